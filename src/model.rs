@@ -1,0 +1,203 @@
+//! Plain data shared by every floor: polygons, wrenches, pressures, slips, scores, grips. SI units, no mathematics.
+//!
+//! Grip frame: origin midway between the jaws; `x3` is the closing axis; `x1` is the approach axis (palm towards
+//! fingertips); `x2 = x3 x x1`. Face I lies at `x3 = +d/2` (the jaw pushes the body along `-x3`), face II at `x3 = -d/2`.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// A closed loop of points [m]; the last point joins the first.
+pub type Ring = Vec<DVec2>;
+
+/// A plane polygon with holes [m]. Outer ring counter-clockwise, holes clockwise once normalised
+/// ([`crate::geometry::polygon`]); readers accept either sense.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Polygon {
+    /// Outer boundary.
+    pub outer: Ring,
+    /// Boundaries of the holes.
+    #[serde(default)]
+    pub holes: Vec<Ring>,
+}
+
+/// One contact area: disjoint polygons in the pad plane `(x1, x2)` [m].
+pub type Patch = Vec<Polygon>;
+
+/// The two contact areas of a grip, both in the grip frame's `(x1, x2)`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Contact {
+    /// Contact area on face I (at `x3 = +d/2`).
+    #[serde(rename = "A_I")]
+    pub face_i: Patch,
+    /// Contact area on face II (at `x3 = -d/2`).
+    #[serde(rename = "A_II")]
+    pub face_ii: Patch,
+}
+
+/// A force [N] and a moment [N m] ON the body. The frame and the point of the moment are the holder's to state;
+/// in mechanics it is the grip frame and its origin.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Wrench {
+    /// Force [N].
+    pub force: DVec3,
+    /// Moment [N m].
+    pub moment: DVec3,
+}
+
+/// Pressure planes of equations (1)(2): `p_I = a_i0 + a1 x1 + a2 x2`, `p_II = a_ii0 - a1 x1 - a2 x2`,
+/// both `max(0, .)` where a pad separates (19)(20).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Pressure {
+    /// Value of `p_I` at the origin [Pa].
+    #[serde(rename = "aI0")]
+    pub a_i0: f64,
+    /// Value of `p_II` at the origin [Pa].
+    #[serde(rename = "aII0")]
+    pub a_ii0: f64,
+    /// Slope along `x1` [Pa/m].
+    pub a1: f64,
+    /// Slope along `x2` [Pa/m].
+    pub a2: f64,
+}
+
+/// The incipient motion of the body in the grip.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "type", rename_all = "lowercase")]
+pub enum Slip {
+    /// Rotation about `x3` through `c` [m]; `sense` is +1 (the paper's) or -1 (there a negative mu).
+    Rotation {
+        /// Slip centre in `(x1, x2)` [m].
+        c: [f64; 2],
+        /// Sense of rotation about `+x3`.
+        sense: i8,
+    },
+    /// Pure translation: unit velocity of the body in `(x1, x2)`.
+    Translation {
+        /// Unit velocity.
+        direction: [f64; 2],
+    },
+    /// No load in the pad plane: nothing slips at any friction.
+    None,
+}
+
+/// What the solver found out about a grip under a load.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Status {
+    /// A limit state exists; no other was found.
+    Ok,
+    /// A limit state exists with part of the pads separated, and the caller asked to discard such grips.
+    Separating,
+    /// A limit state was found, but another one exists or could not be excluded.
+    Ambiguous,
+    /// No limit state exists: the contact twists out.
+    TwistedOut,
+    /// `|F3| >= 2 Fn`: one pad carries no normal force.
+    NoNormalForce,
+    /// A contact area is empty.
+    NoContact,
+    /// The iteration ended above its residual target; the numbers are the best found.
+    NotConverged,
+}
+
+impl Status {
+    /// Whether `mu_s` is a usable number for ranking.
+    pub fn holds(self) -> bool {
+        matches!(self, Self::Ok | Self::Ambiguous)
+    }
+}
+
+/// Lower and upper bound on `mu_s` for the found pressure (MECHANICS: the slip problem is convex).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Bounds {
+    /// `(w.v)/D(v)` of the best twist tried.
+    pub lower: f64,
+    /// From the supports of the tried twists; infinite where none encloses the load.
+    pub upper: f64,
+}
+
+/// The answer for one contact pair and one wrench.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    /// What kind of answer this is.
+    pub status: Status,
+    /// Smallest friction coefficient that holds; `None` when no limit state exists.
+    pub mu_s: Option<f64>,
+    /// Incipient motion at `mu_s`.
+    pub slip: Option<Slip>,
+    /// Pressure planes at the limit state.
+    pub pressure: Option<Pressure>,
+    /// Area of face I still in contact [m^2].
+    pub contact_area_i: f64,
+    /// Area of face II still in contact [m^2].
+    pub contact_area_ii: f64,
+    /// Largest of the seven equilibrium equations' residuals, forces over Fn and moments over Fn sqrt(A).
+    pub residual: f64,
+    /// Certificate on `mu_s` for the found pressure.
+    pub bounds: Option<Bounds>,
+    /// Evaluations of the contact integrals spent.
+    pub evaluations: u32,
+}
+
+/// A rigid frame: `point_in_outer = rotation * point_in_inner + origin`. Columns of `rotation` are the inner axes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Frame {
+    /// Orthonormal, right-handed.
+    pub rotation: DMat3,
+    /// Origin of the inner frame in the outer one [m].
+    pub origin: DVec3,
+}
+
+impl Frame {
+    /// The identity.
+    pub const IDENTITY: Self = Self { rotation: DMat3::IDENTITY, origin: DVec3::ZERO };
+
+    /// A point of the inner frame in the outer one.
+    pub fn point(&self, point: DVec3) -> DVec3 {
+        self.rotation * point + self.origin
+    }
+
+    /// A point of the outer frame in the inner one.
+    pub fn point_inverse(&self, point: DVec3) -> DVec3 {
+        self.rotation.transpose() * (point - self.origin)
+    }
+
+    /// `self` after `inner`: the frame of `inner`'s inside in `self`'s outside.
+    #[must_use]
+    pub fn compose(&self, inner: &Self) -> Self {
+        Self { rotation: self.rotation * inner.rotation, origin: self.point(inner.origin) }
+    }
+
+    /// The inverse frame.
+    #[must_use]
+    pub fn inverse(&self) -> Self {
+        let rotation = self.rotation.transpose();
+        Self { rotation, origin: -(rotation * self.origin) }
+    }
+}
+
+/// A candidate grip on a part, free of interference.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Grip {
+    /// Number of the candidate, stable for the same input and settings.
+    pub id: u64,
+    /// Grip frame in the part frame.
+    pub part_from_grip: Frame,
+    /// Distance between the two faces, `d` [m].
+    pub width: f64,
+    /// Planar face of the part under pad I ([`crate::part::PlanarFace::id`]).
+    pub face_i: u32,
+    /// Planar face of the part under pad II.
+    pub face_ii: u32,
+    /// Angle of the approach axis about the closing axis, from the face pair's reference direction [rad].
+    pub angle: f64,
+    /// Contact areas in the grip frame; shared by grips whose areas are the same in the pad frame.
+    pub contact: Arc<Contact>,
+    /// The grip with the same pose and the jaws exchanged, when that one is the representative.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flip_of: Option<u64>,
+}
