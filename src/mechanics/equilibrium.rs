@@ -1,0 +1,260 @@
+//! The seven equations (3)-(9) together: pressure and slip coupled by the friction forces' lever `d/2`, with separation.
+//!
+//! Unknowns, in the pads' scale: the twist `v` (three, its length carries `mu`) and `q = (a_i0, a_ii0, a1, a2)`.
+//! Residuals: `w - D grad D` (three), the two normal forces, the two out-of-plane moments. The Jacobian is analytic;
+//! a zero-pressure line that moves adds nothing to it because the pressure is zero there.
+
+use glam::DVec2;
+use nalgebra::{SMatrix, SVector, Vector3};
+
+use crate::contact::{Loops, friction, moments};
+
+use super::pads::{Load, Pads};
+use super::pressure::{self, face_pressure, separates};
+use super::slip::{self, Field, Refiner};
+
+type Vector7 = SVector<f64, 7>;
+type Matrix7 = SMatrix<f64, 7, 7>;
+
+/// A state of the seven unknowns and what the equations say of it.
+#[derive(Debug, Clone, Copy)]
+pub struct State {
+    /// Twist, then pressure coefficients.
+    pub z: Vector7,
+    /// Residuals of the seven equations, forces in units of `Fn`, moments of `Fn` times the pads' length; the first
+    /// three over the load's size.
+    pub residual: Vector7,
+    /// `mu` over the load's size.
+    pub mu_over_size: f64,
+    /// Areas left in contact, scaled.
+    pub areas: [f64; 2],
+}
+
+impl State {
+    /// Pressure coefficients.
+    pub fn q(&self) -> [f64; 4] {
+        [self.z[3], self.z[4], self.z[5], self.z[6]]
+    }
+
+    /// Twist.
+    pub fn twist(&self) -> Vector3<f64> {
+        Vector3::new(self.z[0], self.z[1], self.z[2])
+    }
+}
+
+/// Solves one contact pair under one load; keeps its scratch memory and counts its work.
+pub struct Solver<'a> {
+    pads: &'a Pads,
+    load: Load,
+    scratch: [Loops; 2],
+    /// Evaluations of the friction integrals so far.
+    pub evaluations: u32,
+    /// Newton steps so far.
+    pub iterations: u32,
+}
+
+/// Residual at which a state counts as a solution.
+pub const TOLERANCE: f64 = 1e-11;
+
+impl<'a> Solver<'a> {
+    /// A solver for `load` with a non-zero in-plane part.
+    pub fn new(pads: &'a Pads, load: Load) -> Self {
+        Self { pads, load, scratch: [Loops::default(), Loops::default()], evaluations: 0, iterations: 0 }
+    }
+
+    /// Residuals and, if wanted, the Jacobian at `z`, the coupling scaled by `coupling` (1: the real one).
+    fn evaluate(&mut self, z: &Vector7, coupling: f64, jacobian: Option<&mut Matrix7>) -> State {
+        self.evaluations += 1;
+        let v = Vector3::new(z[0], z[1], z[2]);
+        let q = [z[3], z[4], z[5], z[6]];
+        let mut gradients = [Vector3::zeros(); 2];
+        let mut hessians = [nalgebra::Matrix3::zeros(); 2];
+        // d gradient_k / d q_j for j = own offset, a1, a2
+        let mut by_pressure = [[Vector3::zeros(); 3]; 2];
+        let mut m = [[0.0; 6]; 2];
+        for k in 0..2 {
+            let p = face_pressure(&q, k);
+            let area = if separates(&self.pads.areas[k], p) {
+                self.pads.areas[k].clip_into(p, &mut self.scratch[k]);
+                m[k] = moments(&self.scratch[k]);
+                &self.scratch[k]
+            } else {
+                m[k] = self.pads.moments[k];
+                &self.pads.areas[k]
+            };
+            let f = friction(area, [v.x, v.y, v.z], p);
+            let sign = if k == 0 { 1.0 } else { -1.0 };
+            by_pressure[k] = [Vector3::from(f.g[0]), sign * Vector3::from(f.g[1]), sign * Vector3::from(f.g[2])];
+            gradients[k] = Vector3::from(f.gradient(p));
+            hessians[k] = nalgebra::Matrix3::from_fn(|i, j| f.hessian[i][j]);
+        }
+        let g = gradients[0] + gradients[1];
+        let d = g.dot(&v);
+        let lever = coupling * self.load.half_distance * self.load.size;
+        let carried = pressure::stiffness(&m) * nalgebra::Vector4::new(q[0], q[1], q[2], q[3]);
+        let difference = gradients[0] - gradients[1];
+        let slip = self.load.direction - d * g;
+        let [m1, m2] = self.load.moment;
+        let residual = Vector7::from([
+            slip.x,
+            slip.y,
+            slip.z,
+            self.load.normal[0] - carried[0],
+            self.load.normal[1] - carried[1],
+            m1 + lever * d * difference.y - carried[3],
+            m2 - lever * d * difference.x + carried[2],
+        ]);
+        if let Some(jacobian) = jacobian {
+            let h = hessians[0] + hessians[1];
+            let dh = hessians[0] - hessians[1];
+            let by_v = -(g * g.transpose() + d * h);
+            jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&by_v);
+            let lever_row = |i: usize, dd: f64, ddifference: f64| lever * (dd * difference[i] + d * ddifference);
+            for j in 0..3 {
+                jacobian[(3, j)] = 0.0;
+                jacobian[(4, j)] = 0.0;
+                jacobian[(5, j)] = lever_row(1, g[j], dh[(1, j)]);
+                jacobian[(6, j)] = -lever_row(0, g[j], dh[(0, j)]);
+            }
+            let k = pressure::stiffness(&m);
+            for j in 0..4 {
+                let (sum, minus) = match j {
+                    0 => (by_pressure[0][0], by_pressure[0][0]),
+                    1 => (by_pressure[1][0], -by_pressure[1][0]),
+                    _ => (by_pressure[0][j - 1] + by_pressure[1][j - 1], by_pressure[0][j - 1] - by_pressure[1][j - 1]),
+                };
+                let dd = sum.dot(&v);
+                let column = -(dd * g + d * sum);
+                for i in 0..3 {
+                    jacobian[(i, 3 + j)] = column[i];
+                }
+                jacobian[(3, 3 + j)] = -k[(0, j)];
+                jacobian[(4, 3 + j)] = -k[(1, j)];
+                jacobian[(5, 3 + j)] = lever_row(1, dd, minus.y) - k[(3, j)];
+                jacobian[(6, 3 + j)] = -lever_row(0, dd, minus.x) + k[(2, j)];
+            }
+        }
+        State { z: *z, residual, mu_over_size: d, areas: [m[0][0], m[1][0]] }
+    }
+
+    /// Damped semi-smooth Newton from `z`; `None` when it does not come below [`TOLERANCE`] in `most` steps.
+    fn newton(&mut self, z: Vector7, coupling: f64, most: u32) -> Option<State> {
+        let mut jacobian = Matrix7::zeros();
+        let mut at = self.evaluate(&z, coupling, Some(&mut jacobian));
+        for _ in 0..most {
+            let error = at.residual.amax();
+            if !error.is_finite() {
+                return None;
+            }
+            if error < 1e-15 {
+                break;
+            }
+            self.iterations += 1;
+            let step = -jacobian.lu().solve(&at.residual)?;
+            let mut t = 1.0;
+            let mut next = None;
+            for _ in 0..8 {
+                let mut next_jacobian = Matrix7::zeros();
+                let tried = self.evaluate(&(at.z + t * step), coupling, Some(&mut next_jacobian));
+                let pressed = tried.areas[0] > 0.0 && tried.areas[1] > 0.0;
+                if pressed && tried.residual.norm() <= (1.0 - 0.1 * t) * at.residual.norm() {
+                    next = Some((tried, next_jacobian));
+                    break;
+                }
+                if error < TOLERANCE {
+                    break; // at rounding level: no step improves it
+                }
+                t *= 0.4;
+            }
+            let Some((tried, next_jacobian)) = next else { break };
+            (at, jacobian) = (tried, next_jacobian);
+        }
+        (at.residual.amax() < TOLERANCE && at.mu_over_size > 0.0).then_some(at)
+    }
+
+    /// A state from the contact moment `target` (see [`pressure::reach`]): its pressure, and the slip under it.
+    pub fn state_at(&mut self, target: DVec2, seed: Option<Vector3<f64>>) -> Option<Vector7> {
+        let q = pressure::solve(self.pads, self.load.normal, target, &mut self.scratch[0])?;
+        let p = [face_pressure(&q, 0), face_pressure(&q, 1)];
+        for k in 0..2 {
+            self.pads.areas[k].clip_into(p[k], &mut self.scratch[k]);
+        }
+        let fields = [Field { area: &self.scratch[0], p: p[0] }, Field { area: &self.scratch[1], p: p[1] }];
+        let slip = slip::solve(&fields, self.load.direction, seed, Refiner::Newton);
+        self.evaluations += slip.evaluations;
+        self.iterations += slip.iterations;
+        let v = slip.twist;
+        Some(Vector7::from([v.x, v.y, v.z, q[0], q[1], q[2], q[3]]))
+    }
+
+    /// The contact moment `(X1, X2)` that the load asks for without friction coupling.
+    pub fn uncoupled_target(&self) -> DVec2 {
+        let [m1, m2] = self.load.moment;
+        DVec2::new(-m2, m1)
+    }
+
+    /// The solution on the branch that starts at `d = 0` without coupling; `None` when that branch does not exist, or
+    /// ends before the real `d`.
+    pub fn branch(&mut self, seed: Option<Vector3<f64>>) -> Option<State> {
+        let start = self.state_at(self.uncoupled_target(), seed)?;
+        self.newton(start, 1.0, 25).or_else(|| self.follow(start))
+    }
+
+    /// Follows the branch from coupling 0 to 1 in steps that adapt to its curvature.
+    pub fn follow(&mut self, start: Vector7) -> Option<State> {
+        let mut at = self.newton(start, 0.0, 25)?;
+        let (mut reached, mut step) = (0.0, 0.25);
+        let mut tangent = Vector7::zeros();
+        while reached < 1.0 {
+            let next = f64::min(1.0, reached + step);
+            let guess = at.z + (next - reached) * tangent;
+            match self.newton(guess, next, 8).or_else(|| self.newton(at.z, next, 8)) {
+                Some(found) if (found.z - at.z).norm() <= 0.5 * at.z.norm() => {
+                    tangent = (found.z - at.z) / (next - reached);
+                    (at, reached) = (found, next);
+                    step *= 1.7;
+                }
+                _ => {
+                    step /= 2.0;
+                    if step < 1e-3 {
+                        return None;
+                    }
+                }
+            }
+        }
+        Some(at)
+    }
+
+    /// All solutions that Newton finds from contact moments spread over the whole region that pressing pads can carry.
+    pub fn search(&mut self, seed: Option<Vector3<f64>>) -> Vec<State> {
+        let [m_i, m_ii] = &self.pads.moments;
+        let n = self.load.normal;
+        let middle = DVec2::new(m_i[1], m_i[2]) * (n[0] / m_i[0]) - DVec2::new(m_ii[1], m_ii[2]) * (n[1] / m_ii[0]);
+        let mut found: Vec<State> = Vec::new();
+        let mut targets = vec![middle];
+        for &share in &SEARCH_SHARES {
+            for k in 0..SEARCH_DIRECTIONS {
+                let direction = DVec2::from_angle(std::f64::consts::TAU * (k as f64 + 0.5 * share) / SEARCH_DIRECTIONS as f64);
+                targets.push(middle + share * pressure::reach_along(self.pads, n, middle, direction) * direction);
+            }
+        }
+        for target in targets {
+            let Some(z) = self.state_at(target, seed) else { continue };
+            let Some(state) = self.newton(z, 1.0, 15) else { continue };
+            if !found.iter().any(|known| same(known, &state)) {
+                found.push(state);
+            }
+        }
+        found
+    }
+}
+
+/// Rays and shares of their length at which [`Solver::search`] starts.
+const SEARCH_DIRECTIONS: usize = 10;
+const SEARCH_SHARES: [f64; 4] = [0.3, 0.6, 0.85, 0.97];
+
+/// Whether two states are the same solution.
+pub fn same(a: &State, b: &State) -> bool {
+    let tilt = (a.z.fixed_rows::<4>(3) - b.z.fixed_rows::<4>(3)).norm();
+    (a.mu_over_size / b.mu_over_size - 1.0).abs() < 1e-6 && tilt < 1e-5 * (1.0 + a.z.fixed_rows::<4>(3).norm())
+}

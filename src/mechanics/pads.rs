@@ -1,0 +1,94 @@
+//! A contact pair made ready for solving: scaled to its size, in a frame at its middle.
+
+use glam::{DVec2, DVec3};
+
+use crate::contact::{Loops, moments};
+use crate::geometry::polygon::convex_hull;
+use crate::model::{Contact, Pressure, Slip, Wrench};
+
+/// Both contact areas in units of `length`, about `origin`.
+#[derive(Debug, Clone)]
+pub struct Pads {
+    /// The areas I and II, scaled.
+    pub areas: [Loops; 2],
+    /// Their moments ([`moments`]), scaled.
+    pub moments: [[f64; 6]; 2],
+    /// Their convex hulls, counter-clockwise, scaled.
+    pub hulls: [Vec<DVec2>; 2],
+    /// Middle of the areas in the grip frame [m]: the scaled frame's origin.
+    pub origin: DVec2,
+    /// Square root of the mean area [m]: the scaled frame's unit.
+    pub length: f64,
+}
+
+impl Pads {
+    /// `None` when an area is empty.
+    pub fn new(contact: &Contact) -> Option<Self> {
+        let raw = [&contact.face_i, &contact.face_ii].map(|patch| moments(&Loops::new(patch)));
+        if raw.iter().any(|m| !(m[0] > 0.0 && m[0].is_finite())) {
+            return None;
+        }
+        let area = raw[0][0] + raw[1][0];
+        let origin = DVec2::new(raw[0][1] + raw[1][1], raw[0][2] + raw[1][2]) / area;
+        let length = (area / 2.0).sqrt();
+        let areas = [&contact.face_i, &contact.face_ii].map(|patch| Loops::mapped(patch, |point| (point - origin) / length));
+        let moments = [moments(&areas[0]), moments(&areas[1])];
+        let hulls = [convex_hull(areas[0].points()), convex_hull(areas[1].points())];
+        Some(Self { areas, moments, hulls, origin, length })
+    }
+
+    /// The load in units of `force` [N] and of this contact's length, its moment about the scaled frame's origin.
+    pub fn load(&self, distance: f64, force: f64, wrench: &Wrench) -> Load {
+        let origin = DVec3::new(self.origin.x, self.origin.y, 0.0);
+        let f = wrench.force / force;
+        let m = (wrench.moment - origin.cross(wrench.force)) / (force * self.length);
+        let in_plane = nalgebra::Vector3::new(f.x, f.y, m.z);
+        let size = in_plane.norm();
+        let direction = if size > 0.0 { in_plane / size } else { nalgebra::Vector3::zeros() };
+        Load { direction, size, normal: [1.0 + f.z / 2.0, 1.0 - f.z / 2.0], moment: [m.x, m.y], half_distance: distance / self.length / 2.0 }
+    }
+
+    /// Pressure planes in SI about the grip origin from scaled coefficients `(a_i0, a_ii0, a1, a2)`.
+    pub fn pressure(&self, q: [f64; 4], force: f64) -> Pressure {
+        let unit = force / (self.length * self.length);
+        let (a1, a2) = (q[2] * unit / self.length, q[3] * unit / self.length);
+        let shift = a1 * self.origin.x + a2 * self.origin.y;
+        Pressure { a_i0: q[0] * unit - shift, a_ii0: q[1] * unit + shift, a1, a2 }
+    }
+
+    /// The slip in SI about the grip origin from a scaled twist.
+    pub fn slip(&self, twist: nalgebra::Vector3<f64>) -> Slip {
+        let (u, omega) = (DVec2::new(twist.x, twist.y), twist.z);
+        if omega.abs() <= TRANSLATION * u.length() {
+            let direction = u.normalize_or_zero();
+            return Slip::Translation { direction: direction.to_array() };
+        }
+        let c = self.origin + DVec2::new(-u.y, u.x) / omega * self.length;
+        Slip::Rotation { c: c.to_array(), sense: if omega > 0.0 { 1 } else { -1 } }
+    }
+
+    /// A twist `(u1, u2, omega)` about the grip origin, SI up to scale, in the scaled frame.
+    pub fn scaled_twist(&self, twist: [f64; 3]) -> nalgebra::Vector3<f64> {
+        let [u1, u2, omega] = twist;
+        nalgebra::Vector3::new(u1 - omega * self.origin.y, u2 + omega * self.origin.x, omega * self.length)
+    }
+}
+
+/// Angular over linear velocity, in pad lengths, below which a slip is called a translation: rounding of the load's
+/// moment alone moves the slip centre this far out.
+const TRANSLATION: f64 = 1e-14;
+
+/// A scaled load: forces in units of the gripping force, lengths in the pads' length.
+#[derive(Debug, Clone, Copy)]
+pub struct Load {
+    /// Unit vector of `(F1, F2, M3)`, or zero.
+    pub direction: nalgebra::Vector3<f64>,
+    /// Norm of `(F1, F2, M3)`.
+    pub size: f64,
+    /// Normal forces `N_I`, `N_II` of equations (8)(9).
+    pub normal: [f64; 2],
+    /// `(M1, M2)`.
+    pub moment: [f64; 2],
+    /// `d/2`.
+    pub half_distance: f64,
+}

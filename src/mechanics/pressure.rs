@@ -1,0 +1,127 @@
+//! The pressure that carries given normal forces and out-of-plane moments, with separation where the pads pull
+//! (equations (6)-(9) with given friction, (19)(20)).
+
+use glam::DVec2;
+use nalgebra::{Matrix4, Vector4};
+
+use crate::contact::{Loops, moments};
+
+use super::pads::Pads;
+
+/// Pressure coefficients of face `k` (0: I, 1: II) from `q = (a_i0, a_ii0, a1, a2)`.
+pub fn face_pressure(q: &[f64; 4], k: usize) -> [f64; 3] {
+    if k == 0 { [q[0], q[2], q[3]] } else { [q[1], -q[2], -q[3]] }
+}
+
+/// Whether the pressure plane is negative at a point of the area.
+pub fn separates(area: &Loops, p: [f64; 3]) -> bool {
+    area.points().iter().any(|x| p[0] + p[1] * x.x + p[2] * x.y < 0.0)
+}
+
+/// Moments of the pressed parts of both areas, using `scratch` where an area must be cut.
+pub fn pressed_moments(pads: &Pads, q: &[f64; 4], scratch: &mut Loops) -> [[f64; 6]; 2] {
+    std::array::from_fn(|k| {
+        let p = face_pressure(q, k);
+        if separates(&pads.areas[k], p) {
+            pads.areas[k].clip_into(p, scratch);
+            moments(scratch)
+        } else {
+            pads.moments[k]
+        }
+    })
+}
+
+/// Stiffness: `(N_I, N_II, X1, X2) = K q` with `X = int_I x p_I - int_II x p_II`.
+pub fn stiffness(m: &[[f64; 6]; 2]) -> Matrix4<f64> {
+    let [a, b] = m;
+    Matrix4::new(
+        a[0], 0.0, a[1], a[2], //
+        0.0, b[0], -b[1], -b[2], //
+        a[1], -b[1], a[3] + b[3], a[4] + b[4], //
+        a[2], -b[2], a[4] + b[4], a[5] + b[5],
+    )
+}
+
+/// Distance of the contact moment `target = (X1, X2)` inside the region `N_I conv A_I - N_II conv A_II` that pressing
+/// pads can carry, in units of force times length; not positive: the contact twists out.
+pub fn reach(pads: &Pads, normal: [f64; 2], target: DVec2) -> f64 {
+    region_edges(pads, normal).map(|(e, support)| support - e.dot(target)).fold(f64::INFINITY, f64::min)
+}
+
+/// How far from `from` the region of [`reach`] extends along the unit vector `direction`.
+pub fn reach_along(pads: &Pads, normal: [f64; 2], from: DVec2, direction: DVec2) -> f64 {
+    region_edges(pads, normal)
+        .filter(|(e, _)| e.dot(direction) > 0.0)
+        .map(|(e, support)| (support - e.dot(from)) / e.dot(direction))
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Outward normals of the region's edges with the region's support in that direction.
+fn region_edges(pads: &Pads, normal: [f64; 2]) -> impl Iterator<Item = (DVec2, f64)> {
+    let [hull_i, hull_ii] = &pads.hulls;
+    let support = move |e: DVec2| {
+        let i = hull_i.iter().map(|x| e.dot(*x)).fold(f64::NEG_INFINITY, f64::max);
+        let ii = hull_ii.iter().map(|x| -e.dot(*x)).fold(f64::NEG_INFINITY, f64::max);
+        normal[0] * i + normal[1] * ii
+    };
+    let normals = |hull: &'_ [DVec2], sign: f64| {
+        (0..hull.len()).map(|i| {
+            let edge = hull[(i + 1) % hull.len()] - hull[i];
+            sign * DVec2::new(edge.y, -edge.x).normalize_or_zero()
+        }).collect::<Vec<_>>()
+    };
+    let all = normals(hull_i, 1.0).into_iter().chain(normals(hull_ii, -1.0));
+    all.filter(|e| *e != DVec2::ZERO).map(move |e| (e, support(e)))
+}
+
+/// The pressure `q = (a_i0, a_ii0, a1, a2)` that carries the normal forces and the contact moment `target`; `None`
+/// outside [`reach`] or at its very rim, where the iteration ends unresolved.
+///
+/// It minimises the convex `1/2 sum int p^2 - f . q` by Newton's method; each step is one solve on the areas cut at the
+/// current zero-pressure lines (paper 3.6), damped so that the function falls.
+pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, scratch: &mut Loops) -> Option<[f64; 4]> {
+    if reach(pads, normal, target) <= 0.0 {
+        return None;
+    }
+    let load = Vector4::new(normal[0], normal[1], target.x, target.y);
+    let mut q = Vector4::new(normal[0] / pads.moments[0][0], normal[1] / pads.moments[1][0], 0.0, 0.0);
+    let mut k = stiffness(&pads.moments);
+    let mut error = k * q - load;
+    let scale = load.amax();
+    let mut value = 0.5 * q.dot(&(k * q)) - load.dot(&q);
+    for _ in 0..300 {
+        if error.amax() <= 1e-15 * scale {
+            break;
+        }
+        let mut matrix = k;
+        for lift in [0.0, 1e-14, 1e-10, 1e-6] {
+            matrix = k + Matrix4::from_diagonal(&k.diagonal()) * lift + Matrix4::identity() * (lift * 1e-3);
+            if matrix.cholesky().is_some() {
+                break;
+            }
+        }
+        let step = -matrix.cholesky()?.solve(&error);
+        let slope = error.dot(&step);
+        let mut t = 1.0;
+        let mut moved = false;
+        for _ in 0..50 {
+            let tried = q + t * step;
+            let m = pressed_moments(pads, &tried.into(), scratch);
+            let stiff = stiffness(&m);
+            let tried_error = stiff * tried - load;
+            let tried_value = 0.5 * tried.dot(&(stiff * tried)) - load.dot(&tried);
+            if m[0][0] > 0.0 && m[1][0] > 0.0 && (tried_value <= value + 1e-4 * t * slope || tried_error.norm() < 0.5 * error.norm()) {
+                moved = tried_error.norm() < error.norm() || error.amax() > 1e-10 * scale;
+                if moved {
+                    (q, k, error, value) = (tried, stiff, tried_error, tried_value);
+                }
+                break;
+            }
+            t *= 0.5;
+        }
+        if !moved {
+            break;
+        }
+    }
+    (error.amax() <= 1e-9 * scale).then(|| q.into())
+}
