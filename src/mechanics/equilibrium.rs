@@ -11,7 +11,7 @@ use crate::contact::{Loops, friction, moments};
 
 use super::pads::{Load, Pads};
 use super::pressure::{self, face_pressure, separates};
-use super::slip::{self, Field, Refiner};
+use super::slip::{self, Field};
 
 type Vector7 = SVector<f64, 7>;
 type Matrix7 = SMatrix<f64, 7, 7>;
@@ -180,7 +180,7 @@ impl<'a> Solver<'a> {
             self.pads.areas[k].clip_into(p[k], &mut self.scratch[k]);
         }
         let fields = [Field { area: &self.scratch[0], p: p[0] }, Field { area: &self.scratch[1], p: p[1] }];
-        let slip = slip::solve(&fields, self.load.direction, seed, Refiner::Newton);
+        let slip = slip::solve(&fields, self.load.direction, seed);
         self.evaluations += slip.evaluations;
         self.iterations += slip.iterations;
         let v = slip.twist;

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::contact::{Loops, moments};
-use crate::geometry::polygon::convex_hull;
+use crate::geometry::hull::convex_hull;
 use crate::model::{Contact, Pressure, Slip, Wrench};
 
 /// Both contact areas in units of `length`, about `origin`.

@@ -35,10 +35,22 @@ pub fn pressed_moments(pads: &Pads, q: &[f64; 4], scratch: &mut Loops) -> [[f64;
 pub fn stiffness(m: &[[f64; 6]; 2]) -> Matrix4<f64> {
     let [a, b] = m;
     Matrix4::new(
-        a[0], 0.0, a[1], a[2], //
-        0.0, b[0], -b[1], -b[2], //
-        a[1], -b[1], a[3] + b[3], a[4] + b[4], //
-        a[2], -b[2], a[4] + b[4], a[5] + b[5],
+        a[0],
+        0.0,
+        a[1],
+        a[2], //
+        0.0,
+        b[0],
+        -b[1],
+        -b[2], //
+        a[1],
+        -b[1],
+        a[3] + b[3],
+        a[4] + b[4], //
+        a[2],
+        -b[2],
+        a[4] + b[4],
+        a[5] + b[5],
     )
 }
 
@@ -65,10 +77,12 @@ fn region_edges(pads: &Pads, normal: [f64; 2]) -> impl Iterator<Item = (DVec2, f
         normal[0] * i + normal[1] * ii
     };
     let normals = |hull: &'_ [DVec2], sign: f64| {
-        (0..hull.len()).map(|i| {
-            let edge = hull[(i + 1) % hull.len()] - hull[i];
-            sign * DVec2::new(edge.y, -edge.x).normalize_or_zero()
-        }).collect::<Vec<_>>()
+        (0..hull.len())
+            .map(|i| {
+                let edge = hull[(i + 1) % hull.len()] - hull[i];
+                sign * DVec2::new(edge.y, -edge.x).normalize_or_zero()
+            })
+            .collect::<Vec<_>>()
     };
     let all = normals(hull_i, 1.0).into_iter().chain(normals(hull_ii, -1.0));
     all.filter(|e| *e != DVec2::ZERO).map(move |e| (e, support(e)))

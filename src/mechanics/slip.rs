@@ -10,8 +10,6 @@ use nalgebra::{Matrix3, Vector3};
 use crate::contact::{Friction, Loops, friction, moments};
 use crate::model::Bounds;
 
-use super::shanno;
-
 /// An area with its pressure `p0 + p1 x1 + p2 x2`, not negative on the area.
 #[derive(Debug, Clone, Copy)]
 pub struct Field<'a> {
@@ -61,16 +59,6 @@ pub struct Solution {
     pub iterations: u32,
 }
 
-/// Which minimiser polishes a solution.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Refiner {
-    /// Damped Newton with the analytic Hessian.
-    #[default]
-    Newton,
-    /// Shanno's conjugate-direction method with Beale-Powell restarts (the paper's reference [17]).
-    Shanno,
-}
-
 /// Below this residual, relative to the load, a solution is at rounding level.
 const CONVERGED: f64 = 2e-15;
 
@@ -94,17 +82,14 @@ pub fn ellipsoid_start(fields: &[Field<'_>], w: Vector3<f64>) -> Vector3<f64> {
 
 /// Solves the slip problem for the in-plane load `w = (F1, F2, M3)`, not zero, from `start` or, without one, from the
 /// ellipsoid approximation.
-pub fn solve(fields: &[Field<'_>], w: Vector3<f64>, start: Option<Vector3<f64>>, refiner: Refiner) -> Solution {
+pub fn solve(fields: &[Field<'_>], w: Vector3<f64>, start: Option<Vector3<f64>>) -> Solution {
     let start = start.filter(|v| w.dot(v) > 0.0).unwrap_or_else(|| ellipsoid_start(fields, w));
     let start = start / start.norm();
     let first = dissipation(fields, start);
     // The exact minimum along the ray of the start.
     let scale = w.dot(&start) / (first.value * first.value);
     let at_start = Dissipation { value: first.value * scale, gradient: first.gradient, hessian: first.hessian / scale };
-    match refiner {
-        Refiner::Newton => newton(fields, w, start * scale, at_start),
-        Refiner::Shanno => conjugate(fields, w, start * scale),
-    }
+    newton(fields, w, start * scale, at_start)
 }
 
 fn newton(fields: &[Field<'_>], w: Vector3<f64>, mut v: Vector3<f64>, mut at: Dissipation) -> Solution {
@@ -154,29 +139,6 @@ fn newton_step(matrix: Matrix3<f64>, rhs: Vector3<f64>) -> Vector3<f64> {
         lift = if lift == 0.0 { 1e-15 } else { lift * 100.0 };
     }
     rhs / trace
-}
-
-/// Shanno's method on the same convex function, in variables in which its Hessian at the start is the identity.
-fn conjugate(fields: &[Field<'_>], w: Vector3<f64>, start: Vector3<f64>) -> Solution {
-    let at = dissipation(fields, start);
-    let matrix = at.gradient * at.gradient.transpose() + at.value * at.hessian;
-    let factor = matrix.cholesky().map_or_else(Matrix3::identity, |c| c.l());
-    let inverse_transpose = factor.transpose().try_inverse().unwrap_or_else(Matrix3::identity);
-    let scale = w.amax();
-    let run = shanno::minimise(
-        |y: &[f64; 3]| {
-            let v = start + inverse_transpose * Vector3::from(*y);
-            let at = dissipation(fields, v);
-            let gradient = inverse_transpose.transpose() * (at.value * at.gradient - w);
-            (at.value * at.value / 2.0 - w.dot(&v), gradient.into())
-        },
-        [0.0; 3],
-        &shanno::Options { gradient_tolerance: 1e-13 * w.norm() / factor.norm(), max_iterations: 200, ..Default::default() },
-    );
-    let v = start + inverse_transpose * Vector3::from(run.x);
-    let end = dissipation(fields, v);
-    let error = end.value * end.gradient - w;
-    Solution { twist: v, mu: end.value, residual: error.amax() / scale, evaluations: run.evaluations as u32 + 2, iterations: run.iterations as u32 }
 }
 
 /// Relative size of the twist's turns from which the upper bound is made; the bound's gap is about its square.
