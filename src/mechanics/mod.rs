@@ -5,7 +5,10 @@
 pub mod equilibrium;
 pub mod pads;
 pub mod pressure;
+pub mod shanno;
 pub mod slip;
+pub mod twist_out;
+pub mod wolter;
 
 use nalgebra::Vector3;
 
