@@ -11,6 +11,7 @@ pub mod gripper;
 pub mod load;
 pub mod mechanics;
 pub mod model;
+pub mod case;
 pub mod part;
 pub mod propose;
 pub mod rank;

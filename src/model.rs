@@ -132,8 +132,10 @@ pub struct Score {
     /// Pressure planes at the limit state.
     pub pressure: Option<Pressure>,
     /// Area of face I still in contact [m^2].
+    #[serde(rename = "contact_area_I")]
     pub contact_area_i: f64,
     /// Area of face II still in contact [m^2].
+    #[serde(rename = "contact_area_II")]
     pub contact_area_ii: f64,
     /// Largest of the seven equilibrium equations' residuals, forces over Fn and moments over Fn sqrt(A).
     pub residual: f64,

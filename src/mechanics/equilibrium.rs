@@ -11,7 +11,8 @@ use crate::contact::{Loops, friction, moments};
 
 use super::pads::{Load, Pads};
 use super::pressure::{self, face_pressure, separates};
-use super::slip::{self, Field};
+use super::shanno;
+use super::slip::{self, Field, Refiner};
 
 type Vector7 = SVector<f64, 7>;
 type Matrix7 = SMatrix<f64, 7, 7>;
@@ -46,6 +47,7 @@ impl State {
 pub struct Solver<'a> {
     pads: &'a Pads,
     load: Load,
+    refiner: Refiner,
     scratch: [Loops; 2],
     /// Evaluations of the friction integrals so far.
     pub evaluations: u32,
@@ -58,8 +60,8 @@ pub const TOLERANCE: f64 = 1e-11;
 
 impl<'a> Solver<'a> {
     /// A solver for `load` with a non-zero in-plane part.
-    pub fn new(pads: &'a Pads, load: Load) -> Self {
-        Self { pads, load, scratch: [Loops::default(), Loops::default()], evaluations: 0, iterations: 0 }
+    pub fn new(pads: &'a Pads, load: Load, refiner: Refiner) -> Self {
+        Self { pads, load, refiner, scratch: [Loops::default(), Loops::default()], evaluations: 0, iterations: 0 }
     }
 
     /// Residuals and, if wanted, the Jacobian at `z`, the coupling scaled by `coupling` (1: the real one).
@@ -172,6 +174,33 @@ impl<'a> Solver<'a> {
         (at.residual.amax() < TOLERANCE && at.mu_over_size > 0.0).then_some(at)
     }
 
+    /// Shanno's method on half the squared residual, in variables scaled by the Jacobian at the start of each round.
+    fn conjugate(&mut self, z: Vector7) -> Option<State> {
+        let mut jacobian = Matrix7::zeros();
+        let mut at = self.evaluate(&z, 1.0, Some(&mut jacobian));
+        for _ in 0..CONJUGATE_ROUNDS {
+            if at.residual.amax() < 1e-14 {
+                break;
+            }
+            let back = jacobian.try_inverse()?;
+            let (origin, before) = (at.z, at.residual.norm());
+            let options = shanno::Options { gradient_tolerance: 0.0, value_target: 0.5e-28, max_evaluations: 60 };
+            let run = shanno::minimise([0.0; 7], &options, |y: &[f64; 7]| {
+                let mut jacobian = Matrix7::zeros();
+                let state = self.evaluate(&(origin + back * Vector7::from(*y)), 1.0, Some(&mut jacobian));
+                let gradient = (jacobian * back).transpose() * state.residual;
+                (0.5 * state.residual.norm_squared(), gradient.into())
+            });
+            self.iterations += run.iterations;
+            at = self.evaluate(&(origin + back * Vector7::from(run.x)), 1.0, Some(&mut jacobian));
+            if at.residual.norm() > 0.5 * before {
+                break;
+            }
+        }
+        let pressed = at.areas[0] > 0.0 && at.areas[1] > 0.0;
+        (pressed && at.residual.amax() < TOLERANCE && at.mu_over_size > 0.0).then_some(at)
+    }
+
     /// A state from the contact moment `target` (see [`pressure::reach`]): its pressure, and the slip under it.
     pub fn state_at(&mut self, target: DVec2, seed: Option<Vector3<f64>>) -> Option<Vector7> {
         let q = pressure::solve(self.pads, self.load.normal, target, &mut self.scratch[0])?;
@@ -180,7 +209,7 @@ impl<'a> Solver<'a> {
             self.pads.areas[k].clip_into(p[k], &mut self.scratch[k]);
         }
         let fields = [Field { area: &self.scratch[0], p: p[0] }, Field { area: &self.scratch[1], p: p[1] }];
-        let slip = slip::solve(&fields, self.load.direction, seed);
+        let slip = slip::solve(&fields, self.load.direction, seed, self.refiner);
         self.evaluations += slip.evaluations;
         self.iterations += slip.iterations;
         let v = slip.twist;
@@ -197,7 +226,11 @@ impl<'a> Solver<'a> {
     /// ends before the real `d`.
     pub fn branch(&mut self, seed: Option<Vector3<f64>>) -> Option<State> {
         let start = self.state_at(self.uncoupled_target(), seed)?;
-        self.newton(start, 1.0, 25).or_else(|| self.follow(start))
+        let polished = match self.refiner {
+            Refiner::Newton => self.newton(start, 1.0, 25),
+            Refiner::Shanno => self.conjugate(start),
+        };
+        polished.or_else(|| self.follow(start))
     }
 
     /// Follows the branch from coupling 0 to 1 in steps that adapt to its curvature.
@@ -248,6 +281,9 @@ impl<'a> Solver<'a> {
         found
     }
 }
+
+/// Rounds of [`Solver::conjugate`], each with a fresh scaling.
+const CONJUGATE_ROUNDS: u32 = 8;
 
 /// Rays and shares of their length at which [`Solver::search`] starts.
 const SEARCH_DIRECTIONS: usize = 10;

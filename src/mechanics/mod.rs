@@ -3,6 +3,7 @@
 //! [`solve`] answers one case; [`Pads`] keeps what a contact determines for many loads.
 
 pub mod equilibrium;
+pub mod inverse;
 pub mod pads;
 pub mod pressure;
 pub mod shanno;
@@ -20,6 +21,7 @@ use equilibrium::{Solver, State};
 pub use pads::{Load, Pads};
 use pressure::face_pressure;
 use slip::Field;
+pub use slip::Refiner;
 
 /// What to do with a grip whose pads separate under the load.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -36,6 +38,8 @@ pub enum Separation {
 pub struct Options {
     /// Treatment of separation.
     pub separation: Separation,
+    /// Minimiser that polishes the solution.
+    pub refiner: Refiner,
     /// A twist `(u1, u2, omega)` about the grip origin to start from (SI, any length), e.g. the best seed.
     pub seed: Option<[f64; 3]>,
 }
@@ -93,7 +97,7 @@ pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, optio
         return pressed_only(pads, force, &load, options);
     }
     let seed = options.seed.map(|twist| pads.scaled_twist(twist));
-    let mut solver = Solver::new(pads, load);
+    let mut solver = Solver::new(pads, load, options.refiner);
     let branch = solver.branch(seed);
     let strong = |state: &State| state.mu_over_size * load.size * 2.0 * load.half_distance > COUPLING_SEARCH;
     let (state, unique) = match branch {

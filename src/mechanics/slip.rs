@@ -10,6 +10,8 @@ use nalgebra::{Matrix3, Vector3};
 use crate::contact::{Friction, Loops, friction, moments};
 use crate::model::Bounds;
 
+use super::shanno;
+
 /// An area with its pressure `p0 + p1 x1 + p2 x2`, not negative on the area.
 #[derive(Debug, Clone, Copy)]
 pub struct Field<'a> {
@@ -59,6 +61,17 @@ pub struct Solution {
     pub iterations: u32,
 }
 
+/// Which minimiser refines a solution.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Refiner {
+    /// Damped Newton with the analytic Hessian or Jacobian.
+    #[default]
+    Newton,
+    /// Shanno's conjugate-direction method (the paper's reference [17]), in variables scaled by the Hessian or Jacobian
+    /// at the start.
+    Shanno,
+}
+
 /// Below this residual, relative to the load, a solution is at rounding level.
 const CONVERGED: f64 = 2e-15;
 
@@ -82,14 +95,17 @@ pub fn ellipsoid_start(fields: &[Field<'_>], w: Vector3<f64>) -> Vector3<f64> {
 
 /// Solves the slip problem for the in-plane load `w = (F1, F2, M3)`, not zero, from `start` or, without one, from the
 /// ellipsoid approximation.
-pub fn solve(fields: &[Field<'_>], w: Vector3<f64>, start: Option<Vector3<f64>>) -> Solution {
+pub fn solve(fields: &[Field<'_>], w: Vector3<f64>, start: Option<Vector3<f64>>, refiner: Refiner) -> Solution {
     let start = start.filter(|v| w.dot(v) > 0.0).unwrap_or_else(|| ellipsoid_start(fields, w));
     let start = start / start.norm();
     let first = dissipation(fields, start);
     // The exact minimum along the ray of the start.
     let scale = w.dot(&start) / (first.value * first.value);
     let at_start = Dissipation { value: first.value * scale, gradient: first.gradient, hessian: first.hessian / scale };
-    newton(fields, w, start * scale, at_start)
+    match refiner {
+        Refiner::Newton => newton(fields, w, start * scale, at_start),
+        Refiner::Shanno => conjugate(fields, w, start * scale, at_start),
+    }
 }
 
 fn newton(fields: &[Field<'_>], w: Vector3<f64>, mut v: Vector3<f64>, mut at: Dissipation) -> Solution {
@@ -139,6 +155,24 @@ fn newton_step(matrix: Matrix3<f64>, rhs: Vector3<f64>) -> Vector3<f64> {
         lift = if lift == 0.0 { 1e-15 } else { lift * 100.0 };
     }
     rhs / trace
+}
+
+/// Shanno's method on the same convex function, in variables in which its Hessian at the start is the identity.
+fn conjugate(fields: &[Field<'_>], w: Vector3<f64>, start: Vector3<f64>, at: Dissipation) -> Solution {
+    let matrix = at.gradient * at.gradient.transpose() + at.value * at.hessian;
+    let back = matrix.cholesky().and_then(|factor| factor.l().transpose().try_inverse()).unwrap_or_else(Matrix3::identity);
+    let scale = w.amax();
+    let options = shanno::Options { gradient_tolerance: 1e-13 * (back.transpose() * w).norm(), max_evaluations: 400, ..Default::default() };
+    let run = shanno::minimise([0.0; 3], &options, |y: &[f64; 3]| {
+        let v = start + back * Vector3::from(*y);
+        let at = dissipation(fields, v);
+        let gradient = back.transpose() * (at.value * at.gradient - w);
+        (at.value * at.value / 2.0 - w.dot(&v), gradient.into())
+    });
+    let twist = start + back * Vector3::from(run.x);
+    let end = dissipation(fields, twist);
+    let residual = (end.value * end.gradient - w).amax() / scale;
+    Solution { twist, mu: end.value, residual, evaluations: run.evaluations + 2, iterations: run.iterations }
 }
 
 /// Relative size of the twist's turns from which the upper bound is made; the bound's gap is about its square.

@@ -1,0 +1,97 @@
+//! Contact-pair files: one case, a list, `{"cases": [..]}` or JSON Lines; in SI, about the origin midway between the faces.
+
+use std::io::Read;
+use std::path::Path;
+
+use glam::DVec3;
+use serde::Deserialize;
+
+use crate::error::{Error, Result};
+use crate::model::{Contact, Patch, Wrench};
+
+/// One contact pair under one wrench.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Case {
+    /// The case's own name, if it has one.
+    pub id: Option<String>,
+    /// Both contact areas [m].
+    pub contact: Contact,
+    /// Distance of the faces [m].
+    pub distance: f64,
+    /// Gripping force [N].
+    pub force: f64,
+    /// External wrench about the origin midway between the faces.
+    pub wrench: Wrench,
+}
+
+/// As written in a file; keys that are not ours are ignored so that files can carry notes and expected answers.
+#[derive(Deserialize)]
+struct Raw {
+    id: Option<serde_json::Value>,
+    #[serde(rename = "A_I")]
+    a_i: Patch,
+    #[serde(rename = "A_II")]
+    a_ii: Patch,
+    d: f64,
+    #[serde(rename = "Fn")]
+    force: f64,
+    #[serde(rename = "F")]
+    f: DVec3,
+    #[serde(rename = "M")]
+    m: DVec3,
+}
+
+const SHAPE: &str = r#"a case is {"A_I":[{"outer":[[x,y],..],"holes":[..]}],"A_II":[..],"d":..,"Fn":..,"F":[f1,f2,f3],"M":[m1,m2,m3]} in m, N, N m"#;
+
+/// Reads all cases of a file, or of standard input for `-`, in order.
+///
+/// # Errors
+/// When the file cannot be read or a case is not of the form; the message names the file and the place in it.
+pub fn read(path: &Path) -> Result<Vec<Case>> {
+    let text = if path == Path::new("-") {
+        let mut text = String::new();
+        std::io::stdin().read_to_string(&mut text).map_err(|error| Error::io(path, "read", error))?;
+        text
+    } else {
+        std::fs::read_to_string(path).map_err(|error| Error::io(path, "read", error))?
+    };
+    let name = path.display().to_string();
+    // A stream of JSON values covers one value as well as JSON Lines.
+    let mut cases = Vec::new();
+    let mut stream = serde_json::Deserializer::from_str(&text).into_iter::<serde_json::Value>();
+    while let Some(value) = stream.next() {
+        let line = text[..stream.byte_offset().min(text.len())].lines().count();
+        let value = value.map_err(|error| Error::input(&name, format!("is not JSON: {error}"), SHAPE))?;
+        let mut take = |place: String, value: serde_json::Value| -> Result<()> {
+            cases.push(case(&place, value)?);
+            Ok(())
+        };
+        match value {
+            serde_json::Value::Object(mut object) if object.contains_key("cases") => match object.remove("cases") {
+                Some(serde_json::Value::Array(list)) => {
+                    for (index, item) in list.into_iter().enumerate() {
+                        take(format!("{name}: cases[{index}]"), item)?;
+                    }
+                }
+                _ => return Err(Error::input(&name, "\"cases\" is not a list", SHAPE)),
+            },
+            serde_json::Value::Array(list) => {
+                for (index, item) in list.into_iter().enumerate() {
+                    take(format!("{name}: [{index}]"), item)?;
+                }
+            }
+            other => take(format!("{name}: line {line}"), other)?,
+        }
+    }
+    if cases.is_empty() {
+        return Err(Error::input(&name, "holds no case", SHAPE));
+    }
+    Ok(cases)
+}
+
+fn case(place: &str, value: serde_json::Value) -> Result<Case> {
+    let raw: Raw = serde_json::from_value(value).map_err(|error| Error::input(place, error.to_string(), SHAPE))?;
+    let id = raw.id.map(|id| id.as_str().map_or_else(|| id.to_string(), str::to_string));
+    let contact = Contact { face_i: raw.a_i, face_ii: raw.a_ii };
+    Ok(Case { id, contact, distance: raw.d, force: raw.force, wrench: Wrench { force: raw.f, moment: raw.m } })
+}

@@ -1,0 +1,192 @@
+//! `gripfast solve`: one contact pair at a time, with everything visible.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args as ClapArgs, ValueEnum};
+use gripfast::case::{self, Case};
+use gripfast::mechanics::{self, Options, Pads, Refiner, Separation, inverse};
+use gripfast::model::{Score, Slip, Status};
+
+/// Scores contact pairs: the smallest friction coefficient that holds each one's load.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "EXAMPLES:\n  gripfast solve case.json\n  gripfast solve case.json --json\n  gripfast solve case.json --explain --pad-friction 0.5\n\n\
+A case is {\"A_I\":[{\"outer\":[[x,y],..],\"holes\":[]}],\"A_II\":[..],\"d\":..,\"Fn\":..,\"F\":[..],\"M\":[..]} in metres and newtons,\n\
+the load on the body about the point midway between the faces. A file may hold one case, a list, {\"cases\":[..]} or JSON Lines.")]
+pub(crate) struct Args {
+    /// Case file; `-` for standard input.
+    case: PathBuf,
+    /// One JSON object per case on standard output.
+    #[arg(long)]
+    json: bool,
+    /// Also the iterations, the certificate and what each number means.
+    #[arg(long)]
+    explain: bool,
+    /// Pads that separate under the load: solve with the contact left, or discard as the paper does.
+    #[arg(long, value_enum, default_value = "solve")]
+    separation: SeparationArg,
+    /// Minimiser that polishes the solution.
+    #[arg(long, value_enum, default_value = "newton")]
+    refiner: RefinerArg,
+    /// Friction coefficient of the pads: also tells the force needed and the load multiple held.
+    #[arg(long, value_name = "MU")]
+    pad_friction: Option<f64>,
+    /// Safety factor on the pad friction for the force needed.
+    #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
+    safety: f64,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum SeparationArg {
+    Solve,
+    Discard,
+}
+
+impl From<SeparationArg> for Separation {
+    fn from(arg: SeparationArg) -> Self {
+        match arg {
+            SeparationArg::Solve => Self::Solve,
+            SeparationArg::Discard => Self::Discard,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum RefinerArg {
+    Newton,
+    Shanno,
+}
+
+impl From<RefinerArg> for Refiner {
+    fn from(arg: RefinerArg) -> Self {
+        match arg {
+            RefinerArg::Newton => Self::Newton,
+            RefinerArg::Shanno => Self::Shanno,
+        }
+    }
+}
+
+/// Answers of the questions asked the other way round.
+#[derive(serde::Serialize)]
+struct Inverse {
+    force_needed: Option<f64>,
+    load_multiple: f64,
+}
+
+#[derive(serde::Serialize)]
+struct Answer<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    id: Option<&'a str>,
+    #[serde(flatten)]
+    score: Score,
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    inverse: Option<Inverse>,
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if let Some(mu) = args.pad_friction
+        && !(mu.is_finite() && mu > 0.0)
+    {
+        anyhow::bail!("--pad-friction {mu}: give a positive number");
+    }
+    if !(args.safety.is_finite() && args.safety > 0.0) {
+        anyhow::bail!("--safety {}: give a positive number", args.safety);
+    }
+    let options = Options { separation: args.separation.into(), refiner: args.refiner.into(), seed: None };
+    let mut out = std::io::stdout().lock();
+    let cases = case::read(&args.case)?;
+    let mut any = false;
+    for (index, case) in cases.iter().enumerate() {
+        let place = || case.id.clone().unwrap_or_else(|| format!("case {}", index + 1));
+        let score = mechanics::solve(&case.contact, case.distance, case.force, &case.wrench, &options)
+            .map_err(|error| anyhow::anyhow!("{}: {}: {error}", args.case.display(), place()))?;
+        any |= score.status.holds();
+        let inverse = args.pad_friction.and_then(|friction| {
+            let pads = Pads::new(&case.contact)?;
+            Some(Inverse {
+                force_needed: inverse::force_needed(&pads, case.distance, &case.wrench, friction / args.safety, &options),
+                load_multiple: inverse::load_multiple(&pads, case.distance, case.force, &case.wrench, friction, &options),
+            })
+        });
+        if args.json {
+            let mut inverse = inverse;
+            if let Some(inverse) = &mut inverse
+                && !inverse.load_multiple.is_finite()
+            {
+                inverse.load_multiple = f64::MAX;
+            }
+            writeln!(out, "{}", serde_json::to_string(&Answer { id: case.id.as_deref(), score, inverse })?)?;
+        } else {
+            if cases.len() > 1 {
+                writeln!(out, "{}{}", if index > 0 { "\n" } else { "" }, place())?;
+            }
+            print(&mut out, case, &score, inverse.as_ref(), &args)?;
+        }
+    }
+    Ok(if any { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+fn print(out: &mut impl Write, case: &Case, score: &Score, inverse: Option<&Inverse>, args: &Args) -> anyhow::Result<()> {
+    let mm = 1e3;
+    match score.mu_s {
+        Some(mu) => writeln!(out, "smallest friction coefficient that holds  {mu:.6}{}", note(score.status))?,
+        None => writeln!(out, "no answer: {}", reason(score.status))?,
+    }
+    match score.slip {
+        Some(Slip::Rotation { c, sense }) => {
+            let turn = if sense > 0 { "counter-clockwise" } else { "clockwise" };
+            writeln!(out, "about to turn                             {turn} about ({:.4}, {:.4}) mm", c[0] * mm, c[1] * mm)?;
+        }
+        Some(Slip::Translation { direction }) => writeln!(out, "about to slide                            along ({:.4}, {:.4})", direction[0], direction[1])?,
+        Some(Slip::None) => writeln!(out, "nothing slips                             the load has no part in the pad plane")?,
+        None => {}
+    }
+    if let Some(p) = score.pressure {
+        let per_mm = 1e-3;
+        writeln!(out, "pressure on face I  [Pa, x in mm]         {:.6e} {:+.6e} x1 {:+.6e} x2", p.a_i0, p.a1 * per_mm, p.a2 * per_mm)?;
+        writeln!(out, "pressure on face II [Pa, x in mm]         {:.6e} {:+.6e} x1 {:+.6e} x2", p.a_ii0, -p.a1 * per_mm, -p.a2 * per_mm)?;
+        let area = |patch: &[gripfast::model::Polygon]| gripfast::geometry::patch_area(patch);
+        let share = |left: f64, patch: &[gripfast::model::Polygon]| 100.0 * left / area(patch);
+        writeln!(
+            out,
+            "contact left                              I {:.4} mm2 ({:.2} %), II {:.4} mm2 ({:.2} %)",
+            score.contact_area_i * mm * mm,
+            share(score.contact_area_i, &case.contact.face_i),
+            score.contact_area_ii * mm * mm,
+            share(score.contact_area_ii, &case.contact.face_ii)
+        )?;
+    }
+    if let Some(inverse) = inverse {
+        match inverse.force_needed {
+            Some(force) => writeln!(out, "gripping force needed                     {force:.4} N (pad friction {}, safety {})", args.pad_friction.unwrap_or_default(), args.safety)?,
+            None => writeln!(out, "gripping force needed                     none is enough at this pad friction")?,
+        }
+        writeln!(out, "load multiple held                        {:.4}", inverse.load_multiple)?;
+    }
+    if args.explain {
+        if let Some(bounds) = score.bounds {
+            writeln!(out, "certificate for this pressure             {:.15} <= mu_s <= {:.15}", bounds.lower, bounds.upper)?;
+        }
+        writeln!(out, "largest residual of the seven equations   {:.2e}  (forces over Fn, moments over Fn sqrt(A))", score.residual)?;
+        writeln!(out, "evaluations of the integrals              {}  (refiner: {})", score.evaluations, if matches!(args.refiner, RefinerArg::Newton) { "newton" } else { "shanno" })?;
+    }
+    Ok(())
+}
+
+fn note(status: Status) -> &'static str {
+    match status {
+        Status::Ambiguous => "   (ambiguous: another limit state exists; this is the one on the branch from d = 0, or the smallest)",
+        Status::Separating => "   (discarded: the pads separate)",
+        _ => "",
+    }
+}
+
+fn reason(status: Status) -> &'static str {
+    match status {
+        Status::TwistedOut => "no slip limit exists for this load: the contact twists out",
+        Status::NoNormalForce => "the load pulls one pad off: |F3| is not below 2 Fn",
+        Status::NoContact => "a contact area is empty",
+        _ => "the solver found no solution",
+    }
+}
