@@ -3,6 +3,7 @@
 //! A file imports only from modules above it in this list.
 
 pub mod backend;
+pub mod case;
 pub mod contact;
 pub mod error;
 pub mod export;
@@ -11,7 +12,6 @@ pub mod gripper;
 pub mod load;
 pub mod mechanics;
 pub mod model;
-pub mod case;
 pub mod part;
 pub mod propose;
 pub mod rank;

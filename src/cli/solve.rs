@@ -159,7 +159,12 @@ fn print(out: &mut impl Write, case: &Case, score: &Score, inverse: Option<&Inve
     }
     if let Some(inverse) = inverse {
         match inverse.force_needed {
-            Some(force) => writeln!(out, "gripping force needed                     {force:.4} N (pad friction {}, safety {})", args.pad_friction.unwrap_or_default(), args.safety)?,
+            Some(force) => writeln!(
+                out,
+                "gripping force needed                     {force:.4} N (pad friction {}, safety {})",
+                args.pad_friction.unwrap_or_default(),
+                args.safety
+            )?,
             None => writeln!(out, "gripping force needed                     none is enough at this pad friction")?,
         }
         writeln!(out, "load multiple held                        {:.4}", inverse.load_multiple)?;
@@ -169,7 +174,12 @@ fn print(out: &mut impl Write, case: &Case, score: &Score, inverse: Option<&Inve
             writeln!(out, "certificate for this pressure             {:.15} <= mu_s <= {:.15}", bounds.lower, bounds.upper)?;
         }
         writeln!(out, "largest residual of the seven equations   {:.2e}  (forces over Fn, moments over Fn sqrt(A))", score.residual)?;
-        writeln!(out, "evaluations of the integrals              {}  (refiner: {})", score.evaluations, if matches!(args.refiner, RefinerArg::Newton) { "newton" } else { "shanno" })?;
+        writeln!(
+            out,
+            "evaluations of the integrals              {}  (refiner: {})",
+            score.evaluations,
+            if matches!(args.refiner, RefinerArg::Newton) { "newton" } else { "shanno" }
+        )?;
     }
     Ok(())
 }
