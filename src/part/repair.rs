@@ -1,0 +1,140 @@
+//! From joined triangles to one consistent, outward-oriented surface. Only what is broken is touched: a clean mesh
+//! passes unchanged, and each repair is counted.
+
+use glam::DVec3;
+
+use super::mass::Integrals;
+use super::orient::{self, Role, Shell};
+use super::topology::{self, Edges, NONE, ends};
+use super::weld::Soup;
+use super::{Health, MassProperties, Mesh};
+use crate::error::{Error, Result};
+
+/// The repaired surface and what is known about it.
+pub(super) struct Repaired {
+    pub mesh: Mesh,
+    pub health: Health,
+    /// Neighbours, with windings agreeing.
+    pub edges: Edges,
+    pub shell_of: Vec<u32>,
+    pub shells: Vec<Shell>,
+    /// Diagonal of the bounding box [m].
+    pub diagonal: f64,
+    /// Uncertainty of the coordinates from 32-bit floats [m].
+    pub noise: f64,
+    apex: DVec3,
+}
+
+impl Repaired {
+    /// Mass properties at density 1 of all material.
+    pub(super) fn mass(&self) -> MassProperties {
+        let mut total = Integrals::default();
+        for shell in self.shells.iter().filter(|shell| shell.role != Role::Embedded) {
+            total.merge(&shell.integrals);
+        }
+        total.properties(self.apex)
+    }
+}
+
+/// Repairs `soup`, whose unit is `scale` metres. `place` names it in errors.
+///
+/// # Errors
+/// When no triangle with an area is left.
+pub(super) fn repair(soup: Soup, scale: f64, place: &str) -> Result<Repaired> {
+    let mut health = Health { triangles_read: soup.read, degenerate_removed: soup.read - soup.triangles.len(), warnings: soup.warnings, ..Health::default() };
+    let mut mesh = Mesh { vertices: soup.vertices, triangles: soup.triangles };
+    if scale != 1.0 {
+        for vertex in &mut mesh.vertices {
+            *vertex *= scale;
+        }
+    }
+    let (low, high) = mesh.bounding_box();
+    let diagonal = (high - low).length();
+    if mesh.triangles.is_empty() || diagonal <= 0.0 || !diagonal.is_finite() {
+        return Err(Error::input(
+            place,
+            "no triangle has an area",
+            "export the part as a surface mesh; check that its coordinates were not all rounded to the same value",
+        ));
+    }
+    let noise = low.abs().max(high.abs()).max_element() * f64::from(f32::EPSILON);
+    let mut edges = topology::edges(mesh.vertices.len(), &mesh.triangles);
+    if !edges.tangled.is_empty() && remove_duplicates(&mut mesh, &mut health) {
+        edges = topology::edges(mesh.vertices.len(), &mesh.triangles);
+    }
+    let apex = (low + high) / 2.0;
+    let (shell_of, shells) = orient::orient(&mut mesh, &edges, apex, &mut health);
+    if !edges.tangled.is_empty() && (health.windings_reversed > 0 || health.shells_reversed > 0) {
+        edges = topology::edges(mesh.vertices.len(), &mesh.triangles); // which edges are balanced has changed
+    }
+    if health.one_sided_edges > 0 {
+        separate_disagreeing(&mesh, &mut edges);
+    }
+    report_edges(&mesh, &edges, &mut health);
+    Ok(Repaired { mesh, health, edges, shell_of, shells, diagonal, noise, apex })
+}
+
+/// Parts neighbours whose windings still disagree, so that walks over the surface never change sides.
+fn separate_disagreeing(mesh: &Mesh, edges: &mut Edges) {
+    for half in 0..edges.twin.len() as u32 {
+        let twin = edges.twin[half as usize];
+        if twin != NONE && ends(&mesh.triangles, half).0 == ends(&mesh.triangles, twin).0 {
+            edges.twin[half as usize] = NONE;
+            edges.twin[twin as usize] = NONE;
+        }
+    }
+}
+
+fn report_edges(mesh: &Mesh, edges: &Edges, health: &mut Health) {
+    let longest = |halves: &[u32]| {
+        let span = |half: u32| {
+            let (from, to) = ends(&mesh.triangles, half);
+            (mesh.vertices[from as usize], mesh.vertices[to as usize])
+        };
+        halves.iter().map(|&half| span(half)).max_by(|a, b| a.0.distance(a.1).total_cmp(&b.0.distance(b.1))).map(|(a, b)| (a + b) / 2.0)
+    };
+    health.open_edges = edges.open.len();
+    health.open_edge_at = longest(&edges.open);
+    health.tangled_edges = edges.tangled.len();
+    health.tangled_edge_at = longest(&edges.tangled);
+    health.watertight = edges.open.is_empty() && edges.unbalanced == 0 && health.one_sided_edges == 0;
+}
+
+/// Removes repeated triangles, in whatever order and sense their corners are listed. Two of opposite senses in a mesh
+/// that is not two-sided throughout are the wall between two bodies glued together: both go, so that one body is left.
+fn remove_duplicates(mesh: &mut Mesh, health: &mut Health) -> bool {
+    let even = |[a, b, c]: [u32; 3]| (a < b) ^ (b < c) ^ (a < c); // sense of the corners against ascending order
+    let mut keys: Vec<([u32; 3], u32)> = mesh
+        .triangles
+        .iter()
+        .zip(0..)
+        .map(|(&triangle, index)| {
+            let mut key = triangle;
+            key.sort_unstable();
+            (key, index)
+        })
+        .collect();
+    keys.sort_unstable();
+    let mut drop = vec![false; mesh.triangles.len()];
+    let mut walls = Vec::new();
+    for group in keys.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() > 1) {
+        for entry in &group[1..] {
+            drop[entry.1 as usize] = true;
+        }
+        let ups = group.iter().filter(|entry| even(mesh.triangles[entry.1 as usize])).count();
+        if group.len() == 2 && ups == 1 {
+            walls.push(group[0].1);
+        }
+    }
+    // Every triangle of a two-sided mesh is such a pair; walls between bodies are the smaller part of one.
+    if walls.len() * 4 < mesh.triangles.len() {
+        for wall in walls {
+            drop[wall as usize] = true;
+        }
+    }
+    let before = mesh.triangles.len();
+    let mut flags = drop.into_iter();
+    mesh.triangles.retain(|_| !flags.next().unwrap_or(false));
+    health.duplicates_removed += before - mesh.triangles.len();
+    before != mesh.triangles.len()
+}

@@ -1,0 +1,130 @@
+//! Triangles as they come from a reader, joined at equal corners.
+
+use glam::DVec3;
+
+use super::unit::Unit;
+
+/// Triangles of a file in the file's own unit, corners with equal coordinates shared.
+#[derive(Debug, Default)]
+pub(super) struct Soup {
+    pub vertices: Vec<DVec3>,
+    pub triangles: Vec<[u32; 3]>,
+    /// Triangles of the file, counting those without area that were left out.
+    pub read: usize,
+    /// The file's own unit, where it states one.
+    pub unit: Option<Unit>,
+    /// What the reader noticed.
+    pub warnings: Vec<String>,
+}
+
+/// Most triangles that are taken: half-edge numbers (three a triangle) must fit 32 bits with room for repairs.
+pub(super) const MAX_TRIANGLES: usize = 1 << 30;
+
+/// Joins corners with equal coordinates (`-0.0` equals `0.0`) while triangles stream in.
+///
+/// An open-addressing table of vertex numbers: one probe costs one cache line of it and one of the vertices, and
+/// neighbouring triangles hit the same ones.
+#[derive(Default)]
+pub(super) struct Welder {
+    vertices: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+    /// Vertex number plus one; 0 is free. The length is a power of two, at most half full.
+    table: Vec<u32>,
+    read: usize,
+}
+
+impl Welder {
+    /// Adds a triangle; one with two equal corners is only counted.
+    #[inline]
+    pub(super) fn triangle(&mut self, corners: [DVec3; 3]) {
+        self.read += 1;
+        let [a, b, c] = corners.map(|corner| self.vertex(corner));
+        if a != b && b != c && c != a {
+            self.triangles.push([a, b, c]);
+        }
+    }
+
+    /// Triangles taken so far.
+    pub(super) fn count(&self) -> usize {
+        self.read
+    }
+
+    #[inline]
+    fn vertex(&mut self, position: DVec3) -> u32 {
+        // Adding +0.0 turns -0.0 into 0.0, so equal values have equal bits.
+        let position = position + DVec3::ZERO;
+        if self.vertices.len() * 2 >= self.table.len() {
+            self.grow();
+        }
+        let mask = self.table.len() - 1;
+        let mut slot = hash(position) as usize & mask;
+        loop {
+            match self.table[slot] {
+                0 => {
+                    // Fits: MAX_TRIANGLES bounds the vertices below 2^32.
+                    self.vertices.push(position);
+                    self.table[slot] = self.vertices.len() as u32;
+                    return self.vertices.len() as u32 - 1;
+                }
+                entry if self.vertices[entry as usize - 1] == position => return entry - 1,
+                _ => slot = (slot + 1) & mask,
+            }
+        }
+    }
+
+    fn grow(&mut self) {
+        let length = (self.table.len() * 4).max(1 << 10);
+        self.table.clear();
+        self.table.resize(length, 0);
+        for (index, &vertex) in self.vertices.iter().enumerate() {
+            let mut slot = hash(vertex) as usize & (length - 1);
+            while self.table[slot] != 0 {
+                slot = (slot + 1) & (length - 1);
+            }
+            self.table[slot] = index as u32 + 1;
+        }
+    }
+
+    /// The joined triangles.
+    pub(super) fn finish(self, unit: Option<Unit>, warnings: Vec<String>) -> Soup {
+        Soup { vertices: self.vertices, triangles: self.triangles, read: self.read, unit, warnings }
+    }
+}
+
+/// Mixes the bits of the coordinates. Values from 32-bit floats leave the low mantissa bits zero, so the multiply must
+/// carry high bits down: the upper half of the products is folded in.
+#[inline]
+fn hash(position: DVec3) -> u64 {
+    const K: u64 = 0x9e37_79b9_7f4a_7c15;
+    let mut state = position.x.to_bits().wrapping_mul(K);
+    state = (state.rotate_left(23) ^ position.y.to_bits()).wrapping_mul(K);
+    state = (state.rotate_left(23) ^ position.z.to_bits()).wrapping_mul(K);
+    state ^ (state >> 32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn joins_equal_corners_and_folds_minus_zero() {
+        let mut welder = Welder::default();
+        welder.triangle([DVec3::ZERO, DVec3::X, DVec3::Y]);
+        welder.triangle([DVec3::new(-0.0, 0.0, -0.0), DVec3::Y, DVec3::Z]);
+        welder.triangle([DVec3::X, DVec3::X, DVec3::Z]);
+        let soup = welder.finish(None, Vec::new());
+        assert_eq!((soup.vertices.len(), soup.triangles.len(), soup.read), (4, 2, 3));
+    }
+
+    #[test]
+    fn survives_growth() {
+        let mut welder = Welder::default();
+        let point = |i: u32| DVec3::new(f64::from(i % 100), f64::from(i / 100), 0.5);
+        for _ in 0..2 {
+            for i in 0..20_000 {
+                welder.triangle([point(i), point(i + 1), point(i + 2)]);
+            }
+        }
+        assert_eq!(welder.finish(None, Vec::new()).vertices.len(), 20_002);
+    }
+}
