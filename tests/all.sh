@@ -1,0 +1,33 @@
+#!/usr/bin/env bash
+# Sets up what the tests need and runs all of them. Debian 12 or similar with Rust and Python 3.11; as root it installs
+# the missing system packages, otherwise it names them. Nothing is skipped silently: see the lines that say SKIPPED.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+need=()
+ls /usr/share/vulkan/icd.d/*lvp* >/dev/null 2>&1 || need+=(mesa-vulkan-drivers)
+command -v cc >/dev/null || need+=(gcc libc6-dev)
+command -v chromium >/dev/null || need+=(chromium)
+command -v npm >/dev/null || need+=(nodejs npm)
+if [ ${#need[@]} -gt 0 ]; then
+    if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+        apt-get update -qq
+        DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${need[@]}" >/dev/null
+    else
+        echo "missing: ${need[*]} (install them, or run this as root on Debian)"
+    fi
+fi
+
+# Independent readers of the export formats.
+if [ ! -x target/readers/bin/python ]; then
+    python3 -m venv target/readers
+    target/readers/bin/pip install -q --disable-pip-version-check -r tests/readers/requirements.txt
+fi
+export GRIPFAST_PYTHON="$PWD/target/readers/bin/python"
+
+# With the software Vulkan driver there is always an adapter: a test that needs one fails instead of skipping.
+export GRIPFAST_GPU=require GRIPFAST_READERS=require
+
+cargo fmt --check
+cargo clippy --all-targets --features full --quiet -- -D warnings
+cargo test --features full
