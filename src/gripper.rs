@@ -1,9 +1,20 @@
 //! The gripper file: stroke, force, pads, finger and palm bodies, frames; and the shipped catalogue.
 
-use glam::{DVec2, DVec3};
+pub mod catalogue;
+pub mod check;
+pub mod drawing;
+pub mod file;
+
+use std::collections::BTreeMap;
+
+use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::model::{Frame, Ring};
+
+pub use catalogue::find;
+pub use check::check;
+pub use file::{parse, read};
 
 /// A two-finger gripper in SI units, in the grip frame (x1 approach, x3 closing; origin midway between the pads).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -20,6 +31,9 @@ pub struct Gripper {
     pub pad_friction: Option<f64>,
     /// Rubber thickness [m], where stated.
     pub pad_thickness: Option<f64>,
+    /// Young's modulus of the rubber [Pa], where stated.
+    #[serde(default)]
+    pub pad_modulus: Option<f64>,
     /// Bodies that move with the finger at `x3 > 0`, placed for pads touching at zero width: the pad face lies at
     /// `x3 = 0` and the body at `x3 >= 0`. The other finger's bodies are these turned by 180 degrees about `x1`.
     pub fingers: Vec<Body>,
@@ -27,6 +41,21 @@ pub struct Gripper {
     pub palm: Vec<Body>,
     /// Flange frame (robot mounting) in the grip frame, where stated.
     pub grip_from_flange: Option<Frame>,
+    /// Tool frame in the grip frame, where it is not the usual one (z approach, y closing, origin between the pads).
+    #[serde(default)]
+    pub grip_from_tool: Option<Frame>,
+    /// Where each dimension comes from, by its name in the file, e.g. `pad.friction` or `finger.fingertip`.
+    #[serde(default)]
+    pub sources: BTreeMap<String, Source>,
+}
+
+/// Where a dimension comes from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Source {
+    /// In words.
+    pub text: String,
+    /// Whether it was taken from the maker's or another named document; else it is an estimate.
+    pub verified: bool,
 }
 
 /// A solid of the gripper.
@@ -40,7 +69,7 @@ pub struct Body {
     pub grip_from_body: Frame,
 }
 
-/// Shapes of gripper bodies.
+/// Shapes of gripper bodies, all convex.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "lowercase")]
 pub enum Shape {
@@ -56,6 +85,81 @@ pub enum Shape {
         /// Half height [m].
         half_height: f64,
     },
+    /// Convex hull of points.
+    Hull {
+        /// At least four points, not in one plane [m].
+        points: Vec<DVec3>,
+    },
+}
+
+impl Shape {
+    /// The point of the shape farthest along `direction`, in the body frame.
+    pub fn support_point(&self, direction: DVec3) -> DVec3 {
+        match self {
+            Self::Box { half } => half.copysign(direction),
+            Self::Cylinder { radius, half_height } => {
+                let flat = direction.truncate().normalize_or_zero() * *radius;
+                flat.extend(half_height.copysign(direction.z))
+            }
+            Self::Hull { points } => points.iter().copied().max_by(|a, b| a.dot(direction).total_cmp(&b.dot(direction))).unwrap_or(DVec3::ZERO),
+        }
+    }
+}
+
+impl Body {
+    /// The point of the body farthest along `direction`, both in the grip frame.
+    pub fn support_point(&self, direction: DVec3) -> DVec3 {
+        let direction = self.grip_from_body.rotation.transpose() * direction;
+        self.grip_from_body.point(self.shape.support_point(direction))
+    }
+
+    /// Smallest and largest coordinates in the grip frame [m].
+    pub fn bounds(&self) -> [DVec3; 2] {
+        let reach = |sign: f64| DVec3::from_array(DVec3::AXES.map(|axis| self.support_point(axis * sign).dot(axis)));
+        [reach(-1.0), reach(1.0)]
+    }
+
+    /// The body under a rigid map of the grip frame.
+    #[must_use]
+    pub fn moved(&self, map: &Frame) -> Self {
+        Self { name: self.name.clone(), shape: self.shape.clone(), grip_from_body: map.compose(&self.grip_from_body) }
+    }
+}
+
+impl Gripper {
+    /// The bodies of the finger under pad I (`jaw_i`) or II, with the pads `width` apart.
+    pub fn finger(&self, jaw_i: bool, width: f64) -> Vec<Body> {
+        let map = if jaw_i {
+            Frame { rotation: DMat3::IDENTITY, origin: DVec3::new(0.0, 0.0, width / 2.0) }
+        } else {
+            Frame { rotation: half_turn(), origin: DVec3::new(0.0, 0.0, -width / 2.0) }
+        };
+        self.fingers.iter().map(|body| body.moved(&map)).collect()
+    }
+
+    /// Whether exchanging the jaws (half a turn about the approach axis) changes nothing but the names: the pad is
+    /// mirror-symmetric in `x2`, and the half turn maps the set of palm bodies to itself.
+    pub fn is_symmetric(&self) -> bool {
+        let close = 1e-9;
+        let mirrored = |point: &DVec2| self.pad.iter().any(|other| other.distance(DVec2::new(point.x, -point.y)) < close);
+        let turn = Frame { rotation: half_turn(), origin: DVec3::ZERO };
+        let has_twin = |body: &Body| {
+            let [min, max] = body.moved(&turn).bounds();
+            self.palm.iter().any(|other| {
+                let [other_min, other_max] = other.bounds();
+                std::mem::discriminant(&other.shape) == std::mem::discriminant(&body.shape)
+                    && min.abs_diff_eq(other_min, close)
+                    && max.abs_diff_eq(other_max, close)
+                    && !matches!(other.shape, Shape::Hull { .. })
+            })
+        };
+        self.pad.iter().all(mirrored) && self.palm.iter().all(has_twin)
+    }
+}
+
+/// Half a turn about the approach axis: exchanges the jaws.
+pub fn half_turn() -> DMat3 {
+    DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0))
 }
 
 /// A rectangle of the given sizes along `(x1, x2)`, centred.

@@ -1,5 +1,6 @@
 //! The command line: flags to options, options to calls of the library, answers to text. Thin.
 
+mod gripper;
 mod solve;
 
 use std::process::ExitCode;
@@ -17,12 +18,14 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Gripper(gripper::Args),
     Solve(solve::Args),
 }
 
 /// Parses the command line and runs the subcommand.
 pub(crate) fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
+        Command::Gripper(args) => gripper::run(args),
         Command::Solve(args) => solve::run(args),
     };
     match outcome {

@@ -1,0 +1,146 @@
+//! `gripfast gripper`: the shipped grippers, and a look at one.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Context;
+use clap::{Args as ClapArgs, Subcommand};
+use comfy_table::{Table, presets};
+use gripfast::geometry::Bounds2;
+use gripfast::gripper::{self, Body, Gripper, Shape, catalogue, check, drawing};
+
+/// Lists, prints and checks grippers.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Lists the shipped grippers.
+    List,
+    /// Prints the file of a gripper, e.g. as a start for your own.
+    Show {
+        /// Shipped name or gripper file.
+        gripper: String,
+    },
+    /// Reads a gripper, prints its dimensions with their sources, and warns of what is doubtful.
+    Check {
+        /// Shipped name or gripper file.
+        gripper: String,
+        /// Draw it with its dimensions into this SVG file.
+        #[arg(long, value_name = "FILE")]
+        svg: Option<PathBuf>,
+    },
+}
+
+/// Runs the subcommand.
+pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    match args.action {
+        Action::List => list()?,
+        Action::Show { gripper } => print!("{}", catalogue::text(&gripper)?),
+        Action::Check { gripper, svg } => {
+            let gripper = gripper::find(&gripper)?;
+            println!("{}", describe(&gripper));
+            if let Some(path) = svg {
+                write_whole(&path, &drawing::svg(&gripper))?;
+                println!("drawing: {}", path.display());
+            }
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn list() -> anyhow::Result<()> {
+    let mut table = new_table(&["gripper", "name", "stroke", "force", "pad x1 x x2", "friction", "unverified"]);
+    for (short, _) in catalogue::CATALOGUE {
+        let gripper = gripper::find(short)?;
+        let pad = Bounds2::of(&gripper.pad).size() * 1e3;
+        let unverified = gripper.sources.values().filter(|source| !source.verified).count();
+        table.add_row([
+            (*short).to_string(),
+            gripper.name.clone(),
+            range(gripper.stroke, 1e3, "mm"),
+            range(gripper.force, 1.0, "N"),
+            format!("{} x {} mm", short_number(pad.x), short_number(pad.y)),
+            gripper.pad_friction.map_or("-".into(), |friction| friction.to_string()),
+            format!("{unverified} of {}", gripper.sources.len()),
+        ]);
+    }
+    println!("{table}");
+    println!("`gripfast gripper check NAME` says where each value comes from; unverified ones are estimates.");
+    Ok(())
+}
+
+fn describe(gripper: &Gripper) -> String {
+    let mut table = new_table(&["dimension", "value", "source"]);
+    let mut row = |key: String, value: String| {
+        let source = gripper
+            .sources
+            .get(&key)
+            .map_or("no source given".to_string(), |source| if source.verified { source.text.clone() } else { format!("UNVERIFIED: {}", source.text) });
+        table.add_row([key, value, source]);
+    };
+    row("stroke".into(), range(gripper.stroke, 1e3, "mm"));
+    row("force".into(), range(gripper.force, 1.0, "N"));
+    let pad = Bounds2::of(&gripper.pad).size() * 1e3;
+    row("pad.size".into(), format!("{} x {} mm (x1, x2)", short_number(pad.x), short_number(pad.y)));
+    if let Some(value) = gripper.pad_thickness {
+        row("pad.thickness".into(), format!("{} mm", short_number(value * 1e3)));
+    }
+    if let Some(value) = gripper.pad_modulus {
+        row("pad.modulus".into(), format!("{} MPa", short_number(value * 1e-6)));
+    }
+    row("pad.friction".into(), gripper.pad_friction.map_or("not stated".into(), |value| value.to_string()));
+    for (table, bodies) in [("finger", &gripper.fingers), ("palm", &gripper.palm)] {
+        for body in bodies {
+            row(format!("{table}.{}", body.name), body_text(body));
+        }
+    }
+    if let Some(frame) = gripper.grip_from_flange {
+        row("flange".into(), format!("{} mm behind the pads' middle", short_number(-frame.origin.x * 1e3)));
+    }
+    let throat = check::throat(gripper).map_or(String::new(), |throat| format!("\nthroat (pad's rear edge to palm): {} mm", short_number(throat * 1e3)));
+    let warnings: Vec<String> = gripper::check(gripper).iter().map(|warning| format!("\nwarning: {warning}")).collect();
+    format!("{}\n{table}{throat}{}", gripper.name, warnings.concat())
+}
+
+fn body_text(body: &Body) -> String {
+    let [min, max] = body.bounds().map(|corner| corner * 1e3);
+    let kind = match body.shape {
+        Shape::Box { .. } => "box",
+        Shape::Cylinder { .. } => "cylinder",
+        Shape::Hull { .. } => "hull",
+    };
+    let span = |axis: usize| format!("{}..{}", short_number(min[axis]), short_number(max[axis]));
+    format!("{kind}, x1 {}, x2 {}, x3 {} mm", span(0), span(1), span(2))
+}
+
+fn range(values: [f64; 2], factor: f64, unit: &str) -> String {
+    format!("{} .. {} {unit}", short_number(values[0] * factor), short_number(values[1] * factor))
+}
+
+fn short_number(value: f64) -> String {
+    let text = format!("{value:.3}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+fn new_table(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_FULL_CONDENSED).set_content_arrangement(comfy_table::ContentArrangement::Dynamic).set_header(header.to_vec());
+    table
+}
+
+/// Writes a file under its final name only when it is whole.
+fn write_whole(path: &Path, text: &str) -> anyhow::Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let context = || format!("{}: cannot write", path.display());
+    let mut file = tempfile::NamedTempFile::new_in(folder).with_context(context)?;
+    file.write_all(text.as_bytes()).with_context(context)?;
+    file.as_file().sync_all().with_context(context)?;
+    file.persist(path).with_context(context)?;
+    Ok(())
+}
