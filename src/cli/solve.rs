@@ -8,12 +8,15 @@ use clap::{Args as ClapArgs, ValueEnum};
 use gripfast::case::{self, Case};
 use gripfast::mechanics::{self, Options, Pads, Refiner, Separation, inverse};
 use gripfast::model::{Score, Slip, Status};
+use gripfast::report::contact_svg;
 
 /// Scores contact pairs: the smallest friction coefficient that holds each one's load.
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "EXAMPLES:\n  gripfast solve case.json\n  gripfast solve case.json --json\n  gripfast solve case.json --explain --pad-friction 0.5\n\n\
+#[command(
+    after_help = "EXAMPLES:\n  gripfast solve case.json\n  gripfast solve case.json --json\n  gripfast solve case.json --explain --pad-friction 0.5\n  gripfast solve case.json --plot case.svg\n\n\
 A case is {\"A_I\":[{\"outer\":[[x,y],..],\"holes\":[]}],\"A_II\":[..],\"d\":..,\"Fn\":..,\"F\":[..],\"M\":[..]} in metres and newtons,\n\
-the load on the body about the point midway between the faces. A file may hold one case, a list, {\"cases\":[..]} or JSON Lines.")]
+the load on the body about the point midway between the faces. A file may hold one case, a list, {\"cases\":[..]} or JSON Lines."
+)]
 pub(crate) struct Args {
     /// Case file; `-` for standard input.
     case: PathBuf,
@@ -23,6 +26,9 @@ pub(crate) struct Args {
     /// Also the iterations, the certificate and what each number means.
     #[arg(long)]
     explain: bool,
+    /// Also draws the contact pair as SVG: pads, pressure, separation line, slip centre, friction directions.
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
     /// Pads that separate under the load: solve with the contact left, or discard as the paper does.
     #[arg(long, value_enum, default_value = "solve")]
     separation: SeparationArg,
@@ -102,6 +108,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         let score = mechanics::solve(&case.contact, case.distance, case.force, &case.wrench, &options)
             .map_err(|error| anyhow::anyhow!("{}: {}: {error}", args.case.display(), place()))?;
         any |= score.status.holds();
+        if let Some(path) = &args.plot {
+            let path = if cases.len() > 1 {
+                path.with_file_name(format!("{}-{}.svg", path.file_stem().unwrap_or_default().to_string_lossy(), place()))
+            } else {
+                path.clone()
+            };
+            std::fs::write(&path, contact_svg::draw(&place(), &case.contact, &score)).map_err(|error| gripfast::error::Error::io(&path, "write", error))?;
+        }
         let inverse = args.pad_friction.and_then(|friction| {
             let pads = Pads::new(&case.contact)?;
             Some(Inverse {
