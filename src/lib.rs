@@ -7,6 +7,7 @@ pub mod case;
 pub mod contact;
 pub mod error;
 pub mod export;
+pub mod file;
 pub mod geometry;
 pub mod gripper;
 pub mod load;

@@ -116,7 +116,8 @@ impl Status {
 pub struct Bounds {
     /// `(w.v)/D(v)` of the best twist tried.
     pub lower: f64,
-    /// From the supports of the tried twists; infinite where none encloses the load.
+    /// From the supports of the tried twists; infinite where none encloses the load, null in JSON.
+    #[serde(with = "null_is_infinite")]
     pub upper: f64,
 }
 
@@ -138,6 +139,7 @@ pub struct Score {
     #[serde(rename = "contact_area_II")]
     pub contact_area_ii: f64,
     /// Largest of the seven equilibrium equations' residuals, forces over Fn and moments over Fn sqrt(A).
+    #[serde(with = "null_is_infinite")]
     pub residual: f64,
     /// Certificate on `mu_s` for the found pressure.
     pub bounds: Option<Bounds>,
@@ -202,4 +204,18 @@ pub struct Grip {
     /// The grip with the same pose and the jaws exchanged, when that one is the representative.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flip_of: Option<u64>,
+}
+
+/// JSON has no infinity and no nan: both are written as null, and null is read as infinity.
+pub(crate) mod null_is_infinite {
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
+    pub(crate) fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+        if value.is_finite() { serializer.serialize_f64(*value) } else { serializer.serialize_none() }
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+        Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+    }
 }

@@ -1,1 +1,220 @@
-//! To be written.
+//! The order of the grips: score, ties, flips, duplicates by symmetry, and a choice of grips that differ.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+
+use crate::model::{Patch, Status};
+use crate::results::RankedGrip;
+
+/// Scores that differ by less than this share count as equal and are ordered by id: final answers agree to this across
+/// backends and refiners, and the order shall not depend on which of them ran.
+pub const TIE: f64 = 1e-9;
+
+/// Two lengths [m] (or areas, by their square roots) count as equal for [`Options::merge_duplicates`].
+const SAME_LENGTH: f64 = 1e-7;
+
+/// Weights of the score `k1/mu_s + k2 alpha`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Weights {
+    /// Of `1/mu_s`.
+    pub k1: f64,
+    /// Of alpha [1/rad].
+    pub k2: f64,
+}
+
+impl Default for Weights {
+    /// `k1 = 1`, `k2 = 1`.
+    fn default() -> Self {
+        Self { k1: 1.0, k2: 1.0 }
+    }
+}
+
+impl Weights {
+    /// `k1/mu_s + k2 alpha`; infinite for `mu_s = 0` unless `k1 = 0`.
+    pub fn score(self, mu_s: f64, alpha: f64) -> f64 {
+        // 0/0 where the friction does not count.
+        let friction = if self.k1 == 0.0 { 0.0 } else { self.k1 / mu_s };
+        friction + self.k2 * alpha
+    }
+}
+
+/// What [`rank`] keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Options {
+    /// Weights of the score.
+    pub weights: Weights,
+    /// Keeps grips that are another one with the jaws exchanged (`flip_of`).
+    pub keep_flips: bool,
+    /// Keeps one of the grips that score the same with the same geometry in the grip frame, as those that a symmetry of the part
+    /// maps to each other do.
+    pub merge_duplicates: bool,
+    /// Keeps this many.
+    pub top: Option<usize>,
+    /// With `top`: keeps grips that differ in place, approach and face pair rather than the first ones.
+    pub diverse: bool,
+}
+
+/// The ordered grips and what became of the others.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Ranking {
+    /// Best first. `rank` is the place among all grips that were ranked, so a choice by `top` and `diverse` has gaps.
+    pub grips: Vec<RankedGrip>,
+    /// Grips that were ranked, before `top`.
+    pub ranked: u64,
+    /// Grips left out, by reason: the status (`twisted_out`, ...), `not_finite`, `flip`, `duplicate`.
+    pub rejections: BTreeMap<String, u64>,
+    /// Ids of the grips merged into each one kept.
+    pub merged: BTreeMap<u64, Vec<u64>>,
+}
+
+/// Scores and orders `grips`; their `rank` and `score` are set here. `centre_of_mass` and `size` (the diagonal of the bounding
+/// box) are the part's [m], in the part frame.
+///
+/// The order is that of falling score; scores within [`TIE`] of each other follow the ids. It depends neither on the order in which
+/// the grips come nor on differences below [`TIE`].
+pub fn rank(grips: Vec<RankedGrip>, centre_of_mass: DVec3, size: f64, options: &Options) -> Ranking {
+    let mut ranking = Ranking::default();
+    let mut reject = |reason: &str| *ranking.rejections.entry(reason.to_owned()).or_default() += 1;
+    let mut kept: Vec<(f64, RankedGrip)> = Vec::with_capacity(grips.len());
+    for mut grip in grips {
+        if grip.grip.flip_of.is_some() && !options.keep_flips {
+            reject("flip");
+            continue;
+        }
+        if !grip.worst.status.holds() {
+            reject(&status_name(grip.worst.status));
+            continue;
+        }
+        let score = grip.worst.mu_s.map_or(f64::NAN, |mu_s| options.weights.score(mu_s, grip.alpha));
+        if score.is_nan() {
+            reject("not_finite");
+            continue;
+        }
+        grip.score = score.is_finite().then_some(score);
+        kept.push((score, grip));
+    }
+    let runs = order(&mut kept);
+    if options.merge_duplicates {
+        let before = kept.len();
+        kept = merge(kept, &runs, centre_of_mass, &mut ranking.merged);
+        if kept.len() < before {
+            ranking.rejections.insert("duplicate".into(), (before - kept.len()) as u64);
+        }
+    }
+    ranking.ranked = kept.len() as u64;
+    let mut grips: Vec<RankedGrip> = kept.into_iter().map(|(_, grip)| grip).collect();
+    for (place, grip) in grips.iter_mut().enumerate() {
+        grip.rank = place as u64 + 1;
+    }
+    if let Some(top) = options.top {
+        if options.diverse {
+            let chosen = diverse(&grips, top, size);
+            let mut place = 0;
+            grips.retain(|_| {
+                place += 1;
+                chosen[place - 1]
+            });
+        } else {
+            grips.truncate(top);
+        }
+    }
+    ranking.grips = grips;
+    ranking
+}
+
+/// The status as the result file spells it.
+fn status_name(status: Status) -> String {
+    match serde_json::to_value(status) {
+        Ok(serde_json::Value::String(name)) => name,
+        _ => format!("{status:?}"),
+    }
+}
+
+/// Falling score, runs of scores that tie by id; returns the lengths of the runs.
+///
+/// A run ends at a gap between neighbours, not at a distance from its first member: two equal grips stay together whatever lies
+/// between them.
+fn order(grips: &mut [(f64, RankedGrip)]) -> Vec<usize> {
+    let same = |a: f64, b: f64| a == b || (a - b).abs() <= TIE * a.abs().max(b.abs());
+    grips.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.grip.id.cmp(&b.1.grip.id)));
+    let mut runs = Vec::new();
+    for run in grips.chunk_by_mut(|a, b| same(a.0, b.0)) {
+        run.sort_by_key(|grip| grip.1.grip.id);
+        runs.push(run.len());
+    }
+    runs
+}
+
+/// What a symmetry of the part, or exchanging the jaws, leaves of a grip: width, the centre of mass in the grip frame up to the
+/// signs of `x2` and `x3`, area and second moment of both contacts in either order.
+fn geometry(grip: &RankedGrip, centre_of_mass: DVec3) -> [f64; 8] {
+    let centre = grip.grip.part_from_grip.point_inverse(centre_of_mass);
+    let [mut one, mut two] = [&grip.grip.contact.face_i, &grip.grip.contact.face_ii].map(size_and_spread);
+    if (one[0], one[1]) < (two[0], two[1]) {
+        std::mem::swap(&mut one, &mut two);
+    }
+    [grip.grip.width, centre.x, centre.y.abs(), centre.z.abs(), one[0], one[1], two[0], two[1]]
+}
+
+/// Root of the area and radius of gyration about the grip axis [m].
+fn size_and_spread(patch: &Patch) -> [f64; 2] {
+    let moments = crate::geometry::patch_moments(patch);
+    if moments.area <= 0.0 {
+        return [0.0; 2];
+    }
+    let polar = moments.second.x_axis.x + moments.second.y_axis.y;
+    [moments.area.sqrt(), (polar / moments.area + moments.centroid.length_squared()).max(0.0).sqrt()]
+}
+
+/// Keeps the first of each set of equal grips among those that tie.
+fn merge(grips: Vec<(f64, RankedGrip)>, runs: &[usize], centre_of_mass: DVec3, merged: &mut BTreeMap<u64, Vec<u64>>) -> Vec<(f64, RankedGrip)> {
+    let mut kept: Vec<(f64, RankedGrip)> = Vec::with_capacity(grips.len());
+    let mut grips = grips.into_iter();
+    for run in runs {
+        let mut representatives: Vec<(u64, [f64; 8])> = Vec::new();
+        for (score, grip) in grips.by_ref().take(*run) {
+            let shape = geometry(&grip, centre_of_mass);
+            let same = |other: &[f64; 8]| shape.iter().zip(other).all(|(a, b)| (a - b).abs() <= SAME_LENGTH);
+            if let Some((id, _)) = representatives.iter().find(|(_, other)| same(other)) {
+                merged.entry(*id).or_default().push(grip.grip.id);
+            } else {
+                representatives.push((grip.grip.id, shape));
+                kept.push((score, grip));
+            }
+        }
+    }
+    kept
+}
+
+/// Marks `top` grips of an ordered list that differ: each lies at least a distance from every one chosen before it, and the distance
+/// is lowered step by step until enough are found.
+fn diverse(grips: &[RankedGrip], top: usize, size: f64) -> Vec<bool> {
+    let mut chosen = vec![false; grips.len()];
+    let mut list: Vec<usize> = Vec::new();
+    // 0.5: half the part's size, or a right angle of approach. Below 1 % grips are neighbours of a grid, and the rest is filled in order.
+    let mut distance = 0.5;
+    while list.len() < top.min(grips.len()) {
+        for index in 0..grips.len() {
+            if list.len() == top {
+                break;
+            }
+            if !chosen[index] && list.iter().all(|other| difference(&grips[index], &grips[*other], size) >= distance) {
+                chosen[index] = true;
+                list.push(index);
+            }
+        }
+        distance = if distance > 0.01 { distance * 0.7 } else { 0.0 };
+    }
+    chosen
+}
+
+/// How much two grips differ: place over the part's size, angle between the approaches over half a turn, and 0.2 for another face pair,
+/// as lengths of a right-angled triangle.
+fn difference(a: &RankedGrip, b: &RankedGrip, size: f64) -> f64 {
+    let place = if size > 0.0 { (a.grip.part_from_grip.origin - b.grip.part_from_grip.origin).length() / size } else { 0.0 };
+    let approach = a.grip.part_from_grip.rotation.x_axis.angle_between(b.grip.part_from_grip.rotation.x_axis) / std::f64::consts::PI;
+    let pair = |grip: &RankedGrip| (grip.grip.face_i.min(grip.grip.face_ii), grip.grip.face_i.max(grip.grip.face_ii));
+    let faces = if pair(a) == pair(b) { 0.0 } else { 0.2 };
+    DVec3::new(place, approach, faces).length()
+}

@@ -1,4 +1,8 @@
 //! The result file: everything a run found, with its provenance. Native JSON; other formats are made from it.
+//!
+//! [`GripSet::read`], [`GripSet::write`] and [`GripSet::write_lines`] are its only doors. Numbers that are not finite are null.
+
+mod file;
 
 use std::collections::BTreeMap;
 
@@ -24,7 +28,7 @@ pub struct GripSet {
     pub provenance: Provenance,
     /// The part.
     pub part: PartSummary,
-    /// The gripper, whole, as in its file.
+    /// The gripper, whole: [`crate::gripper::Gripper`] as JSON, in SI units.
     pub gripper: serde_json::Value,
     /// The load cases, in the order of the load indices used below.
     pub loads: Vec<LoadCase>,
@@ -133,6 +137,7 @@ pub struct LoadScore {
     /// Certificate.
     pub bounds: Option<Bounds>,
     /// Largest scaled residual of the seven equations.
+    #[serde(with = "crate::model::null_is_infinite")]
     pub residual: f64,
 }
 
