@@ -5,6 +5,7 @@
 pub mod equilibrium;
 pub mod inverse;
 pub mod pads;
+pub mod paper;
 pub mod pressure;
 pub mod shanno;
 pub mod slip;

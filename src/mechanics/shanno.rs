@@ -47,6 +47,8 @@ pub enum StopReason {
     EvaluationLimit,
     /// Value or gradient at the start is not finite.
     NotFinite,
+    /// The caller's own condition (see [`minimise_until`]).
+    Caller,
 }
 
 /// Where the iteration ended.
@@ -145,7 +147,17 @@ fn next_step(before: Trial, now: Trial) -> f64 {
 /// Minimises `evaluate` (value and gradient at a point) from `start`.
 ///
 /// A point whose value or gradient is not finite is stepped back from, so `evaluate` may answer NaN outside its domain.
-pub fn minimise<const N: usize>(start: [f64; N], options: &Options, mut evaluate: impl FnMut(&[f64; N]) -> (f64, [f64; N])) -> Minimum<N> {
+pub fn minimise<const N: usize>(start: [f64; N], options: &Options, evaluate: impl FnMut(&[f64; N]) -> (f64, [f64; N])) -> Minimum<N> {
+    minimise_until(start, options, evaluate, |_| false)
+}
+
+/// As [`minimise`], ending also when `stop` holds at the point that a line search arrives at.
+pub fn minimise_until<const N: usize>(
+    start: [f64; N],
+    options: &Options,
+    mut evaluate: impl FnMut(&[f64; N]) -> (f64, [f64; N]),
+    mut stop: impl FnMut(&[f64; N]) -> bool,
+) -> Minimum<N> {
     let (value, gradient) = evaluate(&start);
     let mut at = Minimum { x: start, value, gradient, iterations: 0, evaluations: 1, restarts: 0, reason: StopReason::NotFinite };
     if !value.is_finite() || gradient.iter().any(|g| !g.is_finite()) {
@@ -178,6 +190,10 @@ pub fn minimise<const N: usize>(start: [f64; N], options: &Options, mut evaluate
             continue;
         };
         at.iterations += 1;
+        if stop(&at.x) {
+            at.reason = StopReason::Caller;
+            return at;
+        }
         let moved = std::array::from_fn(|i| at.x[i] - previous.x[i]);
         let change = std::array::from_fn(|i| at.gradient[i] - previous.gradient[i]);
         since_restart += 1;
