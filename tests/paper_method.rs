@@ -67,8 +67,14 @@ struct Count {
     cases_checked: u32,
     evaluations: u64,
     time: Duration,
-    default_evaluations: u64,
+    default_evaluations: Vec<u32>,
+    default_right: u32,
     default_time: Duration,
+}
+
+fn median(values: &mut [u32]) -> u32 {
+    values.sort_unstable();
+    values[values.len() / 2]
 }
 
 fn measure(cases: &[Case]) -> Count {
@@ -88,7 +94,8 @@ fn measure(cases: &[Case]) -> Count {
         let begin = Instant::now();
         let score = mechanics::solve(&case.contact, case.distance, case.force, &case.load, &Options::default()).unwrap();
         count.default_time += begin.elapsed();
-        count.default_evaluations += u64::from(score.evaluations);
+        count.default_evaluations.push(score.evaluations);
+        count.default_right += u32::from(score.mu_s.is_some_and(|found| (found / mu - 1.0).abs() < 1e-8));
         let near = |found: f64| (found.abs() / mu - 1.0).abs() < 1e-4;
         let mut line = String::new();
         for run in &report.runs {
@@ -147,14 +154,20 @@ fn generic(wanted: usize) -> Vec<Case> {
 
 fn print(title: &str, cases: &[Case]) -> Count {
     let solvable = cases.iter().filter(|case| case.mu.is_some()).count() as u32;
-    let count = measure(cases);
+    let mut count = measure(cases);
     let runs = count.right + count.wrong + count.false_zero + count.not_zero + count.lost;
     println!(
         "{title}: {runs} runs: right {}, false zero {}, not zero {}, contact lost {}, wrong {}",
         count.right, count.false_zero, count.not_zero, count.lost, count.wrong
     );
-    println!("  of {solvable} cases right: as published {}, after the check {}", count.cases_published, count.cases_checked);
-    println!("  paper's method {} evaluations, {:?}; default method {}, {:?}", count.evaluations, count.time, count.default_evaluations, count.default_time);
+    println!(
+        "  of {solvable} cases right: as published {}, after the check {}, default method {}",
+        count.cases_published, count.cases_checked, count.default_right
+    );
+    println!("  paper's method: {} evaluations, {:?}", count.evaluations, count.time);
+    let total: u32 = count.default_evaluations.iter().sum();
+    println!("  default method: {total} evaluations, median {}, {:?}", median(&mut count.default_evaluations), count.default_time);
+    assert_eq!(count.default_right, solvable);
     assert_eq!(count.wrong, 0);
     count
 }

@@ -8,7 +8,8 @@ use glam::DVec2;
 
 use super::twist_out::{TwistOut, alpha, delta_d};
 use crate::contact::{Loops, friction, moments};
-use crate::model::{Contact, Wrench};
+use crate::error::Result;
+use crate::model::{Contact, Pressure, Score, Slip, Status, Wrench};
 
 /// What the earlier method knows about a contact pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,6 +71,31 @@ impl Centroid {
     }
 }
 
+/// The earlier method's answer to one case in the form of all others; arguments as [`super::solve`].
+///
+/// The residual is that of equations (5), (8) and (9), the only ones the method looks at, hence zero: it is no promise
+/// that the contact is in equilibrium. There are no bounds.
+///
+/// # Errors
+/// As [`super::solve`].
+pub fn solve(contact: &Contact, distance: f64, force: f64, load: &Wrench) -> Result<Score> {
+    super::check(contact, distance, force, load)?;
+    let Some(grip) = centroid(contact) else { return Ok(super::refused(Status::NoContact, 0)) };
+    let c = grip.slip_centre;
+    let moment = load.moment.z + load.force.x * c.y - load.force.y * c.x;
+    let slip = if moment == 0.0 { Slip::None } else { Slip::Rotation { c: c.to_array(), sense: if moment > 0.0 { 1 } else { -1 } } };
+    let [area_i, area_ii] = [&contact.face_i, &contact.face_ii].map(|patch| moments(&Loops::new(patch))[0]);
+    Ok(Score {
+        mu_s: Some(grip.mu_s(force, load)),
+        slip: Some(slip),
+        pressure: Some(Pressure { a_i0: force / area_i, a_ii0: force / area_ii, a1: 0.0, a2: 0.0 }),
+        contact_area_i: area_i,
+        contact_area_ii: area_ii,
+        evaluations: 2,
+        ..super::refused(Status::Ok, 0)
+    })
+}
+
 /// The earlier evaluation function, larger is better: `(k1 Delta_d + k2 tau_s/(mu_s N))/(D + epsilon) + k3 alpha`.
 ///
 /// `d`: distance of the faces [m]; `centre_of_mass`: in the pad plane, grip frame [m]; `D` is its distance from the slip
@@ -114,6 +140,18 @@ mod tests {
         // Figure 6: the old line is D/.382598 in units of W/(2 Fn) for unit squares.
         let bar = Wrench { force: DVec3::new(0.0, -4.905, 0.0), moment: DVec3::new(0.0, 0.0, -0.4905) };
         assert!((grip.mu_s(50.0, &bar) - 0.641_012_474_908_359_2).abs() < 1e-13);
+    }
+
+    #[test]
+    fn answers_like_the_other_methods() {
+        let contact = pair(square(0.0, 0.02), square(0.0, 0.02));
+        let bar = Wrench { force: DVec3::new(0.0, -4.905, 0.0), moment: DVec3::new(0.0, 0.0, -0.4905) };
+        let score = solve(&contact, 0.01, 50.0, &bar).unwrap();
+        assert!((score.mu_s.unwrap() - 0.641_012_474_908_359_2).abs() < 1e-13);
+        assert!((score.pressure.unwrap().a_i0 - 125_000.0).abs() < 1e-6);
+        assert_eq!(score.slip, Some(Slip::Rotation { c: [0.0, 0.0], sense: -1 }));
+        assert_eq!(solve(&pair(vec![], vec![]), 0.01, 50.0, &bar).unwrap().status, Status::NoContact);
+        assert!(solve(&contact, f64::NAN, 50.0, &bar).is_err());
     }
 
     #[test]
