@@ -1,6 +1,7 @@
 //! Finds and ranks every two-finger grip on a CAD part by the smallest friction coefficient that holds it.
 //!
-//! A file imports only from modules above it in this list.
+//! `ARCHITECTURE.md` shows the pipeline and which module may import which. Start at [`plan`] for the whole job, at
+//! [`mechanics::solve`] for one contact pair.
 
 pub mod backend;
 pub mod case;
@@ -14,6 +15,7 @@ pub mod load;
 pub mod mechanics;
 pub mod model;
 pub mod part;
+pub mod plan;
 pub mod propose;
 pub mod rank;
 pub mod report;

@@ -2,17 +2,12 @@
 //!
 //! Candidates flow through in chunks: proposed, scored under every load, measured; only the best [`Settings::keep`] stay.
 
-use std::collections::BTreeMap;
-
-use glam::DVec2;
 use rayon::prelude::*;
 
-use crate::error::Result;
-use crate::gripper::Gripper;
 use crate::load::wrench_in_grip;
-use crate::mechanics::{Options, Pads, Refiner, Separation, inverse, solve_pads, twist_out};
+use crate::mechanics::{Options, Pads, Refiner, Separation, inverse, refused, solve_pads, twist_out};
 use crate::model::{Grip, Score, Status};
-use crate::part::{MassProperties, Part};
+use crate::part::MassProperties;
 use crate::rank::{self, Weights};
 use crate::results::{LoadCase, LoadScore, RankedGrip};
 
@@ -79,7 +74,7 @@ impl Assessor<'_> {
                 let wrench = wrench_in_grip(&load.wrench, self.mass.centre_of_mass, &grip.part_from_grip);
                 let score = match &pads {
                     Some(pads) => solve_pads(pads, grip.width, self.settings.force, &wrench, &options),
-                    None => Score::refused(Status::NoContact, 0),
+                    None => refused(Status::NoContact, 0),
                 };
                 (wrench, score)
             })

@@ -1,16 +1,20 @@
 //! The command line: flags to options, options to calls of the library, answers to text. Thin.
 
+mod defaults;
 mod gripper;
+mod shell;
 mod solve;
 
+use std::path::Path;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 /// Finds and ranks every two-finger grip on a CAD part by the smallest friction coefficient that holds it.
 #[derive(Debug, Parser)]
-#[command(name = "gripfast", version, about, propagate_version = true)]
-#[command(after_help = "EXIT CODES:\n  0  done    1  done, but nothing found    2  bad input, bad usage or a failed run")]
+#[command(name = "gripfast", version, about, propagate_version = true, args_override_self = true)]
+#[command(after_help = "EXIT CODES:\n  0  done    1  done, but nothing found    2  bad input, bad usage or a failed run\n\n\
+PROJECT DEFAULTS:\n  A file gripfast.toml in the current folder sets flags, one table for each subcommand, e.g.\n    [plan]\n    gripper = \"robotiq-2f85\"\n    mass = \"350g\"")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -18,16 +22,21 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Gripper(gripper::Args),
     Solve(solve::Args),
+    Gripper(gripper::Args),
+    Completions(shell::CompletionsArgs),
+    Man(shell::ManArgs),
 }
 
 /// Parses the command line and runs the subcommand.
 pub(crate) fn main() -> ExitCode {
-    let outcome = match Cli::parse().command {
-        Command::Gripper(args) => gripper::run(args),
-        Command::Solve(args) => solve::run(args),
-    };
+    let outcome =
+        defaults::apply(&Cli::command(), std::env::args_os().collect(), Path::new(defaults::FILE)).and_then(|line| match Cli::parse_from(line).command {
+            Command::Solve(args) => solve::run(args),
+            Command::Gripper(args) => gripper::run(args),
+            Command::Completions(args) => shell::completions(args),
+            Command::Man(args) => shell::man(args),
+        });
     match outcome {
         Ok(code) => code,
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,

@@ -84,7 +84,7 @@ fn check(contact: &Contact, distance: f64, force: f64, wrench: &Wrench) -> Resul
 }
 
 /// An answer without a limit state.
-fn refused(status: Status, evaluations: u32) -> Score {
+pub fn refused(status: Status, evaluations: u32) -> Score {
     Score { status, mu_s: None, slip: None, pressure: None, contact_area_i: 0.0, contact_area_ii: 0.0, residual: 0.0, bounds: None, evaluations }
 }
 

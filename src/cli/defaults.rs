@@ -1,0 +1,79 @@
+//! `gripfast.toml`: a project's own defaults, one table for each subcommand, keys named as the flags.
+
+use std::ffi::OsString;
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use clap::Command;
+
+/// Name of the file, looked for in the current folder.
+pub(crate) const FILE: &str = "gripfast.toml";
+
+/// The command line with the file's flags put right after the subcommand, where flags given by the user override them.
+pub(crate) fn apply(command: &Command, arguments: Vec<OsString>, file: &Path) -> anyhow::Result<Vec<OsString>> {
+    let text = match std::fs::read_to_string(file) {
+        Ok(text) => text,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(arguments),
+        Err(error) => return Err(error).with_context(|| format!("{}: cannot read", file.display())),
+    };
+    let table: toml::Table = text.parse().map_err(|error| anyhow::anyhow!("{}: {error}", file.display()))?;
+    for name in table.keys() {
+        if command.find_subcommand(name).is_none() {
+            let known: Vec<_> = command.get_subcommands().map(Command::get_name).collect();
+            bail!("{}: [{name}] is no subcommand; use one of: {}", file.display(), known.join(", "));
+        }
+    }
+    let Some(place) = arguments.iter().skip(1).position(|argument| !argument.to_string_lossy().starts_with('-')).map(|index| index + 1) else {
+        return Ok(arguments);
+    };
+    let name = arguments[place].to_string_lossy().into_owned();
+    let (Some(subcommand), Some(defaults)) = (command.find_subcommand(&name), table.get(&name)) else { return Ok(arguments) };
+    let Some(defaults) = defaults.as_table() else { bail!("{}: [{name}] is not a table", file.display()) };
+    let mut flags = Vec::new();
+    for (key, value) in defaults {
+        let at = || format!("{}: [{name}] {key}", file.display());
+        if !subcommand.get_arguments().any(|argument| argument.get_long() == Some(key)) {
+            bail!("{}: `{name}` has no flag --{key}; see `gripfast {name} --help`", at());
+        }
+        match value {
+            toml::Value::Boolean(true) => flags.push(format!("--{key}")),
+            toml::Value::Boolean(false) => {}
+            toml::Value::String(text) => flags.push(format!("--{key}={text}")),
+            toml::Value::Integer(number) => flags.push(format!("--{key}={number}")),
+            toml::Value::Float(number) => flags.push(format!("--{key}={number}")),
+            _ => bail!("{}: give a text, a number, true or false", at()),
+        }
+    }
+    let mut out = arguments;
+    out.splice(place + 1..place + 1, flags.into_iter().map(OsString::from));
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    fn applied(text: &str, line: &str) -> anyhow::Result<Vec<String>> {
+        let folder = tempfile::tempdir()?;
+        let file = folder.path().join(FILE);
+        std::fs::write(&file, text)?;
+        let line = line.split(' ').map(OsString::from).collect();
+        Ok(apply(&super::super::Cli::command(), line, &file)?.into_iter().map(|part| part.to_string_lossy().into_owned()).collect())
+    }
+
+    #[test]
+    fn flags_of_the_file_stand_before_those_of_the_user() {
+        let got = applied("[solve]\njson = true\nsafety = 2\n", "gripfast solve case.json --safety 3").unwrap();
+        assert_eq!(got, ["gripfast", "solve", "--json", "--safety=2", "case.json", "--safety", "3"]);
+        use clap::Parser;
+        assert!(super::super::Cli::try_parse_from(got).is_ok());
+    }
+
+    #[test]
+    fn unknown_keys_are_refused_by_name() {
+        assert!(applied("[solve]\nfrce = 1\n", "gripfast solve x").unwrap_err().to_string().contains("frce"));
+        assert!(applied("[slove]\n", "gripfast solve x").unwrap_err().to_string().contains("slove"));
+    }
+}
