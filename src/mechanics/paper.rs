@@ -356,6 +356,11 @@ impl Terms {
     }
 }
 
+/// Largest residual of the seven equations at a scaled state on the whole areas, with `mu` of either sign.
+pub(super) fn residual(pads: &Pads, load: &Load, x: &Unknowns, mu: f64) -> f64 {
+    Problem::new(&pads.areas, load, [1.0; 6]).terms(x).residual(x, load, mu)
+}
+
 fn score(pads: &Pads, force: f64, load: &Load, run: &Run, evaluations: u32) -> Score {
     let q = [run.x[2], run.x[3], run.x[4], run.x[5]];
     let area = |k: usize| {

@@ -6,6 +6,7 @@
 
 use glam::DVec2;
 
+use super::pads::Pads;
 use super::twist_out::{TwistOut, alpha, delta_d};
 use crate::contact::{Loops, friction, moments};
 use crate::error::Result;
@@ -73,25 +74,33 @@ impl Centroid {
 
 /// The earlier method's answer to one case in the form of all others; arguments as [`super::solve`].
 ///
-/// The residual is that of equations (5), (8) and (9), the only ones the method looks at, hence zero: it is no promise
-/// that the contact is in equilibrium. There are no bounds.
+/// The residual is that of all seven equations, of which the method looks at the moment about the slip centre and the
+/// gripping force only: how far it is from zero tells how little the answer may be worth. There are no bounds.
 ///
 /// # Errors
 /// As [`super::solve`].
 pub fn solve(contact: &Contact, distance: f64, force: f64, load: &Wrench) -> Result<Score> {
     super::check(contact, distance, force, load)?;
-    let Some(grip) = centroid(contact) else { return Ok(super::refused(Status::NoContact, 0)) };
+    let (Some(grip), Some(pads)) = (centroid(contact), Pads::new(contact)) else { return Ok(super::refused(Status::NoContact, 0)) };
     let c = grip.slip_centre;
     let moment = load.moment.z + load.force.x * c.y - load.force.y * c.x;
-    let slip = if moment == 0.0 { Slip::None } else { Slip::Rotation { c: c.to_array(), sense: if moment > 0.0 { 1 } else { -1 } } };
-    let [area_i, area_ii] = [&contact.face_i, &contact.face_ii].map(|patch| moments(&Loops::new(patch))[0]);
+    let mu = grip.mu_s(force, load);
+    let (slip, sense) = match moment.partial_cmp(&0.0) {
+        Some(std::cmp::Ordering::Greater) => (Slip::Rotation { c: c.to_array(), sense: 1 }, 1.0),
+        Some(std::cmp::Ordering::Less) => (Slip::Rotation { c: c.to_array(), sense: -1 }, -1.0),
+        _ => (Slip::None, 0.0),
+    };
+    let scaled = (c - pads.origin) / pads.length;
+    let x = [scaled.x, scaled.y, 1.0 / pads.moments[0][0], 1.0 / pads.moments[1][0], 0.0, 0.0];
+    let [area_i, area_ii] = pads.moments.map(|m| m[0] * pads.length * pads.length);
     Ok(Score {
-        mu_s: Some(grip.mu_s(force, load)),
+        mu_s: Some(mu),
         slip: Some(slip),
         pressure: Some(Pressure { a_i0: force / area_i, a_ii0: force / area_ii, a1: 0.0, a2: 0.0 }),
         contact_area_i: area_i,
         contact_area_ii: area_ii,
-        evaluations: 2,
+        residual: super::paper::residual(&pads, &pads.load(distance, force, load), &x, sense * mu),
+        evaluations: 3,
         ..super::refused(Status::Ok, 0)
     })
 }
@@ -150,6 +159,10 @@ mod tests {
         assert!((score.mu_s.unwrap() - 0.641_012_474_908_359_2).abs() < 1e-13);
         assert!((score.pressure.unwrap().a_i0 - 125_000.0).abs() < 1e-6);
         assert_eq!(score.slip, Some(Slip::Rotation { c: [0.0, 0.0], sense: -1 }));
+        // It leaves the bar's weight out of its sums, and says so; a pure moment it solves.
+        assert!((score.residual - 4.905 / 50.0).abs() < 1e-12, "{}", score.residual);
+        let turn = Wrench { force: DVec3::ZERO, moment: DVec3::new(0.0, 0.0, 0.2) };
+        assert!(solve(&contact, 0.01, 50.0, &turn).unwrap().residual < 1e-14);
         assert_eq!(solve(&pair(vec![], vec![]), 0.01, 50.0, &bar).unwrap().status, Status::NoContact);
         assert!(solve(&contact, f64::NAN, 50.0, &bar).is_err());
     }
