@@ -6,14 +6,14 @@ use std::process::ExitCode;
 
 use clap::{Args as ClapArgs, ValueEnum};
 use gripfast::case::{self, Case};
-use gripfast::mechanics::{self, Options, Pads, Refiner, Separation, inverse};
+use gripfast::mechanics::{self, Options, Pads, Refiner, Separation, inverse, paper, wolter};
 use gripfast::model::{Score, Slip, Status};
 use gripfast::report::contact_svg;
 
 /// Scores contact pairs: the smallest friction coefficient that holds each one's load.
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "EXAMPLES:\n  gripfast solve case.json\n  gripfast solve case.json --json\n  gripfast solve case.json --explain --pad-friction 0.5\n  gripfast solve case.json --plot case.svg\n\n\
+    after_help = "EXAMPLES:\n  gripfast solve case.json\n  gripfast solve case.json --json\n  gripfast solve case.json --explain --pad-friction 0.5\n  gripfast solve case.json --plot case.svg\n  gripfast solve case.json --method paper --explain\n\n\
 A case is {\"A_I\":[{\"outer\":[[x,y],..],\"holes\":[]}],\"A_II\":[..],\"d\":..,\"Fn\":..,\"F\":[..],\"M\":[..]} in metres and newtons,\n\
 the load on the body about the point midway between the faces. A file may hold one case, a list, {\"cases\":[..]} or JSON Lines."
 )]
@@ -35,12 +35,25 @@ pub(crate) struct Args {
     /// Minimiser that polishes the solution.
     #[arg(long, value_enum, default_value = "newton")]
     refiner: RefinerArg,
+    /// How to solve: our method, the paper's error function, or the earlier method with the slip centre at the centroid.
+    #[arg(long, value_enum, default_value = "gripfast")]
+    method: Method,
     /// Friction coefficient of the pads: also tells the force needed and the load multiple held.
     #[arg(long, value_name = "MU")]
     pad_friction: Option<f64>,
     /// Safety factor on the pad friction for the force needed.
     #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
     safety: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Method {
+    /// Convex slip problem and coupled equilibrium, certified.
+    Gripfast,
+    /// E of equations (17)(18), minimised by Shanno's method from several starts, checked.
+    Paper,
+    /// Slip centre at the centroid, uniform pressure (the paper's section 2).
+    Centroid,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -105,8 +118,16 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut any = false;
     for (index, case) in cases.iter().enumerate() {
         let place = || case.id.clone().unwrap_or_else(|| format!("case {}", index + 1));
-        let score = mechanics::solve(&case.contact, case.distance, case.force, &case.wrench, &options)
-            .map_err(|error| anyhow::anyhow!("{}: {}: {error}", args.case.display(), place()))?;
+        let (contact, distance, force, wrench) = (&case.contact, case.distance, case.force, &case.wrench);
+        let answer = match args.method {
+            Method::Gripfast => mechanics::solve(contact, distance, force, wrench, &options).map(|score| (score, None)),
+            Method::Paper => {
+                let all_starts = paper::Options { all_starts: args.explain, ..paper::Options::default() };
+                paper::solve(contact, distance, force, wrench, &all_starts).map(|report| (report.score, Some(report)))
+            }
+            Method::Centroid => wolter::solve(contact, distance, force, wrench).map(|score| (score, None)),
+        };
+        let (score, report) = answer.map_err(|error| anyhow::anyhow!("{}: {}: {error}", args.case.display(), place()))?;
         any |= score.status.holds();
         if let Some(path) = &args.plot {
             let path = if cases.len() > 1 {
@@ -136,6 +157,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
                 writeln!(out, "{}{}", if index > 0 { "\n" } else { "" }, place())?;
             }
             print(&mut out, case, &score, inverse.as_ref(), &args)?;
+            if let Some(report) = report.filter(|_| args.explain) {
+                print_runs(&mut out, &report)?;
+            }
         }
     }
     Ok(if any { ExitCode::SUCCESS } else { ExitCode::from(1) })
@@ -184,15 +208,34 @@ fn print(out: &mut impl Write, case: &Case, score: &Score, inverse: Option<&Inve
         writeln!(out, "load multiple held                        {:.4}", inverse.load_multiple)?;
     }
     if args.explain {
+        let solver = match (args.method, args.refiner) {
+            (Method::Paper, _) => "the paper's method, all starts",
+            (Method::Centroid, _) => "centroid method",
+            (_, RefinerArg::Newton) => "refiner newton",
+            (_, RefinerArg::Shanno) => "refiner shanno",
+        };
         if let Some(bounds) = score.bounds {
             writeln!(out, "certificate for this pressure             {:.15} <= mu_s <= {:.15}", bounds.lower, bounds.upper)?;
         }
         writeln!(out, "largest residual of the seven equations   {:.2e}  (forces over Fn, moments over Fn sqrt(A))", score.residual)?;
+        writeln!(out, "evaluations of the integrals              {}  ({solver})", score.evaluations)?;
+    }
+    Ok(())
+}
+
+/// What each start of the paper's method came to.
+fn print_runs(out: &mut impl Write, report: &paper::Report) -> anyhow::Result<()> {
+    for (index, run) in report.runs.iter().enumerate() {
+        let taken = if report.published == Some(index) { "  <- taken by the paper's rule" } else { "" };
         writeln!(
             out,
-            "evaluations of the integrals              {}  (refiner: {})",
-            score.evaluations,
-            if matches!(args.refiner, RefinerArg::Newton) { "newton" } else { "shanno" }
+            "start {}: {:?}, mu {:.9}, E {:.1e}, residual {:.1e}, {} evaluations{taken}",
+            index + 1,
+            run.outcome,
+            run.mu,
+            run.error,
+            run.residual,
+            run.evaluations
         )?;
     }
     Ok(())
@@ -202,6 +245,7 @@ fn note(status: Status) -> &'static str {
     match status {
         Status::Ambiguous => "   (ambiguous: another limit state exists; this is the one on the branch from d = 0, or the smallest)",
         Status::Separating => "   (discarded: the pads separate)",
+        Status::NotConverged => "   (NOT a solution: the seven equations do not hold)",
         _ => "",
     }
 }
@@ -211,6 +255,7 @@ fn reason(status: Status) -> &'static str {
         Status::TwistedOut => "no slip limit exists for this load: the contact twists out",
         Status::NoNormalForce => "the load pulls one pad off: |F3| is not below 2 Fn",
         Status::NoContact => "a contact area is empty",
+        Status::NotConverged => "the method did not reach a solution of the seven equations",
         _ => "the solver found no solution",
     }
 }
