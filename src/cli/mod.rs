@@ -2,6 +2,7 @@
 
 mod defaults;
 mod gripper;
+mod part;
 mod shell;
 mod solve;
 
@@ -22,6 +23,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Part(part::Args),
     Solve(solve::Args),
     Gripper(gripper::Args),
     Completions(shell::CompletionsArgs),
@@ -32,6 +34,7 @@ enum Command {
 pub(crate) fn main() -> ExitCode {
     let outcome =
         defaults::apply(&Cli::command(), std::env::args_os().collect(), Path::new(defaults::FILE)).and_then(|line| match Cli::parse_from(line).command {
+            Command::Part(args) => part::run(args),
             Command::Solve(args) => solve::run(args),
             Command::Gripper(args) => gripper::run(args),
             Command::Completions(args) => shell::completions(args),

@@ -5,6 +5,7 @@ use rustc_hash::FxHashMap;
 
 use super::Mesh;
 use super::topology::{NONE, ends, next};
+use crate::geometry::polygon::{ring_area, ring_contains};
 use crate::model::{Frame, Polygon, Ring};
 
 /// Boundary of the region's triangles (`inside` says whether a triangle belongs to it) in the frame's `(x, y)`, points
@@ -127,32 +128,11 @@ fn distance_to_segment(point: DVec2, a: DVec2, b: DVec2) -> f64 {
     point.distance(a + t * along)
 }
 
-/// Twice the signed area, about the first point for accuracy far from the origin.
-pub(super) fn twice_area(ring: &[DVec2]) -> f64 {
-    let Some(&origin) = ring.first() else { return 0.0 };
-    ring.windows(2).map(|pair| (pair[0] - origin).perp_dot(pair[1] - origin)).sum()
-}
-
-/// Area and centroid of polygons with holes; the centroid is zero for an empty area.
-pub(super) fn area_and_centroid(polygons: &[Polygon]) -> (f64, DVec2) {
-    let (mut area, mut first) = (0.0, DVec2::ZERO);
-    for ring in polygons.iter().flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes)) {
-        let Some(&origin) = ring.first() else { continue };
-        for pair in ring.windows(2) {
-            let (a, b) = (pair[0] - origin, pair[1] - origin);
-            let cross = a.perp_dot(b);
-            area += cross / 2.0;
-            first += cross / 2.0 * (origin + (a + b) / 3.0);
-        }
-    }
-    (area, if area > 0.0 { first / area } else { DVec2::ZERO })
-}
-
 /// Gives every hole (clockwise ring) to the smallest outer ring around it.
 fn assemble(rings: Vec<Ring>) -> Vec<Polygon> {
     let (mut outers, mut holes) = (Vec::new(), Vec::new());
     for ring in rings {
-        let area = twice_area(&ring);
+        let area = ring_area(&ring);
         if area > 0.0 {
             outers.push((area, ring));
         } else if area < 0.0 {
@@ -174,16 +154,6 @@ fn assemble(rings: Vec<Ring>) -> Vec<Polygon> {
 /// Whether most of the hole's edge midpoints lie inside the ring (they may touch).
 fn encloses(outer: &[DVec2], hole: &[DVec2]) -> bool {
     let middles = hole.iter().zip(hole.iter().cycle().skip(1)).map(|(&a, &b)| (a + b) / 2.0);
-    let inside = middles.filter(|&point| contains(outer, point)).count();
+    let inside = middles.filter(|&point| ring_contains(outer, point)).count();
     2 * inside > hole.len()
-}
-
-fn contains(ring: &[DVec2], point: DVec2) -> bool {
-    let mut odd = false;
-    for (&a, &b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
-        if (a.y > point.y) != (b.y > point.y) && point.x < a.x + (point.y - a.y) / (b.y - a.y) * (b.x - a.x) {
-            odd = !odd;
-        }
-    }
-    odd
 }

@@ -13,6 +13,7 @@ use super::orient::Role;
 use super::repair::Repaired;
 use super::topology::NONE;
 use super::{Mesh, PlanarFace, boundary};
+use crate::geometry::polygon::{Moments, patch_moments};
 use crate::model::Frame;
 
 /// Distance of a corner from its face's plane, as a share of the part's diagonal: 1 um on 100 mm.
@@ -25,6 +26,8 @@ const JITTER: f64 = 1e-6;
 const NARROWEST: f64 = 5e-4;
 /// Dihedral angle up to which two regions may be neighbouring facets of one curved surface: 25 degrees.
 const SMOOTH: f64 = 25.0 * std::f64::consts::PI / 180.0;
+/// Side of a square, as a share of the diagonal, below whose area a region with one such neighbour is taken for a facet.
+const SMALL: f64 = 0.02;
 /// How much larger than a neighbour a facet of a curved surface may be.
 const FACET_RATIO: f64 = 4.0;
 
@@ -107,22 +110,25 @@ struct Region {
 ///
 /// A region counts as a facet of a curved surface when along a quarter of its boundary or more it meets at least two
 /// neighbours under less than 25 degrees, neither of them 4 times smaller: so do the strips of a tessellated cylinder,
-/// cone or fillet. The flat between two fillets is far larger than their strips and stays; nut flats and chamfers meet
-/// their neighbours under larger angles and stay. Regions narrower than 5e-4 of the part's diagonal are dropped.
+/// cone or fillet. For a region smaller than a square of 2 % of the part's diagonal one such neighbour is enough. The
+/// flat between two fillets is far larger than their strips and stays; nut flats and chamfers meet their neighbours under
+/// larger angles and stay. Where a mesh leaves it open (the outermost strip of a gear's flank) the region stays: a flat
+/// too many costs a few candidates, a flat too few loses grips. Regions narrower than 5e-4 of the part's diagonal are dropped.
 pub(super) fn planar_faces(part: &Repaired) -> Vec<PlanarFace> {
     let (regions, order, region_of) = grow(part);
     let facets = Facets::new(part, &regions, &order, &region_of);
+    let small = (SMALL * part.diagonal).powi(2);
     let tolerance = simplify_tolerance(part);
     let mut faces: Vec<PlanarFace> = Vec::new();
     for (index, region) in regions.iter().enumerate() {
-        if facets.is_facet(&regions, index) || 4.0 * region.area < NARROWEST * part.diagonal * facets.perimeter[index] {
+        if facets.is_facet(&regions, index, small) || 4.0 * region.area < NARROWEST * part.diagonal * facets.perimeter[index] {
             continue;
         }
         let triangles = &order[region.begin..region.end];
         let mut frame = face_frame(region.plane.normal, region.centre);
         let rings = |frame: &Frame| boundary::polygons(&part.mesh, &part.edges.twin, triangles, |t| region_of[t as usize] == index as u32, frame, tolerance);
         let mut polygons = rings(&frame);
-        let (area, centroid) = boundary::area_and_centroid(&polygons);
+        let Moments { area, centroid, .. } = patch_moments(&polygons);
         if area <= 0.0 {
             continue;
         }
@@ -338,16 +344,22 @@ impl Facets {
         Self { perimeter, shared }
     }
 
-    fn is_facet(&self, regions: &[Region], index: usize) -> bool {
+    /// Whether a region is a facet of a curved surface, see [`planar_faces`]. `small` is the area [m^2] below which one
+    /// comparable neighbour is enough.
+    fn is_facet(&self, regions: &[Region], index: usize, small: f64) -> bool {
         let region = &regions[index];
-        let (mut neighbours, mut length) = (0, 0.0);
-        for (&other, &shared) in &self.shared[index] {
-            let other = &regions[other as usize];
-            if region.plane.normal.angle_between(other.plane.normal) <= SMOOTH && region.area <= FACET_RATIO * other.area {
-                neighbours += 1;
-                length += shared;
+        let (mut count, mut smooth, mut comparable) = (0, 0.0, 0.0);
+        for (&neighbour, &shared) in &self.shared[index] {
+            let other = &regions[neighbour as usize];
+            if region.plane.normal.angle_between(other.plane.normal) <= SMOOTH {
+                smooth += shared;
+                if region.area <= FACET_RATIO * other.area {
+                    count += 1;
+                    comparable += shared;
+                }
             }
         }
-        neighbours >= 2 && length >= 0.25 * self.perimeter[index]
+        let long = 0.25 * self.perimeter[index];
+        (count >= 2 && comparable >= long) || (count >= 1 && smooth >= long && region.area < small)
     }
 }

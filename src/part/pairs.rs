@@ -1,13 +1,12 @@
 //! Antiparallel face pairs.
 
 use glam::{DVec2, DVec3};
-use i_overlay::core::fill_rule::FillRule;
-use i_overlay::core::overlay_rule::OverlayRule;
-use i_overlay::float::single::SingleFloatOverlay;
 use rustc_hash::FxHashMap;
 
-use super::boundary::twice_area;
 use super::{FacePair, Mesh, PairKind, PlanarFace};
+use crate::geometry::overlay::intersect;
+use crate::geometry::polygon::{self, patch_moments};
+use crate::model::{Polygon, Ring};
 
 /// Angle between one face and the reverse of the other up to which they count as antiparallel: 0.5 degrees, what the
 /// rubber of a pad takes up (0.2 mm over 20 mm).
@@ -53,38 +52,22 @@ pub(super) fn pairs(faces: &[PlanarFace], kind: PairKind, min_width: f64, max_wi
 /// Signed distance of the faces along `axis` at the middle of their overlap (positive: material between), and its area.
 fn overlap(face: &PlanarFace, other: &PlanarFace, axis: DVec3) -> Option<(f64, f64)> {
     let frame = face.part_from_face;
-    let own = shapes(face, |point| point);
-    let theirs = shapes(other, |point| frame.point_inverse(other.part_from_face.point(point.extend(0.0))).truncate());
-    let ((low_a, high_a), (low_b, high_b)) = (bounds(&own)?, bounds(&theirs)?);
-    if low_a.cmpge(high_b).any() || low_b.cmpge(high_a).any() {
+    let place = |point: &DVec2| frame.point_inverse(other.part_from_face.point(point.extend(0.0))).truncate();
+    let ring = |ring: &Ring| ring.iter().map(place).collect::<Ring>();
+    // Seen from the first face the second one's rings run the other way.
+    let theirs: Vec<Polygon> =
+        other.polygons.iter().map(|polygon| Polygon { outer: ring(&polygon.outer), holes: polygon.holes.iter().map(ring).collect() }).collect();
+    let (own_box, their_box) = (polygon::bounds(&face.polygons), polygon::bounds(&theirs));
+    if !own_box.meets(their_box) {
         return None;
     }
-    let common = own.overlay_as::<i64>(&theirs, OverlayRule::Intersect, FillRule::EvenOdd);
-    let (mut area, mut first) = (0.0, DVec2::ZERO);
-    for contour in common.iter().flatten() {
-        let ring: Vec<DVec2> = contour.iter().copied().map(DVec2::from_array).collect();
-        let part = twice_area(&ring) / 2.0;
-        area += part;
-        first += part * ring.iter().sum::<DVec2>() / ring.len() as f64;
-    }
-    if area <= 0.0 {
+    let common = patch_moments(&intersect(&face.polygons, &theirs));
+    if common.area <= 0.0 {
         return None;
     }
-    // The planes are nearly parallel: a middle weighted by contour is near enough to measure their distance at.
-    let middle = frame.point((first / area).extend(0.0));
+    let middle = frame.point(common.centroid.extend(0.0));
     let on_plane = |plane: &PlanarFace| (plane.offset - plane.normal.dot(middle)) / plane.normal.dot(axis);
-    Some((on_plane(face) - on_plane(other), area))
-}
-
-fn shapes(face: &PlanarFace, place: impl Fn(DVec2) -> DVec2) -> Vec<Vec<Vec<[f64; 2]>>> {
-    let contour = |ring: &Vec<DVec2>| ring.iter().map(|&point| place(point).to_array()).collect();
-    face.polygons.iter().map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes).map(contour).collect()).collect()
-}
-
-fn bounds(shapes: &[Vec<Vec<[f64; 2]>>]) -> Option<(DVec2, DVec2)> {
-    let mut points = shapes.iter().flatten().flatten().copied().map(DVec2::from_array);
-    let first = points.next()?;
-    Some(points.fold((first, first), |(low, high), point| (low.min(point), high.max(point))))
+    Some((on_plane(face) - on_plane(other), common.area))
 }
 
 /// Faces by direction: cells of the cube around the unit sphere, wide enough that near directions share a cell or are neighbours.

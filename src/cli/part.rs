@@ -1,0 +1,187 @@
+//! `gripfast part`: what a part file holds, before any gripper is chosen.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Context;
+use clap::Args as ClapArgs;
+use comfy_table::{CellAlignment, Table, presets};
+use glam::DVec3;
+use gripfast::part::{FacePair, Part, PlanarFace, ReadOptions, Unit};
+use gripfast::units::Quantity;
+use serde_json::json;
+
+/// Reads a part, checks its mesh, and lists its planar faces and the pairs of them that can be gripped.
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "EXAMPLES:\n  gripfast part bracket.stl\n  gripfast part bracket.stl --unit in --density 2.7g/cm3\n  gripfast part bracket.3mf --mass 350g --json\n\n\
+Reads STL, OBJ, PLY, OFF, 3MF and glTF/GLB, each also as .gz."
+)]
+pub(crate) struct Args {
+    /// Part file.
+    part: PathBuf,
+    /// Unit of the file's numbers: mm, cm, m, um, in or ft. Default: the file's own (3MF, glTF), else mm.
+    #[arg(long)]
+    unit: Option<Unit>,
+    /// Density, for the mass and the inertia.
+    #[arg(long, value_name = "DENSITY", conflicts_with = "mass")]
+    density: Option<String>,
+    /// Mass, for the density and the inertia.
+    #[arg(long, value_name = "MASS")]
+    mass: Option<String>,
+    /// Smallest and largest width of the pairs listed.
+    #[arg(long, num_args = 2, value_names = ["MIN", "MAX"])]
+    stroke: Option<Vec<String>>,
+    /// Lists all faces and pairs, not only the largest.
+    #[arg(long)]
+    faces: bool,
+    /// Also pairs that jaws opening into a slot can grip.
+    #[arg(long)]
+    internal: bool,
+    /// One JSON object in SI units on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Rows of a table without `--faces`.
+const ROWS: usize = 10;
+
+pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let density = args.density.as_deref().map(|text| Quantity::Density.parse("--density", text)).transpose()?;
+    let mass = args.mass.as_deref().map(|text| Quantity::Mass.parse("--mass", text)).transpose()?;
+    for (flag, value) in [("--density", density), ("--mass", mass)] {
+        anyhow::ensure!(value.is_none_or(|value| value > 0.0), "{flag}: must be positive");
+    }
+    let stroke = match args.stroke.as_deref() {
+        Some([min, max]) => [Quantity::Length.parse("--stroke", min)?, Quantity::Length.parse("--stroke", max)?],
+        _ => [0.0, f64::INFINITY],
+    };
+    let part = Part::read(&args.part, &ReadOptions { unit: args.unit })?;
+    let volume = part.mass_properties(1.0).volume;
+    let density = match mass {
+        Some(mass) if volume > 0.0 => Some(mass / volume),
+        Some(_) => anyhow::bail!("{}: encloses no volume, so a mass gives no density", args.part.display()),
+        None => density,
+    };
+    let mut pairs = part.pairs(stroke[0], stroke[1]);
+    if args.internal {
+        pairs.extend(part.internal_pairs(stroke[0], stroke[1]));
+    }
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        serde_json::to_writer_pretty(&mut out, &to_json(&part, &pairs, density)).context("writing JSON")?;
+        writeln!(out)?;
+    } else {
+        write!(out, "{}", to_text(&part, &pairs, density, if args.faces { usize::MAX } else { ROWS }))?;
+    }
+    Ok(if pairs.is_empty() { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
+
+fn to_text(part: &Part, pairs: &[FacePair], density: Option<f64>, rows: usize) -> String {
+    let (low, high) = part.mesh.bounding_box();
+    let size = (high - low) * 1e3;
+    let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == part.unit_m).map_or(String::new(), |unit| unit.to_string());
+    let mut text = format!("{}\n", part.file.display());
+    let mut line = |name: &str, value: String| text += &format!("  {name:<15} {value}\n");
+    line("size", format!("{:.3} x {:.3} x {:.3} mm (unit of the file: {unit})", size.x, size.y, size.z));
+    line("triangles", format!("{}, {} vertices", part.mesh.triangles.len(), part.mesh.vertices.len()));
+    for (index, finding) in part.health.lines().into_iter().enumerate() {
+        line(if index == 0 { "surface" } else { "" }, finding);
+    }
+    let mass = part.mass_properties(density.unwrap_or(1.0));
+    line("volume", format!("{:.3} cm3", mass.volume * 1e6));
+    line("centre of mass", format!("{} mm", triple(mass.centre_of_mass * 1e3, 3)));
+    if let Some(density) = density {
+        line("mass", format!("{:.4} kg at {:.1} kg/m3", mass.mass, density));
+        let inertia = mass.inertia * 1e6;
+        let (xx, yy, zz) = (inertia.x_axis.x, inertia.y_axis.y, inertia.z_axis.z);
+        line("inertia", format!("xx, yy, zz: {} kg mm2 about the centre of mass", triple(DVec3::new(xx, yy, zz), 4)));
+        let (xy, yz, zx) = (inertia.x_axis.y, inertia.y_axis.z, inertia.z_axis.x);
+        line("", format!("xy, yz, zx: {} kg mm2 (elements of the matrix)", triple(DVec3::new(xy, yz, zx), 4)));
+    }
+    text += &format!("\n{} planar faces\n", part.faces.len());
+    text += &face_table(&part.faces, rows);
+    text += &format!("\n{} antiparallel pairs\n", pairs.len());
+    text += &pair_table(pairs, rows);
+    text
+}
+
+fn table(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING).set_header(header);
+    for column in table.column_iter_mut() {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+fn finish(table: &Table, total: usize, rows: usize) -> String {
+    let more = total.saturating_sub(rows);
+    let rest = if more > 0 { format!("  ... and {more} smaller ones (--faces lists all)\n") } else { String::new() };
+    if total == 0 { String::new() } else { format!("{}\n{rest}", table.trim_fmt()) }
+}
+
+/// A fixed number of decimals, never `-0.00`.
+fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    if text.starts_with('-') && !text.contains(|digit: char| ('1'..='9').contains(&digit)) { text[1..].to_string() } else { text }
+}
+
+/// Three numbers with a fixed number of decimals.
+fn triple(value: DVec3, decimals: usize) -> String {
+    format!("{} {} {}", fixed(value.x, decimals), fixed(value.y, decimals), fixed(value.z, decimals))
+}
+
+fn face_table(faces: &[PlanarFace], rows: usize) -> String {
+    let mut table = table(&["face", "area mm2", "normal", "offset mm", "holes", "centre mm", ""]);
+    for face in faces.iter().take(rows) {
+        table.add_row([
+            face.id.to_string(),
+            format!("{:.2}", face.area * 1e6),
+            triple(face.normal, 4),
+            fixed(face.offset * 1e3, 3),
+            face.polygons.iter().map(|polygon| polygon.holes.len()).sum::<usize>().to_string(),
+            triple(face.centroid * 1e3, 2),
+            if face.reachable { "" } else { "inside" }.to_string(),
+        ]);
+    }
+    finish(&table, faces.len(), rows)
+}
+
+fn pair_table(pairs: &[FacePair], rows: usize) -> String {
+    let mut table = table(&["faces", "width mm", "overlap mm2", "kind"]);
+    for pair in pairs.iter().take(rows) {
+        table.add_row([
+            format!("{} | {}", pair.face_i, pair.face_ii),
+            format!("{:.3}", pair.width * 1e3),
+            format!("{:.2}", pair.overlap_area * 1e6),
+            format!("{:?}", pair.kind).to_lowercase(),
+        ]);
+    }
+    finish(&table, pairs.len(), rows)
+}
+
+fn to_json(part: &Part, pairs: &[FacePair], density: Option<f64>) -> serde_json::Value {
+    let (low, high) = part.mesh.bounding_box();
+    let mass = part.mass_properties(density.unwrap_or(1.0));
+    let faces: Vec<_> = part
+        .faces
+        .iter()
+        .map(|face| {
+            json!({
+                "id": face.id, "area": face.area, "normal": face.normal, "offset": face.offset, "centroid": face.centroid,
+                "part_from_face": face.part_from_face, "polygons": face.polygons, "shell": face.shell, "reachable": face.reachable,
+            })
+        })
+        .collect();
+    let pairs: Vec<_> = pairs
+        .iter()
+        .map(|pair| json!({ "faces": [pair.face_i, pair.face_ii], "width": pair.width, "overlap_area": pair.overlap_area, "kind": pair.kind }))
+        .collect();
+    json!({
+        "file": part.file, "name": part.name, "unit_m": part.unit_m, "triangles": part.mesh.triangles.len(), "vertices": part.mesh.vertices.len(),
+        "bbox_min": low, "bbox_max": high, "health": part.health, "volume": mass.volume, "centre_of_mass": mass.centre_of_mass,
+        "density": density, "mass": density.map(|_| mass.mass), "inertia": density.map(|_| mass.inertia), "faces": faces, "pairs": pairs,
+    })
+}
