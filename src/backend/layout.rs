@@ -16,9 +16,9 @@ pub const BASIS_GROUP: usize = 64;
 pub const BASIS: usize = 9;
 
 /// Slip centres nearer than this many circumradii from the origin use the fan's closed forms; the others Gauss points.
-/// The fan loses three digits per decade of that distance and f32 has seven; six Gauss points per direction are good
-/// to 1e-7 from 2 on.
-pub const NEAR_LIMIT: f32 = 2.0;
+/// The fan loses digits with that distance; six Gauss points per direction are at rounding level from 1.5 on
+/// (`fan::tests::near_and_far_forms_meet_where_both_are_good` prints both).
+pub const NEAR_LIMIT: f32 = 1.5;
 
 /// An edge whose line passes the slip centre closer than this contributes nothing (its terms vanish with the distance).
 pub const ON_LINE: f32 = 1e-10;
@@ -32,6 +32,13 @@ pub const COUPLING_MARGIN: f32 = 0.25;
 
 /// Share by which a tilt that would lift a pad is shortened beyond the point of first separation (seeds only).
 pub const TILT_LIMIT: f32 = 0.98;
+
+/// Triangles whose three supports span less than this volume give no bound.
+pub const DEGENERATE: f32 = 1e-12;
+
+/// Below this `l / (r1 + r2)` an edge's logarithm is a series: its argument would be rounded to near 1.
+/// Six terms leave 6e-9 there.
+pub const SERIES_LIMIT: f32 = 0.25;
 
 /// [`SeedRecord::status`]: the kernel did not write this record. Anything left so after a run is an error.
 pub const UNWRITTEN: u32 = 0;

@@ -9,24 +9,30 @@
 //! `M1, M2, F3` nor the distance of the faces matters. Elsewhere the seeds come from the pressure without friction
 //! coupling, and there are no bounds.
 
+mod choice;
 mod cpu;
 mod fan;
+#[cfg(feature = "gpu")]
+mod gpu;
 pub mod layout;
 mod prepare;
 mod search;
 mod seeds;
 
 use std::collections::HashMap;
-use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
+#[cfg(feature = "gpu")]
+pub use gpu::{ADAPTER_VARIABLE, AdapterSummary, Gpu, list as list_adapters};
+
+pub use choice::{Choice, Selection, select};
 pub use seeds::{NEGATED, RING, SeedSet};
 
 use crate::error::{Error, Result};
 use crate::model::{Contact, Wrench};
-use layout::{BOUNDED, SeedRecord, UNBOUNDED};
+use layout::SeedRecord;
 use prepare::{Chunk, Prepared, not_searched};
 
 /// Relative widening of both bounds: ten times the largest error of the 32-bit kernels seen in tests (processor and
@@ -87,6 +93,9 @@ pub struct Seed {
 pub enum Backend {
     /// The processor, on rayon's threads.
     Cpu,
+    /// A graphics processor.
+    #[cfg(feature = "gpu")]
+    Gpu(Box<Gpu>),
 }
 
 /// Most loads, contacts and basis numbers of one chunk.
@@ -103,25 +112,28 @@ impl Limits {
     const CPU: Self = Self { loads: 1 << 18, contacts: 1 << 14, edges: 1 << 20, basis: usize::MAX };
 }
 
-/// Consecutive loads of one problem.
-#[derive(Debug, Clone)]
-struct Piece {
+/// Consecutive loads of one problem, and the places of their answers.
+struct Piece<'b> {
     problem: usize,
-    loads: Range<usize>,
+    first: usize,
+    answers: &'b mut [Seed],
+    /// Factor from the unit wrench per load; zero where there is nothing to search.
+    scales: Vec<f64>,
 }
 
 /// What goes into one chunk: contacts (as indices) with their pieces.
-type Plan = Vec<(usize, Vec<Piece>)>;
-
-/// Where a chunk's records go: index of the answer and factor from the unit wrench, per load.
-#[derive(Debug, Default)]
-struct Targets {
-    contact: Vec<usize>,
-    answer: Vec<usize>,
-    scale: Vec<f64>,
-}
+type Plan<'b> = Vec<(usize, Vec<Piece<'b>>)>;
 
 impl Backend {
+    /// `cpu`, or the adapter's name and driver.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Cpu => "cpu".to_owned(),
+            #[cfg(feature = "gpu")]
+            Self::Gpu(gpu) => gpu.name(),
+        }
+    }
+
     /// Seeds of all loads of all problems, in order. Equal input gives equal output on one backend, whatever the number
     /// of threads, and however the batch is cut or permuted.
     ///
@@ -133,10 +145,21 @@ impl Backend {
         let mut answers = vec![not_searched(SeedStatus::NoContact); job.loads];
         match self {
             Self::Cpu => {
-                for plan in job.plans(Limits::CPU) {
-                    let (chunk, targets) = job.build(&plan, &mut answers);
-                    job.scatter(&cpu::run(&chunk, seeds), &targets, &mut answers)?;
+                for mut plan in job.plans(Limits::CPU, &mut answers) {
+                    let chunk = job.build(&mut plan);
+                    job.scatter(&cpu::run(&chunk, seeds), plan)?;
                 }
+            }
+            #[cfg(feature = "gpu")]
+            Self::Gpu(gpu) => {
+                let mut plans = job.plans(gpu.limits(), &mut answers).into_iter();
+                let next = || {
+                    plans.by_ref().find_map(|mut plan| {
+                        let chunk = job.build(&mut plan);
+                        (!chunk.loads.is_empty()).then_some((chunk, plan))
+                    })
+                };
+                gpu.run(seeds, next, |records, plan| job.scatter(&records, plan))?;
             }
         }
         Ok(answers)
@@ -147,8 +170,6 @@ impl Backend {
 struct Job<'a> {
     batch: &'a Batch<'a>,
     seeds: &'a SeedSet,
-    /// First answer of each problem.
-    first: Vec<usize>,
     /// Number of answers.
     loads: usize,
     /// Distinct contacts in the order of first use; `None` has no area.
@@ -159,13 +180,11 @@ struct Job<'a> {
 
 impl<'a> Job<'a> {
     fn new(batch: &'a Batch<'a>, seeds: &'a SeedSet) -> Result<Self> {
-        let mut first = Vec::with_capacity(batch.problems.len());
         let mut loads = 0;
         let mut index_of: HashMap<*const Contact, usize> = HashMap::new();
         let mut problems: Vec<Vec<usize>> = Vec::new();
         for (index, problem) in batch.problems.iter().enumerate() {
             check(problem, index)?;
-            first.push(loads);
             loads += problem.wrenches.len();
             let slot = *index_of.entry(Arc::as_ptr(problem.contact)).or_insert(problems.len());
             if slot == problems.len() {
@@ -177,32 +196,38 @@ impl<'a> Job<'a> {
             .par_iter()
             .map(|users| Prepared::new(batch.problems[users[0]].contact, &format!("contact of grip {}", users[0])))
             .collect::<Result<_>>()?;
-        Ok(Self { batch, seeds, first, loads, prepared, problems })
+        Ok(Self { batch, seeds, loads, prepared, problems })
     }
 
-    /// Cuts the job into chunks within `limits`. A contact with many loads is cut too.
-    fn plans(&self, limits: Limits) -> Vec<Plan> {
-        let (mut plans, mut plan): (Vec<Plan>, Plan) = (Vec::new(), Vec::new());
+    /// Cuts the job into chunks within `limits`, each with its places among the `answers`. A contact with many loads is
+    /// cut too.
+    fn plans<'b>(&self, limits: Limits, mut answers: &'b mut [Seed]) -> Vec<Plan<'b>> {
+        let mut places: Vec<&'b mut [Seed]> = Vec::with_capacity(self.batch.problems.len());
+        for problem in &self.batch.problems {
+            let (mine, others) = answers.split_at_mut(problem.wrenches.len());
+            places.push(mine);
+            answers = others;
+        }
+        let (mut plans, mut plan): (Vec<Plan<'b>>, Plan<'b>) = (Vec::new(), Vec::new());
         let (mut loads, mut edges, mut basis) = (0, 0, 0);
         for (contact, users) in self.problems.iter().enumerate() {
             let Some(prepared) = &self.prepared[contact] else { continue };
             let (own_edges, own_basis) = (prepared.edges.len(), prepare::basis_length(&prepared.header, self.seeds.len()));
-            let mut pieces = Vec::new();
-            let full = |plan: &Plan, edges: usize, basis: usize| {
-                plan.len() + 1 > limits.contacts || edges + own_edges > limits.edges || basis + own_basis > limits.basis
-            };
-            if full(&plan, edges, basis) && !plan.is_empty() {
+            if !plan.is_empty() && (plan.len() + 1 > limits.contacts || edges + own_edges > limits.edges || basis + own_basis > limits.basis) {
                 plans.push(std::mem::take(&mut plan));
                 (loads, edges, basis) = (0, 0, 0);
             }
+            let mut pieces = Vec::new();
             for &problem in users {
-                let total = self.batch.problems[problem].wrenches.len();
-                let mut start = 0;
-                while start < total {
-                    let end = total.min(start + (limits.loads - loads));
-                    pieces.push(Piece { problem, loads: start..end });
-                    loads += end - start;
-                    start = end;
+                let mut rest = std::mem::take(&mut places[problem]);
+                let mut first = 0;
+                while !rest.is_empty() {
+                    let count = rest.len().min(limits.loads - loads);
+                    let (answers, others) = rest.split_at_mut(count);
+                    pieces.push(Piece { problem, first, answers, scales: Vec::new() });
+                    rest = others;
+                    first += count;
+                    loads += count;
                     if loads == limits.loads {
                         plan.push((contact, std::mem::take(&mut pieces)));
                         plans.push(std::mem::take(&mut plan));
@@ -223,62 +248,62 @@ impl<'a> Job<'a> {
     }
 
     /// The records of a plan; answers of loads that need no search are written at once.
-    fn build(&self, plan: &Plan, answers: &mut [Seed]) -> (Chunk, Targets) {
-        type Scaled = Vec<std::result::Result<(layout::LoadRecord, f64), SeedStatus>>;
-        let (mut chunk, mut targets) = (Chunk::default(), Targets::default());
-        for (contact, pieces) in plan {
-            let Some(prepared) = &self.prepared[*contact] else { continue };
-            let scaled: Vec<Scaled> = pieces
-                .par_iter()
-                .with_min_len(64)
-                .map(|piece| {
-                    let problem = &self.batch.problems[piece.problem];
-                    problem.wrenches[piece.loads.clone()].iter().map(|wrench| prepared.load(problem, wrench)).collect()
-                })
-                .collect();
-            let mut records = Vec::with_capacity(scaled.iter().map(Vec::len).sum());
-            for (piece, loads) in pieces.iter().zip(scaled) {
-                let first = self.first[piece.problem] + piece.loads.start;
-                for (offset, load) in loads.into_iter().enumerate() {
-                    match load {
+    fn build(&self, plan: &mut Plan<'_>) -> Chunk {
+        let mut pieces: Vec<(usize, &mut Piece<'_>)> = plan.iter_mut().flat_map(|(contact, pieces)| pieces.iter_mut().map(|piece| (*contact, piece))).collect();
+        let records: Vec<Vec<layout::LoadRecord>> = pieces
+            .par_iter_mut()
+            .with_min_len(16)
+            .map(|(contact, piece)| {
+                let Some(prepared) = &self.prepared[*contact] else { return Vec::new() };
+                let problem = &self.batch.problems[piece.problem];
+                let mut records = Vec::with_capacity(piece.answers.len());
+                piece.scales = Vec::with_capacity(piece.answers.len());
+                for (wrench, answer) in problem.wrenches[piece.first..].iter().zip(piece.answers.iter_mut()) {
+                    match prepared.load(problem, wrench) {
                         Ok((record, scale)) => {
                             records.push(record);
-                            targets.contact.push(*contact);
-                            targets.answer.push(first + offset);
-                            targets.scale.push(scale);
+                            piece.scales.push(scale);
                         }
-                        Err(status) => answers[first + offset] = not_searched(status),
+                        Err(status) => {
+                            *answer = not_searched(status);
+                            piece.scales.push(0.0);
+                        }
                     }
                 }
-            }
-            if !records.is_empty() {
-                chunk.push(prepared, records, self.seeds.len());
-            }
+                records
+            })
+            .collect();
+        let mut chunk = Chunk::default();
+        let mut records = records.into_iter();
+        for (contact, pieces) in plan.iter() {
+            let Some(prepared) = &self.prepared[*contact] else { continue };
+            chunk.push(prepared, records.by_ref().take(pieces.len()), self.seeds.len());
         }
-        (chunk, targets)
+        chunk
     }
 
     /// Turns a chunk's records into answers.
-    fn scatter(&self, records: &[SeedRecord], targets: &Targets, answers: &mut [Seed]) -> Result<()> {
-        if records.len() != targets.answer.len() {
-            return Err(Error::Backend(format!("{} loads were sent and {} answers came back", targets.answer.len(), records.len())));
+    fn scatter(&self, records: &[SeedRecord], plan: Plan<'_>) -> Result<()> {
+        let mut rest = records;
+        let mut jobs = Vec::new();
+        for (contact, pieces) in plan {
+            for piece in pieces {
+                let count = piece.scales.iter().filter(|&&scale| scale > 0.0).count();
+                let Some((mine, others)) = rest.split_at_checked(count) else {
+                    return Err(Error::Backend(format!("only {} answers came back", records.len())));
+                };
+                jobs.push((contact, piece, mine));
+                rest = others;
+            }
         }
-        for (index, record) in records.iter().enumerate() {
-            let Some(prepared) = &self.prepared[targets.contact[index]] else { continue };
-            let status = match record.status {
-                BOUNDED => SeedStatus::Bounded,
-                UNBOUNDED => SeedStatus::Unbounded,
-                other => return Err(Error::Backend(format!("load {index} of a chunk came back with status {other}: the kernel did not write it"))),
-            };
-            let (scale, bounded) = (targets.scale[index], status == SeedStatus::Bounded);
-            answers[targets.answer[index]] = Seed {
-                status,
-                twist: prepared.twist(record.twist),
-                lower: if bounded { scale * f64::from(record.lower) * (1.0 - F32_TOLERANCE) } else { 0.0 },
-                upper: if bounded { scale * f64::from(record.upper) * (1.0 + F32_TOLERANCE) } else { f64::INFINITY },
-            };
-        }
-        Ok(())
+        jobs.into_par_iter().with_min_len(16).try_for_each(|(contact, piece, records)| {
+            let Some(prepared) = &self.prepared[contact] else { return Ok(()) };
+            let searched = piece.answers.iter_mut().zip(&piece.scales).filter(|(_, scale)| **scale > 0.0);
+            for ((answer, scale), record) in searched.zip(records) {
+                *answer = prepared.answer(record, *scale)?;
+            }
+            Ok(())
+        })
     }
 }
 

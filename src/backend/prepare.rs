@@ -1,12 +1,14 @@
 //! From contacts and wrenches in SI to the scaled 32-bit records of the kernels, and back. Everything that decides
 //! whether a load can be searched at all happens here in f64, once for every backend.
 
-use glam::{DMat2, DVec2};
+use glam::DVec2;
 
-use super::layout::{ContactHeader, EdgeRecord, GROUP, GroupRecord, LoadRecord, OUT_OF_RANGE};
-use super::{Problem, Seed, SeedStatus};
+use super::layout::{BOUNDED, ContactHeader, EdgeRecord, GROUP, GroupRecord, LoadRecord, OUT_OF_RANGE, SeedRecord, UNBOUNDED};
+use super::{F32_TOLERANCE, Problem, Seed, SeedStatus};
+use crate::contact::Loops;
 use crate::error::{Error, Result};
-use crate::model::{Contact, Patch, Wrench};
+use crate::geometry::polygon::{Moments, rings_moments};
+use crate::model::{Contact, Wrench};
 
 /// Vertices of two faces this close together, in radii of gyration, count as the same (congruent faces).
 const CONGRUENT: f64 = 1e-9;
@@ -28,56 +30,9 @@ pub(crate) struct Prepared {
     pub(crate) header: ContactHeader,
     pub(crate) edges: Vec<EdgeRecord>,
     /// Centroid of both faces together [m], origin of the scaled frame.
-    origin: DVec2,
+    pub(crate) origin: DVec2,
     /// Radius of gyration about it [m], unit of length.
-    unit: f64,
-}
-
-/// Area, centroid and second moments about the centroid.
-#[derive(Debug, Clone, Copy)]
-struct Moments {
-    area: f64,
-    centroid: DVec2,
-    second: DMat2,
-    perimeter: f64,
-}
-
-/// Directed edges with the material on their left, whatever the sense of the rings.
-fn directed_edges(patch: &Patch) -> Vec<(DVec2, DVec2)> {
-    let mut edges = Vec::new();
-    for polygon in patch {
-        for (ring, outer) in std::iter::once((&polygon.outer, true)).chain(polygon.holes.iter().map(|hole| (hole, false))) {
-            let Some(&base) = ring.first() else { continue };
-            let pairs = || ring.iter().zip(ring.iter().cycle().skip(1)).filter(|(a, b)| a != b);
-            let twice_area: f64 = pairs().map(|(a, b)| (*a - base).perp_dot(*b - base)).sum();
-            if (twice_area > 0.0) == outer {
-                edges.extend(pairs().map(|(a, b)| (*a, *b)));
-            } else {
-                edges.extend(pairs().map(|(a, b)| (*b, *a)));
-            }
-        }
-    }
-    edges
-}
-
-/// Moments by signed triangles about the mean of the vertices (near the material, so nothing large cancels).
-fn moments(edges: &[(DVec2, DVec2)]) -> Moments {
-    let base = edges.iter().map(|edge| edge.0).sum::<DVec2>() / edges.len().max(1) as f64;
-    let (mut area, mut first, mut second, mut perimeter) = (0.0, DVec2::ZERO, DMat2::ZERO, 0.0);
-    for (a, b) in edges.iter().map(|&(a, b)| (a - base, b - base)) {
-        let twice = a.perp_dot(b);
-        area += twice / 2.0;
-        first += twice / 6.0 * (a + b);
-        let sum = a + b;
-        second += (outer(a, a) + outer(b, b) + outer(sum, sum)) * (twice / 24.0);
-        perimeter += a.distance(b);
-    }
-    let centroid = first / area;
-    Moments { area, centroid: base + centroid, second: second - outer(centroid, centroid) * area, perimeter }
-}
-
-fn outer(a: DVec2, b: DVec2) -> DMat2 {
-    DMat2::from_cols(a * b.x, a * b.y)
+    pub(crate) unit: f64,
 }
 
 /// Whether two faces have the same rings, each perhaps begun at another vertex, to within `tolerance` [m].
@@ -93,7 +48,6 @@ impl Prepared {
     /// # Errors
     /// [`Error::Input`] when a coordinate is not finite.
     pub(crate) fn new(contact: &Contact, place: &str) -> Result<Option<Self>> {
-        let (edges_i, edges_ii) = (directed_edges(&contact.face_i), directed_edges(&contact.face_ii));
         for (name, patch) in [("A_I", &contact.face_i), ("A_II", &contact.face_ii)] {
             for point in patch.iter().flat_map(|polygon| polygon.outer.iter().chain(polygon.holes.iter().flatten())) {
                 if !point.is_finite() {
@@ -101,9 +55,13 @@ impl Prepared {
                 }
             }
         }
-        let (on_i, on_ii) = (moments(&edges_i), moments(&edges_ii));
-        let has_area = |face: &Moments| face.area > NO_AREA * face.perimeter * face.perimeter && face.area.is_normal();
-        if !(has_area(&on_i) && has_area(&on_ii)) {
+        let [loops_i, loops_ii] = [&contact.face_i, &contact.face_ii].map(|patch| Loops::new(patch));
+        let [edges_i, edges_ii] = [&loops_i, &loops_ii].map(|loops| loops.edges().filter(|(a, b)| a != b).collect::<Vec<_>>());
+        let [on_i, on_ii] = [&loops_i, &loops_ii].map(|loops| rings_moments(&loops.rings().collect::<Vec<_>>()));
+        let perimeter = |edges: &[(DVec2, DVec2)]| edges.iter().map(|(a, b)| a.distance(*b)).sum::<f64>();
+        let (length_i, length_ii) = (perimeter(&edges_i), perimeter(&edges_ii));
+        let has_area = |face: &Moments, length: f64| face.area > NO_AREA * length * length && face.area.is_normal();
+        if !(has_area(&on_i, length_i) && has_area(&on_ii, length_ii)) {
             return Ok(None);
         }
         let area = on_i.area + on_ii.area;
@@ -115,19 +73,22 @@ impl Prepared {
         }
         let same = congruent(&edges_i, &edges_ii, CONGRUENT * unit);
         let scaled = |p: DVec2| (p - origin) / unit;
-        let edges: Vec<EdgeRecord> = edges_i
-            .iter()
-            .chain(if same { &[] } else { edges_ii.as_slice() })
-            .map(|&(a, b)| (scaled(a), scaled(b)))
-            .map(|(a, b)| [a.x as f32, a.y as f32, b.x as f32, b.y as f32])
-            .collect();
+        let records = |edges: &[(DVec2, DVec2)]| -> Vec<EdgeRecord> {
+            let record = |&(a, b): &(DVec2, DVec2)| [scaled(a).as_vec2().to_array(), scaled(b).as_vec2().to_array()];
+            edges.iter().map(record).filter(|[a, b]| a != b).map(|[a, b]| [a[0], a[1], b[0], b[1]]).collect()
+        };
+        let mut edges = records(&edges_i);
+        let end_of_i = edges.len() as u32;
+        if !same {
+            edges.extend(records(&edges_ii));
+        }
         let radius = edges_i.iter().chain(&edges_ii).map(|edge| scaled(edge.0).length()).fold(0.0, f64::max);
         let stiffness = (on_i.second + on_ii.second) * unit.powi(-4);
         let compliance = stiffness.inverse();
-        let resolved = |face: &Moments| radius * face.perimeter / face.area * unit <= RESOLVED;
+        let resolved = |face: &Moments, length: f64| radius * unit * length / face.area <= RESOLVED;
         let header = ContactHeader {
             edges_i: 0,
-            edges_ii: edges_i.len() as u32,
+            edges_ii: end_of_i,
             edges_end: edges.len() as u32,
             basis: 0,
             faces: if same { 1 } else { 2 },
@@ -137,7 +98,7 @@ impl Prepared {
             centroid_i: scaled(on_i.centroid).as_vec2().to_array(),
             centroid_ii: scaled(on_ii.centroid).as_vec2().to_array(),
             compliance: [compliance.x_axis.x as f32, compliance.y_axis.x as f32, compliance.y_axis.y as f32],
-            resolved: u32::from(resolved(&on_i) && resolved(&on_ii)),
+            resolved: u32::from(resolved(&on_i, length_i) && resolved(&on_ii, length_ii)),
         };
         Ok(Some(Self { header, edges, origin, unit }))
     }
@@ -147,7 +108,7 @@ impl Prepared {
     pub(crate) fn load(&self, problem: &Problem<'_>, wrench: &Wrench) -> std::result::Result<(LoadRecord, f64), SeedStatus> {
         let (force, unit, o) = (problem.force, self.unit, self.origin);
         let f = wrench.force;
-        if !(f.z.abs() < 2.0 * force) {
+        if f.z.abs() >= 2.0 * force {
             return Err(SeedStatus::NoNormalForce);
         }
         // The moment about the centroid, in lengths of the unit.
@@ -167,10 +128,25 @@ impl Prepared {
         Ok((LoadRecord { wrench: direction.as_vec3().to_array(), scale, f3, m1, m2, distance }, length / force))
     }
 
-    /// The scaled twist in SI about the grip origin.
-    pub(crate) fn twist(&self, scaled: [f32; 3]) -> [f64; 3] {
-        let omega = f64::from(scaled[2]) / self.unit;
-        [f64::from(scaled[0]) + omega * self.origin.y, f64::from(scaled[1]) - omega * self.origin.x, omega]
+    /// The answer in SI about the grip origin from the search's record and the load's scale.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] when the kernel did not write the record.
+    pub(crate) fn answer(&self, record: &SeedRecord, scale: f64) -> Result<Seed> {
+        let bounded = match record.status {
+            BOUNDED => true,
+            UNBOUNDED => false,
+            other => return Err(Error::Backend(format!("a load came back with status {other}: the kernel did not write it"))),
+        };
+        let [u1, u2, omega] = record.twist.map(f64::from);
+        let omega = omega / self.unit;
+        let twist = [u1 + omega * self.origin.y, u2 - omega * self.origin.x, omega];
+        if !bounded {
+            return Ok(Seed { status: SeedStatus::Unbounded, twist, lower: 0.0, upper: f64::INFINITY });
+        }
+        let lower = scale * f64::from(record.lower) * (1.0 - F32_TOLERANCE);
+        let upper = scale * f64::from(record.upper) * (1.0 + F32_TOLERANCE);
+        Ok(Seed { status: SeedStatus::Bounded, twist, lower, upper })
     }
 }
 
@@ -186,16 +162,21 @@ pub(crate) struct Chunk {
 }
 
 impl Chunk {
-    /// Adds a contact with its loads, in groups.
-    pub(crate) fn push(&mut self, prepared: &Prepared, loads: impl IntoIterator<Item = LoadRecord>, twists: usize) {
+    /// Adds a contact with its loads, in groups. A contact without loads is left out.
+    pub(crate) fn push(&mut self, prepared: &Prepared, loads: impl IntoIterator<Item = Vec<LoadRecord>>, twists: usize) {
+        let first = self.loads.len();
+        for part in loads {
+            self.loads.extend(part);
+        }
+        if self.loads.len() == first {
+            return;
+        }
         let first_edge = self.edges.len() as u32;
         let mut header = prepared.header;
         header.edges_i += first_edge;
         header.edges_ii += first_edge;
         header.edges_end += first_edge;
         header.basis = self.basis as u32;
-        let first = self.loads.len();
-        self.loads.extend(loads);
         for start in (first..self.loads.len()).step_by(GROUP) {
             let count = GROUP.min(self.loads.len() - start) as u32;
             self.groups.push(GroupRecord { contact: self.contacts.len() as u32, first: start as u32, count, padding: 0 });

@@ -1,9 +1,7 @@
 //! The search for the best twist of one load, in f32: the twin of `shaders/search.wgsl`, same functions in the same
 //! order.
 
-use super::layout::{
-    BASIS, BOUNDED, CONTACT_MARGIN, COUPLING_MARGIN, ContactHeader, EdgeRecord, LoadRecord, SeedRecord, TILT_LIMIT, UNBOUNDED,
-};
+use super::layout::{BASIS, BOUNDED, CONTACT_MARGIN, COUPLING_MARGIN, ContactHeader, DEGENERATE, EdgeRecord, LoadRecord, SeedRecord, TILT_LIMIT, UNBOUNDED};
 use super::seeds::{NEGATED, RING};
 
 /// One contact as the search sees it.
@@ -60,11 +58,7 @@ impl Field<'_> {
         let share = self.free_share(mean_i, mean_ii, full);
         let share = if share < 1.0 { TILT_LIMIT * share } else { share };
         let slope = [share * full[0], share * full[1]];
-        Planes {
-            at_i: mean_i - slope[0] * ci[0] - slope[1] * ci[1],
-            at_ii: mean_ii + slope[0] * cii[0] + slope[1] * cii[1],
-            slope,
-        }
+        Planes { at_i: mean_i - slope[0] * ci[0] - slope[1] * ci[1], at_ii: mean_ii + slope[0] * cii[0] + slope[1] * cii[1], slope }
     }
 
     /// Gradient of the dissipation at twist `entry` (a ring entry) under `planes`.
@@ -102,7 +96,7 @@ impl Field<'_> {
         let (trace, det) = (x11 + x22, x11 * x22 - x12 * x21);
         // 1 - s trace + s^2 det stays above the margin for s in [0, 1].
         let lowest = if det > 0.0 && trace > 0.0 && trace < 2.0 * det { 1.0 - 0.25 * trace * trace / det } else { 1.0 - trace + det };
-        if !(lowest >= COUPLING_MARGIN) {
+        if lowest.is_nan() || lowest < COUPLING_MARGIN {
             return false;
         }
         let right1 = -load.m2 + reach * load.f3 / header.area_i * g0[0];
@@ -145,7 +139,7 @@ impl Field<'_> {
             let gc = self.support(planes, next);
             let normal = cross(gb, gc);
             let det = dot(ga, normal);
-            if det.abs() > 1e-12 {
+            if det.abs() > DEGENERATE {
                 let a = dot(w, normal) / det;
                 let b = dot(w, cross(gc, ga)) / det;
                 let c = dot(w, cross(ga, gb)) / det;

@@ -37,7 +37,11 @@ impl SeedSet {
     /// [`Error::Input`] when `frequency` is not in `1..=64`.
     pub fn new(frequency: u32) -> Result<Self> {
         if !(1..=Self::MAX_FREQUENCY).contains(&frequency) {
-            return Err(Error::input("seed set", format!("frequency {frequency} is not in 1..={}", Self::MAX_FREQUENCY), "use 4 (81 twists) or 8 (321 twists)"));
+            return Err(Error::input(
+                "seed set",
+                format!("frequency {frequency} is not in 1..={}", Self::MAX_FREQUENCY),
+                "use 4 (81 twists) or 8 (321 twists)",
+            ));
         }
         Ok(Self::build(frequency))
     }

@@ -1,0 +1,62 @@
+// Records and constants shared by the kernels. The structs repeat src/backend/layout.rs (a test compares offsets);
+// every constant is set from there when the pipelines are built.
+
+override GROUP: u32;
+override BASIS_GROUP: u32;
+override NEAR_LIMIT: f32;
+override ON_LINE: f32;
+override SERIES_LIMIT: f32;
+override CONTACT_MARGIN: f32;
+override COUPLING_MARGIN: f32;
+override TILT_LIMIT: f32;
+override DEGENERATE: f32;
+override BOUNDED: u32;
+override UNBOUNDED: u32;
+// Dispatches are two-dimensional: a workgroup's number is x + GRID y.
+override GRID: u32;
+
+const BASIS = 9u;
+const RING = 6u;
+const GAUSS_POINTS = 6u;
+const NEGATED = 0x80000000u;
+const LARGEST = 3.4028234e38;
+
+struct ContactHeader {
+    edges_i: u32,
+    edges_ii: u32,
+    edges_end: u32,
+    basis: u32,
+    faces: u32,
+    radius: f32,
+    area_i: f32,
+    area_ii: f32,
+    centroid_i: vec2<f32>,
+    centroid_ii: vec2<f32>,
+    compliance: vec3<f32>,
+    resolved: u32,
+}
+
+struct LoadRecord {
+    wrench: vec3<f32>,
+    scale: f32,
+    f3: f32,
+    m1: f32,
+    m2: f32,
+    distance: f32,
+}
+
+struct GroupRecord {
+    contact: u32,
+    first: u32,
+    count: u32,
+    padding: u32,
+}
+
+struct SeedRecord {
+    twist: vec3<f32>,
+    lower: f32,
+    upper: f32,
+    status: u32,
+    best: u32,
+    padding: u32,
+}

@@ -1,0 +1,331 @@
+//! The kernels on the graphics processor, through wgpu. Two sets of buffers: while one chunk computes, the next is
+//! uploaded and the one before read back.
+
+mod adapter;
+mod shader;
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
+
+pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, list};
+
+use super::Limits;
+use super::layout::{ContactHeader, EdgeRecord, GAUSS, GroupRecord, LoadRecord, SeedRecord};
+use super::prepare::Chunk;
+use super::seeds::SeedSet;
+use crate::error::{Error, Result};
+use shader::Kernel;
+
+/// Most bytes of loads, records or basis in one chunk, so that two of each fit a small card.
+const CHUNK_BYTES: u64 = 64 << 20;
+
+/// Why a chunk did not come back.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The device is gone or out of memory: the chunk can be computed elsewhere.
+    Lost(String),
+    /// A mistake of ours or of the driver's.
+    Fault(String),
+}
+
+impl From<Failure> for Error {
+    fn from(failure: Failure) -> Self {
+        match failure {
+            Failure::Lost(why) => Self::Backend(format!("the graphics processor was lost: {why}")),
+            Failure::Fault(why) => Self::Backend(why),
+        }
+    }
+}
+
+/// A graphics processor with its kernels compiled.
+#[derive(Debug)]
+pub struct Gpu {
+    info: wgpu::AdapterInfo,
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    fan: Kernel,
+    search: Kernel,
+    gauss: wgpu::Buffer,
+    limits: Limits,
+    lost: Arc<AtomicBool>,
+    /// Chunks that the processor computed because the device was lost.
+    redone: AtomicU64,
+    /// Whether a lost device is an error.
+    strict: bool,
+    state: Mutex<State>,
+    /// Destroys the device before this chunk (counted from 1), to test what happens then.
+    #[cfg(test)]
+    destroy_before: AtomicU64,
+}
+
+/// Buffers that are kept between calls.
+#[derive(Debug, Default)]
+struct State {
+    seeds: Option<(SeedSet, wgpu::Buffer, wgpu::Buffer)>,
+    slots: [Slot; 2],
+}
+
+/// One chunk's buffers; they only grow.
+#[derive(Debug, Default)]
+struct Slot {
+    contacts: Option<wgpu::Buffer>,
+    edges: Option<wgpu::Buffer>,
+    basis: Option<wgpu::Buffer>,
+    loads: Option<wgpu::Buffer>,
+    groups: Option<wgpu::Buffer>,
+    seeds: Option<wgpu::Buffer>,
+    readback: Option<wgpu::Buffer>,
+}
+
+/// A chunk in flight.
+struct Ticket {
+    submission: wgpu::SubmissionIndex,
+    mapped: mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
+    readback: wgpu::Buffer,
+    bytes: u64,
+}
+
+impl Gpu {
+    /// Opens the adapter `asked` for (index or part of its name; see [`adapter::choose`]) and compiles the kernels.
+    /// `strict`: a lost device is an error, otherwise its chunk is computed on the processor.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] when there is no such adapter or it cannot run the kernels.
+    pub fn open(asked: Option<&str>, strict: bool) -> Result<Self> {
+        let adapter = adapter::choose(asked)?;
+        let (info, available) = (adapter.get_info(), adapter.limits());
+        let refused = |why: String| Error::Backend(format!("{}: {why}", info.name));
+        let descriptor = wgpu::DeviceDescriptor { label: Some("gripfast"), required_limits: available.clone(), ..Default::default() };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| refused(error.to_string()))?;
+        let lost = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&lost);
+        device.set_device_lost_callback(move |_, _| flag.store(true, Ordering::Release));
+        let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let fan = Kernel::new(&device, "fill_basis", shader::FAN, &shader::FAN_BINDINGS);
+        let search = Kernel::new(&device, "search", shader::SEARCH, &shader::SEARCH_BINDINGS);
+        let gauss = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("gauss"),
+            size: size_of_val(&GAUSS) as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        queue.write_buffer(&gauss, 0, bytemuck::cast_slice(&GAUSS));
+        if let Some(error) = pollster::block_on(scope.pop()) {
+            return Err(refused(error.to_string()));
+        }
+        let bytes = CHUNK_BYTES.min(available.max_storage_buffer_binding_size).min(available.max_buffer_size);
+        let rows = u64::from(available.max_compute_workgroups_per_dimension);
+        // A group per load is the worst case; they fill a grid of GRID columns.
+        let loads = (bytes / size_of::<LoadRecord>() as u64).min(u64::from(shader::GRID) * rows) as usize;
+        let limits = Limits {
+            loads,
+            contacts: (bytes / size_of::<ContactHeader>() as u64).min(rows) as usize,
+            edges: (bytes / size_of::<EdgeRecord>() as u64) as usize,
+            basis: (bytes / size_of::<f32>() as u64) as usize,
+        };
+        Ok(Self {
+            info,
+            device,
+            queue,
+            fan,
+            search,
+            gauss,
+            limits,
+            lost,
+            redone: AtomicU64::new(0),
+            strict,
+            state: Mutex::default(),
+            #[cfg(test)]
+            destroy_before: AtomicU64::new(0),
+        })
+    }
+
+    /// Name, graphics interface and driver of the adapter.
+    pub fn name(&self) -> String {
+        let driver = format!("{} {}", self.info.driver, self.info.driver_info);
+        format!("{} ({:?}, {})", self.info.name, self.info.backend, driver.trim())
+    }
+
+    /// Whether the adapter is software: nothing about speed can be learnt from it.
+    pub fn is_software(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Chunks computed on the processor because the device was lost.
+    pub fn chunks_redone(&self) -> u64 {
+        self.redone.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn limits(&self) -> Limits {
+        self.limits
+    }
+
+    /// Computes chunk after chunk, handing each chunk's records to `take` in order. `next` makes the following chunk
+    /// while the device works on the one before.
+    pub(crate) fn run<T>(&self, seeds: &SeedSet, next: impl FnMut() -> Option<(Chunk, T)>, take: impl FnMut(Vec<SeedRecord>, T) -> Result<()>) -> Result<()> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let outcome = self.run_chunks(&mut state, seeds, next, take);
+        if outcome.is_err() {
+            // A chunk may still be in flight: its buffers are not used again.
+            state.slots = Default::default();
+        }
+        outcome
+    }
+
+    fn run_chunks<T>(
+        &self,
+        state: &mut State,
+        seeds: &SeedSet,
+        mut next: impl FnMut() -> Option<(Chunk, T)>,
+        mut take: impl FnMut(Vec<SeedRecord>, T) -> Result<()>,
+    ) -> Result<()> {
+        let mut in_flight: Option<(Chunk, T, std::result::Result<Ticket, Failure>)> = None;
+        let mut slot = 0;
+        loop {
+            let submitted = next().map(|(chunk, rest)| {
+                let ticket = self.submit(state, slot, &chunk, seeds);
+                (chunk, rest, ticket)
+            });
+            slot = 1 - slot;
+            let Some((chunk, rest, ticket)) = std::mem::replace(&mut in_flight, submitted) else {
+                if in_flight.is_none() {
+                    return Ok(());
+                }
+                continue;
+            };
+            let records = match ticket.and_then(|ticket| self.collect(&ticket)) {
+                Ok(records) => records,
+                Err(Failure::Lost(_)) if !self.strict => {
+                    self.redone.fetch_add(1, Ordering::Relaxed);
+                    super::cpu::run(&chunk, seeds)
+                }
+                Err(failure) => return Err(failure.into()),
+            };
+            take(records, rest)?;
+        }
+    }
+
+    fn check_lost(&self) -> std::result::Result<(), Failure> {
+        if self.lost.load(Ordering::Acquire) { Err(Failure::Lost(format!("{} does not answer any more", self.info.name))) } else { Ok(()) }
+    }
+
+    /// The failure that an error of wgpu means.
+    fn failure(&self, error: &wgpu::Error) -> Failure {
+        if self.lost.load(Ordering::Acquire) || matches!(error, wgpu::Error::OutOfMemory { .. }) {
+            Failure::Lost(error.to_string())
+        } else {
+            Failure::Fault(error.to_string())
+        }
+    }
+
+    /// Uploads a chunk, starts both kernels on it and the way back.
+    fn submit(&self, state: &mut State, slot: usize, chunk: &Chunk, seeds: &SeedSet) -> std::result::Result<Ticket, Failure> {
+        #[cfg(test)]
+        if self.destroy_before.load(Ordering::Relaxed) > 0 && self.destroy_before.fetch_sub(1, Ordering::Relaxed) == 1 {
+            self.device.destroy();
+        }
+        self.check_lost()?;
+        let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let ticket = self.encode(state, slot, chunk, seeds);
+        let errors = [pollster::block_on(validation.pop()), pollster::block_on(memory.pop())];
+        match errors.into_iter().flatten().next() {
+            Some(error) => Err(self.failure(&error)),
+            None => Ok(ticket),
+        }
+    }
+
+    fn encode(&self, state: &mut State, slot: usize, chunk: &Chunk, seeds: &SeedSet) -> Ticket {
+        let (device, queue) = (&self.device, &self.queue);
+        if state.seeds.as_ref().is_none_or(|(known, ..)| known != seeds) {
+            let upload = |name: &str, bytes: &[u8]| {
+                let buffer = self.buffer(name, bytes.len() as u64, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST);
+                queue.write_buffer(&buffer, 0, bytes);
+                buffer
+            };
+            let (twists, rings) = (upload("twists", bytemuck::cast_slice(seeds.twists())), upload("rings", bytemuck::cast_slice(seeds.rings())));
+            state.seeds = Some((seeds.clone(), twists, rings));
+        }
+        let State { seeds: known, slots } = state;
+        let slot = &mut slots[slot];
+        let records = (chunk.loads.len() * size_of::<SeedRecord>()) as u64;
+        let basis_bytes = (chunk.basis * size_of::<f32>()) as u64;
+        let input = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        let output = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        let contacts = self.upload(&mut slot.contacts, "contacts", bytemuck::cast_slice::<ContactHeader, u8>(&chunk.contacts));
+        let edges = self.upload(&mut slot.edges, "edges", bytemuck::cast_slice::<EdgeRecord, u8>(&chunk.edges));
+        let loads = self.upload(&mut slot.loads, "loads", bytemuck::cast_slice::<LoadRecord, u8>(&chunk.loads));
+        let groups = self.upload(&mut slot.groups, "groups", bytemuck::cast_slice::<GroupRecord, u8>(&chunk.groups));
+        let basis = self.grown(&mut slot.basis, "basis", basis_bytes, input);
+        let found = self.grown(&mut slot.seeds, "seeds", records, output);
+        let readback = self.grown(&mut slot.readback, "readback", records, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("seed") });
+        // Zero is the status UNWRITTEN.
+        encoder.clear_buffer(&found, 0, Some(records));
+        if let Some((seeds, twists, rings)) = &*known {
+            let (twists, rings) = ((twists, size_of_val(seeds.twists()) as u64), (rings, size_of_val(seeds.rings()) as u64));
+            let (contacts, edges) = ((&contacts, size_of_val(&chunk.contacts[..]) as u64), (&edges, size_of_val(&chunk.edges[..]) as u64));
+            let fan = self.fan.bind(device, &[contacts, edges, twists, (&basis, basis_bytes), (&self.gauss, size_of_val(&GAUSS) as u64)]);
+            let (loads, groups) = ((&loads, size_of_val(&chunk.loads[..]) as u64), (&groups, size_of_val(&chunk.groups[..]) as u64));
+            let search = self.search.bind(device, &[contacts, edges, twists, rings, (&basis, basis_bytes), loads, groups, (&found, records)]);
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("seed"), timestamp_writes: None });
+            pass.set_pipeline(&self.fan.pipeline);
+            pass.set_bind_group(0, &fan, &[]);
+            pass.dispatch_workgroups(seeds.len().div_ceil(super::layout::BASIS_GROUP) as u32, chunk.contacts.len() as u32, 1);
+            pass.set_pipeline(&self.search.pipeline);
+            pass.set_bind_group(0, &search, &[]);
+            let count = chunk.groups.len() as u32;
+            pass.dispatch_workgroups(count.min(shader::GRID), count.div_ceil(shader::GRID), 1);
+        }
+        encoder.copy_buffer_to_buffer(&found, 0, &readback, 0, records);
+        let submission = queue.submit([encoder.finish()]);
+        let (sender, mapped) = mpsc::channel();
+        readback.map_async(wgpu::MapMode::Read, 0..records, move |outcome| {
+            // The receiver is gone only when the call was abandoned.
+            let _ = sender.send(outcome);
+        });
+        Ticket { submission, mapped, readback, bytes: records }
+    }
+
+    /// Waits for a chunk and copies its records.
+    fn collect(&self, ticket: &Ticket) -> std::result::Result<Vec<SeedRecord>, Failure> {
+        let wait = wgpu::PollType::Wait { submission_index: Some(ticket.submission.clone()), timeout: None };
+        let outcome = self.device.poll(wait);
+        self.check_lost()?;
+        outcome.map_err(|error| Failure::Fault(format!("waiting for the graphics processor: {error}")))?;
+        match ticket.mapped.try_recv() {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => return Err(Failure::Lost(format!("reading back: {error}"))),
+            Err(_) => return Err(Failure::Fault("the answers were not ready after the wait".to_owned())),
+        }
+        let view = ticket.readback.get_mapped_range(0..ticket.bytes).map_err(|error| Failure::Fault(error.to_string()))?;
+        let records = bytemuck::pod_collect_to_vec(&view);
+        drop(view);
+        ticket.readback.unmap();
+        Ok(records)
+    }
+
+    fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size: size.max(16), usage, mapped_at_creation: false })
+    }
+
+    /// The slot's buffer, replaced by a larger one where `size` needs it.
+    fn grown(&self, place: &mut Option<wgpu::Buffer>, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        match place {
+            Some(buffer) if buffer.size() >= size => buffer.clone(),
+            _ => {
+                let most = self.device.limits().max_buffer_size;
+                place.insert(self.buffer(label, size.next_power_of_two().min(most).max(size), usage)).clone()
+            }
+        }
+    }
+
+    fn upload(&self, place: &mut Option<wgpu::Buffer>, label: &str, bytes: &[u8]) -> wgpu::Buffer {
+        let buffer = self.grown(place, label, bytes.len() as u64, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST);
+        self.queue.write_buffer(&buffer, 0, bytes);
+        buffer
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,188 @@
+//! Rust f32 against WGSL, record by record, and the loss of a device.
+
+use super::super::layout::{BOUNDED, UNWRITTEN};
+use super::super::{Backend, Batch, Job, Problem, Seed, SeedStatus, cpu};
+use super::*;
+use crate::model::{Contact, Patch, Polygon, Wrench};
+use glam::{DVec2, DVec3};
+
+/// Largest difference allowed between the processor's and the shader's records, relative to values of order one.
+/// Vulkan allows a logarithm 5e-7 off, fused products change the last bits, and a bound divides by the twist spacing.
+const RECORD_TOLERANCE: f32 = 2e-5;
+
+/// A device for the tests, software included. Without any: a visible word, or a failure under `GRIPFAST_GPU=require`.
+fn gpu(strict: bool) -> Option<Gpu> {
+    if list().is_empty() {
+        assert!(std::env::var("GRIPFAST_GPU").as_deref() != Ok("require"), "GRIPFAST_GPU=require, but there is no graphics adapter");
+        eprintln!("SKIPPED: no graphics adapter, not even a software one");
+        return None;
+    }
+    let gpu = Gpu::open(None, strict).or_else(|_| Gpu::open(Some("0"), strict)).unwrap();
+    eprintln!("adapter: {}", gpu.name());
+    Some(gpu)
+}
+
+/// A small generator, so that the cases are the same everywhere.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next()
+    }
+
+    fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.within(-1.0, 1.0), self.within(-1.0, 1.0), self.within(-1.0, 1.0))
+    }
+
+    fn star(&mut self, size: f64) -> Patch {
+        let (corners, centre) = (3 + (self.next() * 8.0) as usize, DVec2::new(self.within(-0.01, 0.01), self.within(-0.01, 0.01)));
+        let turn = self.next();
+        let outer = (0..corners).map(|i| {
+            let angle = (i as f64 + turn + self.within(-0.2, 0.2)) / corners as f64 * std::f64::consts::TAU;
+            centre + DVec2::from_angle(angle) * size * self.within(0.4, 1.0)
+        });
+        vec![Polygon { outer: outer.collect(), holes: vec![] }]
+    }
+
+    fn contact(&mut self) -> Arc<Contact> {
+        let face_i = self.star(0.02);
+        let face_ii = if self.next() < 0.5 { face_i.clone() } else { self.star(0.02) };
+        Arc::new(Contact { face_i, face_ii })
+    }
+}
+
+fn assert_same(found: &[SeedRecord], expected: &[SeedRecord]) {
+    if let Err(why) = compare(found, expected) {
+        panic!("{why}");
+    }
+}
+
+fn compare(found: &[SeedRecord], expected: &[SeedRecord]) -> std::result::Result<(), String> {
+    if found.len() != expected.len() {
+        return Err(format!("{} records instead of {}", found.len(), expected.len()));
+    }
+    for (i, (a, b)) in found.iter().zip(expected).enumerate() {
+        if a.status == UNWRITTEN || b.status == UNWRITTEN {
+            return Err(format!("record {i} was not written"));
+        }
+        let numbers = |r: &SeedRecord| [r.lower, r.upper, r.twist[0], r.twist[1], r.twist[2]];
+        if !numbers(a).iter().chain(&numbers(b)).all(|x| x.is_finite()) {
+            return Err(format!("record {i} is not finite: {a:?} {b:?}"));
+        }
+        let close = |x: f32, y: f32, scale: f32| (x - y).abs() <= RECORD_TOLERANCE * scale.max(1.0);
+        // Two twists of equal value may change places; the bound and the interpolated twist then come from other triangles.
+        let same_triangle = a.best == b.best;
+        let twist = (0..3).all(|m| close(a.twist[m], b.twist[m], 40.0));
+        if !close(a.lower, b.lower, b.lower) || same_triangle && !(close(a.upper, b.upper, b.upper) && twist) {
+            return Err(format!("record {i}: {a:?} instead of {b:?}"));
+        }
+        if !same_triangle && !(0.9..1.1).contains(&(a.upper / b.upper)) {
+            return Err(format!("record {i}, other triangle: {a:?} instead of {b:?}"));
+        }
+    }
+    Ok(())
+}
+
+/// Records of both kernels for the same chunks.
+fn records(gpu: &Gpu, problems: Vec<Problem<'_>>, seeds: &SeedSet) -> (Vec<SeedRecord>, Vec<SeedRecord>) {
+    let batch = Batch { problems };
+    let job = Job::new(&batch, seeds).unwrap();
+    let mut answers = vec![super::super::not_searched(SeedStatus::NoContact); job.loads];
+    let mut chunks: Vec<Chunk> = job.plans(gpu.limits(), &mut answers).iter_mut().map(|plan| job.build(plan)).collect();
+    let expected = chunks.iter().flat_map(|chunk| cpu::run(chunk, seeds)).collect();
+    let mut found = Vec::new();
+    let mut next = chunks.drain(..).filter(|chunk| !chunk.loads.is_empty()).map(|chunk| (chunk, ()));
+    gpu.run(
+        seeds,
+        || next.next(),
+        |records, ()| {
+            found.extend(records);
+            Ok(())
+        },
+    )
+    .unwrap();
+    (found, expected)
+}
+
+#[test]
+fn shaders_give_the_records_of_the_processor() {
+    let Some(gpu) = gpu(true) else { return };
+    let mut random = Random(7);
+    for frequency in [1, 4, 8, 13] {
+        let seeds = SeedSet::new(frequency).unwrap();
+        let grips: Vec<_> = (0..150)
+            .map(|_| {
+                let loads: Vec<Wrench> = (0..(random.next() * 150.0) as usize)
+                    .map(|_| Wrench { force: random.vector() * 10.0, moment: random.vector() * 0.1 * random.next() })
+                    .collect();
+                (random.contact(), random.within(0.0, 0.1), loads)
+            })
+            .collect();
+        let problems = grips.iter().map(|(contact, distance, wrenches)| Problem { contact, distance: *distance, force: 40.0, wrenches }).collect();
+        let (found, expected) = records(&gpu, problems, &seeds);
+        assert_same(&found, &expected);
+        let bounded = found.iter().filter(|r| r.status == BOUNDED).count();
+        let changed = found.iter().zip(&expected).filter(|(a, b)| a.status != b.status).count();
+        println!("{} twists: {} records, {bounded} bounded, {changed} with another status", seeds.len(), found.len());
+        assert!(bounded > found.len() / 10 && changed <= found.len() / 1000);
+    }
+}
+
+#[test]
+fn the_comparer_sees_one_wrong_number() {
+    let right = SeedRecord { twist: [0.6, 0.0, 0.8], lower: 1.0, upper: 1.01, status: BOUNDED, best: 3, padding: 0 };
+    assert!(compare(&[right; 3], &[right; 3]).is_ok());
+    assert!(compare(&[right; 2], &[right; 3]).is_err());
+    let wrong = [
+        SeedRecord { lower: 1.0001, ..right },
+        SeedRecord { upper: 1.0101, ..right },
+        SeedRecord { twist: [0.602, 0.0, 0.8], ..right },
+        SeedRecord { status: UNWRITTEN, ..right },
+        SeedRecord { upper: f32::NAN, ..right },
+        SeedRecord { best: 4, upper: 2.0, ..right },
+    ];
+    for wrong in wrong {
+        assert!(compare(&[right, wrong, right], &[right; 3]).is_err(), "{wrong:?}");
+    }
+}
+
+/// Four chunks, the device destroyed before the third.
+fn lose_the_device(mut gpu: Gpu) -> (Result<Vec<Seed>>, Vec<Seed>, Backend) {
+    gpu.limits.loads = 100;
+    gpu.destroy_before = AtomicU64::new(3);
+    let mut random = Random(11);
+    let contact = random.contact();
+    let wrenches: Vec<Wrench> = (0..350).map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 }).collect();
+    let batch = Batch { problems: vec![Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches }] };
+    let seeds = SeedSet::default();
+    let backend = Backend::Gpu(Box::new(gpu));
+    (backend.seed(&batch, &seeds), Backend::Cpu.seed(&batch, &seeds).unwrap(), backend)
+}
+
+#[test]
+fn a_lost_device_is_replaced_by_the_processor_under_auto() {
+    let Some(gpu) = gpu(false) else { return };
+    let (found, expected, backend) = lose_the_device(gpu);
+    let found = found.unwrap();
+    assert_eq!(found.len(), expected.len());
+    for (a, b) in found.iter().zip(&expected) {
+        assert!(a.status == b.status && (a.lower - b.lower).abs() <= 1e-4 * b.lower.max(1e-9), "{a:?} instead of {b:?}");
+    }
+    // Chunk two was in flight, three and four were never sent.
+    assert_eq!(found[200..], expected[200..]);
+    let Backend::Gpu(gpu) = &backend else { panic!("the backend changed") };
+    assert!((2..=3).contains(&gpu.chunks_redone()), "{} chunks redone", gpu.chunks_redone());
+}
+
+#[test]
+fn a_lost_device_is_an_error_under_gpu() {
+    let Some(gpu) = gpu(true) else { return };
+    let (found, ..) = lose_the_device(gpu);
+    let message = found.unwrap_err().to_string();
+    assert!(message.contains("lost"), "{message}");
+}
