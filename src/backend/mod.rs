@@ -16,6 +16,7 @@ mod fan;
 mod gpu;
 pub mod layout;
 mod prepare;
+mod score;
 mod search;
 mod seeds;
 
@@ -28,6 +29,7 @@ use rayon::prelude::*;
 pub use gpu::{ADAPTER_VARIABLE, AdapterSummary, Gpu, list as list_adapters};
 
 pub use choice::{Choice, Selection, select};
+pub use score::{Polish, ScoreOptions, Scored, worst};
 pub use seeds::{NEGATED, RING, SeedSet};
 
 use crate::error::{Error, Result};

@@ -20,6 +20,9 @@ const RESOLVED: f64 = 60.0;
 /// Scaled numbers beyond this are not computed with: the load gets no bounds.
 const RANGE: f64 = 1e6;
 
+/// In-plane load over the gripping force below which there is no load: the square of less is not a number of f64.
+const NO_LOAD: f64 = 1e-150;
+
 /// Area over the square of the perimeter below which a face counts as no contact: a line.
 const NO_AREA: f64 = 1e-14;
 
@@ -116,11 +119,13 @@ impl Prepared {
         let m2 = wrench.moment.y / unit + o.x / unit * f.z;
         let m3 = wrench.moment.z / unit - (o.x / unit * f.y - o.y / unit * f.x);
         let in_plane = glam::DVec3::new(f.x, f.y, m3);
-        let length = in_plane.length();
-        let direction = in_plane / length;
-        if !(length > 0.0 && length.is_normal() && direction.is_finite()) {
+        // By its largest component first: the squares of huge and tiny loads leave the range of f64.
+        let most = in_plane.abs().max_element();
+        if most / force < NO_LOAD {
             return Err(SeedStatus::NoLoad);
         }
+        let length = most * (in_plane / most).length();
+        let direction = in_plane / length;
         let numbers = [length / force, f.z / force, m1 / force, m2 / force, problem.distance / unit];
         let usable = numbers.iter().all(|x| x.abs() <= RANGE);
         let [scale, f3, m1, m2, distance] = numbers.map(|x| x.clamp(-RANGE, RANGE) as f32);

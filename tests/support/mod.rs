@@ -15,3 +15,9 @@ pub(crate) fn reference(path: &str) -> Option<PathBuf> {
     let _ = writeln!(std::io::stderr(), "SKIPPED: reference data '{path}' is not beside this checkout");
     None
 }
+
+/// A line on the terminal that the test harness does not hold back.
+pub(crate) fn say(line: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "{line}");
+}

@@ -1,0 +1,166 @@
+//! From seeds to final answers: the bounds decide which loads can be the worst, and only those are solved in f64.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::{Backend, Batch, Problem, Seed, SeedSet, SeedStatus};
+use crate::error::Result;
+use crate::mechanics::{Options, Pads, Refiner, Separation, refused, solve_pads};
+use crate::model::{Contact, Score, Status};
+
+/// Values of `mu_s` that differ by less than this share count as equal, and the first load is taken as the worst:
+/// answers from different seeds agree better than this.
+pub(crate) const TIE: f64 = 1e-9;
+
+/// Loads seeded at a time, which bounds the memory whatever the size of the batch.
+const BLOCK: usize = 1 << 19;
+
+/// Which loads are solved exactly.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Polish {
+    /// Those that can be a grip's worst one.
+    #[default]
+    Worst,
+    /// All of them.
+    All,
+}
+
+/// How [`Backend::score`] works.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ScoreOptions {
+    /// Which loads are solved.
+    pub polish: Polish,
+    /// What to do with grips that separate.
+    pub separation: Separation,
+    /// Minimiser of the exact solver.
+    pub refiner: Refiner,
+}
+
+/// The answer for one grip.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scored {
+    /// Index of the worst load and its answer: the first load without a usable `mu_s`, else the largest `mu_s`; `None`
+    /// without loads.
+    pub worst: Option<(usize, Score)>,
+    /// Answers of all loads under [`Polish::All`], else empty.
+    pub all: Vec<Score>,
+    /// Loads solved exactly.
+    pub solved: usize,
+}
+
+impl Backend {
+    /// Scores every grip under all its loads. The answers agree to 1e-9 whichever backend computed the seeds, and do
+    /// not depend on the number of threads.
+    ///
+    /// # Errors
+    /// As [`Backend::seed`].
+    pub fn score(&self, batch: &Batch<'_>, seeds: &SeedSet, options: &ScoreOptions) -> Result<Vec<Scored>> {
+        let mut scored = Vec::with_capacity(batch.problems.len());
+        let mut waiting: Option<(&[Problem<'_>], Vec<Seed>)> = None;
+        for block in blocks(&batch.problems) {
+            let batch = Batch { problems: block.to_vec() };
+            // While a block is seeded, the one before is solved.
+            let (found, before) = rayon::join(|| self.seed(&batch, seeds), || waiting.take().map(|(block, seeds)| solve_block(block, &seeds, options)));
+            scored.extend(before.into_iter().flatten());
+            waiting = Some((block, found?));
+        }
+        if let Some((block, seeds)) = waiting {
+            scored.extend(solve_block(block, &seeds, options));
+        }
+        Ok(scored)
+    }
+}
+
+/// Cuts the problems so that each block has at most [`BLOCK`] loads (or one problem).
+fn blocks<'a, 'b>(problems: &'a [Problem<'b>]) -> Vec<&'a [Problem<'b>]> {
+    let (mut blocks, mut start, mut loads) = (Vec::new(), 0, 0);
+    for (index, problem) in problems.iter().enumerate() {
+        if index > start && loads + problem.wrenches.len() > BLOCK {
+            blocks.push(&problems[start..index]);
+            (start, loads) = (index, 0);
+        }
+        loads += problem.wrenches.len();
+    }
+    if start < problems.len() {
+        blocks.push(&problems[start..]);
+    }
+    blocks
+}
+
+fn solve_block(problems: &[Problem<'_>], seeds: &[Seed], options: &ScoreOptions) -> Vec<Scored> {
+    let mut index_of: HashMap<*const Contact, usize> = HashMap::new();
+    let mut distinct: Vec<&Contact> = Vec::new();
+    let mut jobs = Vec::with_capacity(problems.len());
+    let mut rest = seeds;
+    for problem in problems {
+        let slot = *index_of.entry(Arc::as_ptr(problem.contact)).or_insert_with(|| {
+            distinct.push(problem.contact);
+            distinct.len() - 1
+        });
+        let (mine, others) = rest.split_at(problem.wrenches.len());
+        jobs.push((problem, slot, mine));
+        rest = others;
+    }
+    let pads: Vec<Option<Pads>> = distinct.into_par_iter().map(Pads::new).collect();
+    jobs.into_par_iter().map(|(problem, slot, seeds)| score_one(problem, pads[slot].as_ref(), seeds, options)).collect()
+}
+
+fn score_one(problem: &Problem<'_>, pads: Option<&Pads>, seeds: &[Seed], options: &ScoreOptions) -> Scored {
+    let solve = |load: usize| {
+        let seed = matches!(seeds[load].status, SeedStatus::Bounded | SeedStatus::Unbounded).then_some(seeds[load].twist);
+        let options = Options { separation: options.separation, refiner: options.refiner, seed };
+        match pads {
+            Some(pads) => solve_pads(pads, problem.distance, problem.force, &problem.wrenches[load], &options),
+            None => refused(Status::NoContact, 0),
+        }
+    };
+    if options.polish == Polish::All {
+        let all: Vec<Score> = (0..seeds.len()).into_par_iter().with_min_len(8).map(solve).collect();
+        return Scored { worst: worst(all.iter().copied().enumerate()), solved: all.len(), all };
+    }
+    // Loads without bounds are solved in order. One that has no limit state is the worst, whatever the others are:
+    // a load with bounds has one.
+    let mut solved: Vec<(usize, Score)> = Vec::new();
+    let mut largest: f64 = 0.0;
+    for load in (0..seeds.len()).filter(|&load| seeds[load].status != SeedStatus::Bounded) {
+        let score = solve(load);
+        solved.push((load, score));
+        match usable(&score) {
+            Some(mu) => largest = largest.max(mu),
+            None => return Scored { worst: Some((load, score)), all: Vec::new(), solved: solved.len() },
+        }
+    }
+    // Then the others by falling upper bound, until none can reach the largest found.
+    let mut bounded: Vec<usize> = (0..seeds.len()).filter(|&load| seeds[load].status == SeedStatus::Bounded).collect();
+    largest = bounded.iter().map(|&load| seeds[load].lower).fold(largest, f64::max);
+    bounded.retain(|&load| seeds[load].upper >= largest);
+    bounded.sort_by(|&a, &b| seeds[b].upper.total_cmp(&seeds[a].upper).then(a.cmp(&b)));
+    for load in bounded {
+        // Ties with the largest are solved too, so that the first of them is found.
+        if seeds[load].upper < largest * (1.0 - 2.0 * TIE) {
+            break;
+        }
+        let score = solve(load);
+        largest = largest.max(usable(&score).unwrap_or(f64::INFINITY));
+        solved.push((load, score));
+    }
+    solved.sort_by_key(|(load, _)| *load);
+    Scored { solved: solved.len(), worst: worst(solved.into_iter()), all: Vec::new() }
+}
+
+/// `mu_s` when the load is held.
+fn usable(score: &Score) -> Option<f64> {
+    score.mu_s.filter(|_| score.status.holds())
+}
+
+/// The worst of some answers given by rising load index: the first without a usable `mu_s`, else the largest `mu_s`;
+/// of those within [`TIE`] of the largest the first.
+pub fn worst(scores: impl Iterator<Item = (usize, Score)> + Clone) -> Option<(usize, Score)> {
+    if let Some(refused) = scores.clone().find(|(_, score)| usable(score).is_none()) {
+        return Some(refused);
+    }
+    let largest = scores.clone().filter_map(|(_, score)| usable(&score)).fold(0.0, f64::max);
+    scores.clone().find(|(_, score)| usable(score).is_some_and(|mu| mu >= largest * (1.0 - TIE)))
+}
