@@ -1,6 +1,7 @@
 //! The command line: flags to options, options to calls of the library, answers to text. Thin.
 
 mod defaults;
+mod figures;
 mod gripper;
 mod part;
 mod shell;
@@ -26,6 +27,7 @@ enum Command {
     Part(part::Args),
     Solve(solve::Args),
     Gripper(gripper::Args),
+    Figures(figures::Args),
     Completions(shell::CompletionsArgs),
     Man(shell::ManArgs),
 }
@@ -37,6 +39,7 @@ pub(crate) fn main() -> ExitCode {
             Command::Part(args) => part::run(args),
             Command::Solve(args) => solve::run(args),
             Command::Gripper(args) => gripper::run(args),
+            Command::Figures(args) => figures::run(args),
             Command::Completions(args) => shell::completions(args),
             Command::Man(args) => shell::man(args),
         });

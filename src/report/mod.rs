@@ -1,2 +1,3 @@
 //! To be written.
 pub mod contact_svg;
+pub mod figures;
