@@ -34,6 +34,10 @@ pub struct Gripper {
     /// Young's modulus of the rubber [Pa], where stated.
     #[serde(default)]
     pub pad_modulus: Option<f64>,
+    /// Distance from the pad face to the finger's outer gripping face [m], where the gripper can grip from inside,
+    /// opening into a slot; that face has the pad's outline.
+    #[serde(default)]
+    pub outer_pad: Option<f64>,
     /// Bodies that move with the finger at `x3 > 0`, placed for pads touching at zero width: the pad face lies at
     /// `x3 = 0` and the body at `x3 >= 0`. The other finger's bodies are these turned by 180 degrees about `x1`.
     pub fingers: Vec<Body>,

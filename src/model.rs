@@ -201,6 +201,10 @@ pub struct Grip {
     pub angle: f64,
     /// Contact areas in the grip frame; shared by grips whose areas are the same in the pad frame.
     pub contact: Arc<Contact>,
+    /// The jaws open against the faces from inside (a slot): face I then lies at `x3 = -width/2`, still pushed along
+    /// `-x3`, and the `d` of the mechanics is `-width`.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub inside: bool,
     /// The grip with the same pose and the jaws exchanged, when that one is the representative.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flip_of: Option<u64>,

@@ -177,16 +177,16 @@ pub fn contains(polygon: &Polygon, point: DVec2) -> bool {
 pub fn ring_contains(ring: &[DVec2], point: DVec2) -> bool {
     let mut inside = false;
     for (&a, &b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
-        if (a.y > point.y) == (b.y > point.y) {
-            continue;
-        }
         inside ^= crosses_right(a, b, point);
     }
     inside
 }
 
-/// Whether the edge, which passes the height of `point`, does so at its right.
-fn crosses_right(a: DVec2, b: DVec2, point: DVec2) -> bool {
+/// Whether the edge passes the height of `point` (its lower end included, its upper end not) at the right of it.
+pub(crate) fn crosses_right(a: DVec2, b: DVec2, point: DVec2) -> bool {
+    if (a.y > point.y) == (b.y > point.y) {
+        return false;
+    }
     if a.x > point.x && b.x > point.x {
         return true;
     }

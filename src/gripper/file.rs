@@ -38,6 +38,7 @@ struct Pad {
     polygon: Option<Vec<[String; 2]>>,
     thickness: Option<String>,
     modulus: Option<String>,
+    outer_face: Option<String>,
     friction: Option<f64>,
 }
 
@@ -125,6 +126,7 @@ pub fn parse(text: &str, place: &str) -> Result<Gripper> {
     let optional = |field: &str, quantity, text: &Option<String>| text.as_deref().map(|text| reader.positive(field, quantity, text)).transpose();
     let pad_thickness = optional("pad.thickness", Quantity::Length, &file.pad.thickness)?;
     let pad_modulus = optional("pad.modulus", Quantity::Pressure, &file.pad.modulus)?;
+    let outer_pad = optional("pad.outer_face", Quantity::Length, &file.pad.outer_face)?;
     if let Some(friction) = file.pad.friction.filter(|friction| !(0.0..=10.0).contains(friction)) {
         return Err(reader.bad("pad.friction", format!("is {friction}"), "give a coefficient between 0 and 10, without unit"));
     }
@@ -133,7 +135,8 @@ pub fn parse(text: &str, place: &str) -> Result<Gripper> {
     let axes = |field: &str, axes: &Option<Axes>| axes.as_ref().map(|axes| reader.frame(field, axes)).transpose();
     let grip_from_flange = axes("flange", &file.flange)?;
     let grip_from_tool = axes("tool", &file.tool)?;
-    let mut known: Vec<String> = ["stroke", "force", "pad.size", "pad.thickness", "pad.modulus", "pad.friction", "flange", "tool"].map(String::from).to_vec();
+    let mut known: Vec<String> =
+        ["stroke", "force", "pad.size", "pad.thickness", "pad.modulus", "pad.outer_face", "pad.friction", "flange", "tool"].map(String::from).to_vec();
     known.extend(fingers.iter().map(|body| format!("finger.{}", body.name)));
     known.extend(palm.iter().map(|body| format!("palm.{}", body.name)));
     let mut sources = BTreeMap::new();
@@ -155,6 +158,7 @@ pub fn parse(text: &str, place: &str) -> Result<Gripper> {
         pad_friction: file.pad.friction,
         pad_thickness,
         pad_modulus,
+        outer_pad,
         fingers,
         palm,
         grip_from_flange,

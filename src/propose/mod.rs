@@ -1,1 +1,291 @@
-//! To be written.
+//! From a part and a gripper to candidate grips free of interference, with a reason for every rejection.
+//!
+//! Antiparallel face pairs within the stroke become sites; each site gets a grid of positions and a set of approach
+//! angles; each candidate is clipped to its contact polygons and tested for interference of fingers and palm with the
+//! part, in the grip, while the jaws close, and along the straight approach. Candidates flow in chunks, so that memory
+//! stays bounded whatever their number; their order and numbers depend on the input and the options alone.
+
+mod environment;
+mod explain;
+mod interference;
+mod options;
+mod patch;
+mod site;
+mod sweep;
+mod tree;
+mod work;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+pub use explain::{Check, Explanation, SiteInfo};
+pub use options::{Cone, Ground, ProposeOptions, Rejection};
+
+use crate::error::{Error, Result};
+use crate::gripper::Gripper;
+use crate::model::{Contact, Grip, Polygon};
+use crate::part::{FacePair, PairKind, Part};
+use environment::Environment;
+use patch::PatchIndex;
+use site::Site;
+use sweep::{Motion, Sweep, sweeps};
+use tree::{Topology, Tree};
+
+/// Positions per work item: large enough to share what an angle determines, small enough to spread over the threads.
+const ITEM: usize = 4096;
+
+/// Counts of a run so far.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Antiparallel face pairs within the stroke.
+    pub pairs: u64,
+    /// Candidates looked at.
+    pub candidates: u64,
+    /// Grips free of interference among them (flips not counted).
+    pub grips: u64,
+    /// Rejections by [`Rejection::name`].
+    pub rejections: BTreeMap<String, u64>,
+}
+
+/// Some candidates' outcome, in order.
+#[derive(Debug, Clone, Default)]
+pub struct Chunk {
+    /// Grips free of interference.
+    pub grips: Vec<Grip>,
+    /// Candidates looked at for them.
+    pub candidates: u64,
+}
+
+/// Proposes grips chunk by chunk: an iterator of [`Chunk`].
+pub struct Proposer<'a> {
+    part: &'a Part,
+    gripper: &'a Gripper,
+    options: ProposeOptions,
+    environment: Environment,
+    sites: Vec<Site>,
+    directions: Vec<DVec3>,
+    shape: Arc<Topology>,
+    /// Contact of a pad that lies wholly on both faces.
+    whole: Arc<Contact>,
+    symmetric: bool,
+    tally: Tally,
+    next: Cursor,
+    tree: Option<(usize, Arc<Tree>)>,
+}
+
+/// Where the next chunk starts.
+#[derive(Debug, Clone, Copy, Default)]
+struct Cursor {
+    site: usize,
+    angle: usize,
+    position: usize,
+    id: u64,
+}
+
+/// Positions `positions` of a site at one angle; the first has the number `id`.
+#[derive(Debug, Clone)]
+struct Item {
+    site: usize,
+    angle: usize,
+    positions: std::ops::Range<usize>,
+    id: u64,
+}
+
+/// What the items of one site share.
+struct Prepared<'a> {
+    site: &'a Site,
+    patches: [PatchIndex; 2],
+    /// Against the part; the second set with exchanged jaws, for grippers where that matters.
+    sweeps: Vec<Vec<Sweep>>,
+    /// Against ground and keep-out boxes.
+    outer_sweeps: Vec<Vec<Sweep>>,
+}
+
+impl<'a> Proposer<'a> {
+    /// Finds the sites of `part` for `gripper`.
+    ///
+    /// # Errors
+    /// When an option is out of its range, the gripper has no pad with area, or inside grips are asked of a gripper
+    /// without outer pads.
+    pub fn new(part: &'a Part, gripper: &'a Gripper, options: &ProposeOptions) -> Result<Self> {
+        options.validate()?;
+        if !crate::geometry::is_convex(&gripper.pad) {
+            return Err(Error::input(&gripper.name, "the pad is not a convex counter-clockwise polygon", "correct the gripper"));
+        }
+        let mut tally = Tally::default();
+        let mut pairs = Vec::new();
+        if options.outside {
+            let reach = [gripper.stroke[0], gripper.stroke[1] - 2.0 * options.min_opening];
+            choose(part.pairs(0.0, f64::INFINITY), reach, options, &mut pairs, &mut tally);
+        }
+        if options.inside {
+            let Some(outer) = gripper.outer_pad else {
+                let remedy = "state pad.outer_face in the gripper file: the distance from the pad face to the finger's outer gripping face";
+                return Err(Error::input(&gripper.name, "inside grips need outer pads, and this gripper states none", remedy));
+            };
+            let reach = [gripper.stroke[0] + 2.0 * (outer + options.min_opening), gripper.stroke[1] + 2.0 * outer];
+            choose(part.internal_pairs(0.0, f64::INFINITY), reach, options, &mut pairs, &mut tally);
+        }
+        tally.pairs = pairs.len() as u64;
+        let (sites, directions) = site::sites(part, gripper, options, &pairs);
+        let pad = vec![Polygon { outer: gripper.pad.clone(), holes: Vec::new() }];
+        Ok(Self {
+            part,
+            gripper,
+            options: options.clone(),
+            environment: Environment::new(options),
+            sites,
+            directions,
+            shape: Arc::new(Topology::new(&part.mesh)),
+            whole: Arc::new(Contact { face_i: pad.clone(), face_ii: pad }),
+            symmetric: gripper.is_symmetric(),
+            tally,
+            next: Cursor::default(),
+            tree: None,
+        })
+    }
+
+    /// Number of candidates in all.
+    pub fn candidates(&self) -> u64 {
+        self.sites.iter().map(|site| (site.positions.len() * site.angles.len()) as u64 * self.orientations()).sum()
+    }
+
+    /// Counts so far.
+    pub fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// Ways to put the jaws at one pose that must be tested by themselves.
+    fn orientations(&self) -> u64 {
+        if self.symmetric { 1 } else { 2 }
+    }
+
+    /// Numbers used up per pose.
+    fn stride(&self) -> u64 {
+        if self.options.flips || !self.symmetric { 2 } else { 1 }
+    }
+
+    fn motion(&self, site: &Site, approach: f64, flipped: bool) -> Motion {
+        let [least, most] = self.gripper.stroke;
+        let room = match site.kind {
+            PairKind::External => most - site.width,
+            PairKind::Internal => site.width - 2.0 * self.gripper.outer_pad.unwrap_or(0.0) - least,
+        };
+        Motion {
+            kind: site.kind,
+            width: site.width,
+            opening: self.options.opening.min(room / 2.0).max(0.0),
+            touch: site.rise,
+            clearance: self.options.clearance,
+            approach,
+            flipped,
+        }
+    }
+
+    fn prepare<'s>(&self, site: &'s Site) -> Prepared<'s> {
+        let axes = site::axes(self.directions[site.direction]);
+        let reach = self.gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
+        let (low, high) = self.part.mesh.bounding_box();
+        let bodies = self.gripper.fingers.iter().chain(&self.gripper.palm);
+        let extent = bodies.flat_map(crate::gripper::Body::bounds).map(|corner| corner.length()).fold(0.0, f64::max);
+        // Longer than the part and the gripper together: beyond it the gripper is clear of the part.
+        let clear = (high - low).length() + 2.0 * extent + self.gripper.stroke[1];
+        let each =
+            |approach: f64| -> Vec<Vec<Sweep>> { (0..self.orientations()).map(|flip| sweeps(self.gripper, &self.motion(site, approach, flip == 1))).collect() };
+        Prepared { site, patches: site.patches(self.part, &axes, reach), sweeps: each(clear), outer_sweeps: each(self.options.approach) }
+    }
+
+    /// The tree in the axes of a direction; the last one is kept.
+    fn tree(&mut self, direction: usize) -> Arc<Tree> {
+        match &self.tree {
+            Some((known, tree)) if *known == direction => Arc::clone(tree),
+            _ => {
+                self.tree = None; // frees the old one first
+                let tree = Arc::new(self.new_tree(direction));
+                self.tree = Some((direction, Arc::clone(&tree)));
+                tree
+            }
+        }
+    }
+
+    fn new_tree(&self, direction: usize) -> Tree {
+        let axes: DMat3 = site::axes(self.directions[direction]);
+        Tree::new(&self.shape, &self.part.mesh, axes)
+    }
+
+    /// The next items: of one direction, and about a chunk of candidates.
+    fn take_items(&mut self) -> Vec<Item> {
+        let mut items = Vec::new();
+        let mut candidates = 0;
+        let direction = self.sites.get(self.next.site).map(|site| site.direction);
+        while candidates < self.options.chunk.max(1) {
+            let Some(site) = self.sites.get(self.next.site).filter(|site| Some(site.direction) == direction) else { break };
+            if self.next.angle == site.angles.len() || site.positions.is_empty() {
+                self.next = Cursor { site: self.next.site + 1, angle: 0, position: 0, ..self.next };
+                continue;
+            }
+            let end = (self.next.position + ITEM).min(site.positions.len());
+            let positions = self.next.position..end;
+            candidates += positions.len();
+            let id = self.next.id;
+            self.next.id += positions.len() as u64 * self.stride();
+            items.push(Item { site: self.next.site, angle: self.next.angle, positions, id });
+            self.next.position = end;
+            if end == site.positions.len() {
+                (self.next.angle, self.next.position) = (self.next.angle + 1, 0);
+            }
+        }
+        items
+    }
+}
+
+impl Iterator for Proposer<'_> {
+    type Item = Chunk;
+
+    fn next(&mut self) -> Option<Chunk> {
+        let items = self.take_items();
+        let first = items.first()?;
+        let tree = self.tree(self.sites[first.site].direction);
+        let this = &*self;
+        let mut wanted: Vec<usize> = items.iter().map(|item| item.site).collect();
+        wanted.dedup();
+        let prepared: Vec<Prepared<'_>> = wanted.par_iter().map(|&site| this.prepare(&this.sites[site])).collect();
+        let results: Vec<work::Outcome> = items
+            .par_iter()
+            .map_init(work::Buffers::default, |buffers, item| {
+                let prepared = &prepared[wanted.partition_point(|&site| site < item.site)];
+                this.evaluate(item, prepared, &tree, buffers)
+            })
+            .collect();
+        drop(prepared);
+        let mut chunk = Chunk::default();
+        for outcome in results {
+            chunk.candidates += outcome.candidates;
+            self.tally.grips += outcome.grips.iter().filter(|grip| grip.flip_of.is_none()).count() as u64;
+            chunk.grips.extend(outcome.grips);
+            for (reason, count) in outcome.rejections {
+                *self.tally.rejections.entry(reason.name()).or_default() += count;
+            }
+        }
+        self.tally.candidates += chunk.candidates;
+        Some(chunk)
+    }
+}
+
+fn choose(all: Vec<FacePair>, reach: [f64; 2], options: &ProposeOptions, pairs: &mut Vec<FacePair>, tally: &mut Tally) {
+    for pair in all {
+        let chosen = |face: u32| options.faces.as_ref().is_none_or(|faces| faces.contains(&face));
+        let reason = if !(reach[0]..=reach[1]).contains(&pair.width) {
+            Rejection::Stroke
+        } else if !chosen(pair.face_i) || !chosen(pair.face_ii) {
+            Rejection::FaceNotChosen
+        } else {
+            pairs.push(pair);
+            continue;
+        };
+        *tally.rejections.entry(reason.name()).or_default() += 1;
+    }
+}

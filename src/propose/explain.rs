@@ -1,0 +1,264 @@
+//! Why one pose is a grip, or is not: every test, with body and place.
+
+use glam::{DVec2, DVec3};
+
+use super::options::Rejection;
+use super::patch::{Scratch, Touch, TurnedPad, outline};
+use super::site::Site;
+use super::sweep::{Stage, Sweep};
+use super::{Prepared, Proposer, work};
+use crate::error::{Error, Result};
+use crate::model::{Contact, Frame, Patch, Polygon};
+use crate::part::PairKind;
+
+/// A stretch of two facing planes as users see it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SiteInfo {
+    /// Number of the site: its place in [`Proposer::sites`].
+    pub site: usize,
+    /// Gripped faces on side I.
+    pub faces_i: Vec<u32>,
+    /// Gripped faces on side II.
+    pub faces_ii: Vec<u32>,
+    /// Distance of the planes [m].
+    pub width: f64,
+    /// Gripped from outside or from inside.
+    pub kind: PairKind,
+    /// Site frame in the part frame: `z` is the closing axis, positions lie in `(x, y)`, angles count from `x`.
+    pub part_from_site: Frame,
+    /// Grip origins in the site's `(x, y)` [m].
+    pub positions: Vec<DVec2>,
+    /// Approach angles [rad].
+    pub angles: Vec<f64>,
+}
+
+/// One test of a pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Check {
+    /// What was tested.
+    pub name: String,
+    /// Whether the pose passed.
+    pub passed: bool,
+    /// Numbers, body and place in words.
+    pub detail: String,
+}
+
+/// The full verdict on a pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Explanation {
+    /// The site it belongs to.
+    pub site: usize,
+    /// Grip frame in the part frame.
+    pub part_from_grip: Frame,
+    /// Distance of the faces [m].
+    pub width: f64,
+    /// Contact areas in the grip frame.
+    pub contact: Contact,
+    /// Every test, in order; later ones are made even when an earlier one failed.
+    pub checks: Vec<Check>,
+    /// The reason that counts: that of the first failed test.
+    pub rejection: Option<Rejection>,
+    /// Where a body meets the part, part frame [m].
+    pub place: Option<DVec3>,
+}
+
+impl Proposer<'_> {
+    /// The sites, in the order of their candidates.
+    pub fn sites(&self) -> Vec<SiteInfo> {
+        let info = |(index, site): (usize, &Site)| SiteInfo {
+            site: index,
+            faces_i: site.faces[0].clone(),
+            faces_ii: site.faces[1].clone(),
+            width: site.width,
+            kind: site.kind,
+            part_from_site: site.part_from_site,
+            positions: site.positions.clone(),
+            angles: site.angles.clone(),
+        };
+        self.sites.iter().enumerate().map(info).collect()
+    }
+
+    /// Explains the grip with frame `part_from_grip` on two faces, e.g. one of a result file.
+    ///
+    /// # Errors
+    /// When no site holds these faces, or the frame's closing axis is not theirs.
+    pub fn explain_pose(&self, face_i: u32, face_ii: u32, part_from_grip: &Frame) -> Result<Explanation> {
+        let place = || format!("faces {face_i} and {face_ii}");
+        let holds = |site: &Site| {
+            let has = |side: usize, face: u32| site.faces[side].contains(&face);
+            (has(0, face_i) && has(1, face_ii)) || (has(0, face_ii) && has(1, face_i))
+        };
+        let local = |site: &Site| site.part_from_site.point_inverse(part_from_grip.origin);
+        let nearest = self.sites.iter().enumerate().filter(|(_, site)| holds(site)).min_by(|(_, a), (_, b)| {
+            let outside = |site: &Site| {
+                let point = local(site).truncate();
+                (point - point.clamp(site.bounds.min, site.bounds.max)).length()
+            };
+            outside(a).total_cmp(&outside(b))
+        });
+        let Some((index, site)) = nearest else {
+            return Err(Error::input(
+                place(),
+                "are no pair that this gripper can grip on this part",
+                "take the faces and the gripper from the run that made the grip",
+            ));
+        };
+        let axes = site.part_from_site.rotation.transpose() * part_from_grip.rotation;
+        if axes.z_axis.z.abs() < 1.0 - 1e-6 {
+            return Err(Error::input(place(), "the closing axis of the frame is not their normal", "take frame and faces from one grip"));
+        }
+        self.explain(index, local(site).truncate(), axes.x_axis.truncate().to_angle(), axes.z_axis.z < 0.0)
+    }
+
+    /// Explains the pose at `position` [m] of a site's plane, approaching at `angle` [rad]; `flipped`: jaws exchanged.
+    ///
+    /// # Errors
+    /// When there is no such site or the numbers are not finite.
+    pub fn explain(&self, site: usize, position: DVec2, angle: f64, flipped: bool) -> Result<Explanation> {
+        let Some(found) = self.sites.get(site) else {
+            return Err(Error::input(format!("site {site}"), format!("the part has {} sites for this gripper", self.sites.len()), "count from 0"));
+        };
+        if !position.is_finite() || !angle.is_finite() {
+            return Err(Error::input("position and angle", format!("{position}, {angle}"), "give finite values"));
+        }
+        // A symmetric gripper looks the same with exchanged jaws.
+        let turned = flipped && !self.symmetric;
+        let prepared = self.prepare(found);
+        let mut verdict = Verdict { checks: Vec::new(), rejection: None, place: None };
+        let mut frame = work::frame(found, position, angle);
+        self.explain_place(&frame, &mut verdict);
+        let contact = self.explain_contact(&prepared, position, angle, turned, &mut verdict);
+        self.explain_environment(&prepared, &frame, turned, &mut verdict);
+        self.explain_interference(&prepared, position, angle, turned, &frame, &mut verdict);
+        if flipped {
+            frame.rotation *= crate::gripper::half_turn();
+        }
+        let Verdict { checks, rejection, place } = verdict;
+        Ok(Explanation { site, part_from_grip: frame, width: found.width, contact, checks, rejection, place })
+    }
+
+    fn explain_place(&self, frame: &Frame, verdict: &mut Verdict) {
+        if self.options.approach_cone.is_some() {
+            let direction = work::approach(frame);
+            let passed = self.environment.allows(direction);
+            verdict
+                .add("approach direction", passed, format!("({:.3}, {:.3}, {:.3})", direction.x, direction.y, direction.z), || Rejection::ApproachOutsideCone);
+        }
+        if let Some(most) = self.options.max_offset {
+            let distance = frame.origin.distance(self.part.mass_properties(1.0).centre_of_mass);
+            let detail = format!("{:.2} mm, at most {:.2} mm", distance * 1e3, most * 1e3);
+            verdict.add("distance from the centre of mass", distance <= most, detail, || Rejection::TooFarFromCentreOfMass);
+        }
+    }
+
+    fn explain_contact(&self, prepared: &Prepared<'_>, position: DVec2, angle: f64, turned: bool, verdict: &mut Verdict) -> Contact {
+        let outline_of_pad = work::oriented(&self.gripper.pad, turned);
+        let pad = TurnedPad::new(&outline_of_pad, angle);
+        let mut patches: [Patch; 2] = [Patch::new(), Patch::new()];
+        for (side, name) in ["contact on face I", "contact on face II"].into_iter().enumerate() {
+            let mut scratch = Scratch::default();
+            let area = match prepared.patches[side].touch(&pad, position, &mut scratch) {
+                Touch::Empty => 0.0,
+                Touch::Whole => {
+                    patches[side] = vec![Polygon { outer: outline_of_pad.clone(), holes: Vec::new() }];
+                    pad.area()
+                }
+                Touch::Part(area) => {
+                    patches[side] = outline(&scratch, angle);
+                    area
+                }
+            };
+            let floor = self.contact_floor(prepared.site, pad.area());
+            let detail = format!("{:.2} mm^2, {:.1} % of the pad; at least {:.2} mm^2", area * 1e6, area / pad.area() * 100.0, floor * 1e6);
+            verdict.add(name, area > 0.0 && area >= floor, detail, || Rejection::ContactTooSmall);
+        }
+        let [face_i, face_ii] = patches;
+        Contact { face_i, face_ii }
+    }
+
+    fn explain_environment(&self, prepared: &Prepared<'_>, frame: &Frame, turned: bool, verdict: &mut Verdict) {
+        let sweeps = &prepared.outer_sweeps[usize::from(turned)];
+        if self.options.ground.is_some() {
+            let depths = self.environment.depths(sweeps, frame);
+            let hit = self.environment.grounded(&depths, frame.origin);
+            let detail = hit.map_or("above it".to_string(), |sweep| format!("{} would go below it", title(&sweeps[sweep])));
+            verdict.add("ground", hit.is_none(), detail, || Rejection::Ground { body: hit.map_or(String::new(), |sweep| sweeps[sweep].body.clone()) });
+        }
+        if !self.options.keep_out.is_empty() {
+            let hit = self.environment.kept_out(sweeps, frame);
+            let detail = hit.map_or("outside all".to_string(), |(sweep, number)| format!("{} would enter box {number}", title(&sweeps[sweep])));
+            verdict.add("keep-out boxes", hit.is_none(), detail, || Rejection::KeepOut {
+                body: hit.map_or(String::new(), |(sweep, _)| sweeps[sweep].body.clone()),
+            });
+        }
+    }
+
+    fn explain_interference(&self, prepared: &Prepared<'_>, position: DVec2, angle: f64, turned: bool, frame: &Frame, verdict: &mut Verdict) {
+        let site = prepared.site;
+        let kept = self.tree.as_ref().filter(|(direction, _)| *direction == site.direction);
+        let tree = kept.map_or_else(|| std::sync::Arc::new(self.new_tree(site.direction)), |(_, tree)| std::sync::Arc::clone(tree));
+        let view = self.view(site, &tree, angle);
+        let place = self.place(site, &view, position);
+        for sweep in &prepared.sweeps[usize::from(turned)] {
+            let stage = match (sweep.stage, sweep.jaw.is_empty()) {
+                (Stage::Grip, false) => "in the grip and while closing",
+                (Stage::Grip, true) => "in the grip",
+                (Stage::Approach, _) => "on the approach",
+            };
+            let met = view.first_met(sweep, place);
+            let at = met.map(|(_, corners)| frame.point(common_point(sweep, corners)));
+            let detail = match (met, at) {
+                (Some((triangle, _)), Some(at)) => {
+                    let at = at * 1e3;
+                    format!("meets the part at ({:.2}, {:.2}, {:.2}) mm, triangle {triangle}", at.x, at.y, at.z)
+                }
+                _ => "free".to_string(),
+            };
+            verdict.place = verdict.place.or(at);
+            verdict.add(&format!("{} {stage}", title(sweep)), met.is_none(), detail, || work::reason(sweep));
+        }
+    }
+}
+
+struct Verdict {
+    checks: Vec<Check>,
+    rejection: Option<Rejection>,
+    place: Option<DVec3>,
+}
+
+impl Verdict {
+    fn add(&mut self, name: &str, passed: bool, detail: String, reason: impl FnOnce() -> Rejection) {
+        if !passed && self.rejection.is_none() {
+            self.rejection = Some(reason());
+        }
+        self.checks.push(Check { name: name.to_string(), passed, detail });
+    }
+}
+
+fn title(sweep: &Sweep) -> String {
+    if sweep.jaw.is_empty() { format!("palm body '{}'", sweep.body) } else { format!("finger {} body '{}'", sweep.jaw, sweep.body) }
+}
+
+/// A point of the triangle within the sweep's box: the middle of what the box cuts out of it.
+fn common_point(sweep: &Sweep, corners: [DVec3; 3]) -> DVec3 {
+    let mut ring = corners.to_vec();
+    for axis in 0..3 {
+        for (sign, limit) in [(1.0, sweep.high[axis]), (-1.0, -sweep.low[axis])] {
+            let value = |point: DVec3| limit - sign * point[axis];
+            let mut next = Vec::with_capacity(ring.len() + 1);
+            for (index, &a) in ring.iter().enumerate() {
+                let b = ring[(index + 1) % ring.len()];
+                if value(a) >= 0.0 {
+                    next.push(a);
+                }
+                if (value(a) >= 0.0) != (value(b) >= 0.0) {
+                    next.push(a + (b - a) * (value(a) / (value(a) - value(b))));
+                }
+            }
+            if !next.is_empty() {
+                ring = next;
+            }
+        }
+    }
+    ring.iter().sum::<DVec3>() / ring.len() as f64
+}

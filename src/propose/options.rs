@@ -1,0 +1,197 @@
+//! What to propose, and the reasons for which a candidate falls.
+
+use glam::DVec3;
+
+use crate::error::{Error, Result};
+use crate::geometry::Bounds2;
+use crate::gripper::Gripper;
+
+/// What to propose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProposeOptions {
+    /// Step of the position grid [m]; `None`: a fifth of the pad's shorter side.
+    pub spacing: Option<f64>,
+    /// Step of the approach angle [rad].
+    pub angle_step: f64,
+    /// Approach along and across the edges of the gripped faces as well.
+    pub edge_angles: bool,
+    /// Smallest contact area on either face, as a share of the largest possible there: the pad's area, or the area in
+    /// which the two faces overlap, whichever is smaller.
+    pub min_contact: f64,
+    /// Smallest contact area on either face, as a share of the pad's area.
+    pub min_pad_share: f64,
+    /// Largest distance of the grip origin from the centre of mass [m].
+    pub max_offset: Option<f64>,
+    /// Only approaches within a cone.
+    pub approach_cone: Option<Cone>,
+    /// Boxes in the part frame that the gripper must not enter: smallest and largest corner [m].
+    pub keep_out: Vec<[DVec3; 2]>,
+    /// The gripper must stay above this plane.
+    pub ground: Option<Ground>,
+    /// Only these planar faces may be touched.
+    pub faces: Option<Vec<u32>>,
+    /// Propose grips that close on faces from outside.
+    pub outside: bool,
+    /// Propose grips that open into a slot; needs a gripper with outer pads.
+    pub inside: bool,
+    /// List the same pose with exchanged jaws as a grip of its own, marked with what it is a flip of.
+    pub flips: bool,
+    /// Way by which each jaw is opened for the approach beyond contact [m]; less where the stroke ends.
+    pub opening: f64,
+    /// Way by which each jaw must at least be openable [m]: else the pair is outside the stroke.
+    pub min_opening: f64,
+    /// Distance kept between gripper and part, but for the pads [m].
+    pub clearance: f64,
+    /// Length of the straight approach that must be clear of ground and keep-out boxes [m]; of the part it must be clear
+    /// all the way.
+    pub approach: f64,
+    /// Candidates per chunk, about.
+    pub chunk: usize,
+}
+
+impl Default for ProposeOptions {
+    fn default() -> Self {
+        Self {
+            spacing: None,
+            angle_step: 15_f64.to_radians(),
+            edge_angles: true,
+            min_contact: 0.25,
+            min_pad_share: 0.02,
+            max_offset: None,
+            approach_cone: None,
+            keep_out: Vec::new(),
+            ground: None,
+            faces: None,
+            outside: true,
+            inside: false,
+            flips: false,
+            opening: 5e-3,
+            min_opening: 0.25e-3,
+            clearance: 0.0,
+            approach: 0.1,
+            chunk: 65_536,
+        }
+    }
+}
+
+/// Directions within an angle of an axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cone {
+    /// Axis in the part frame; any length.
+    pub axis: DVec3,
+    /// Half the opening angle [rad].
+    pub half_angle: f64,
+}
+
+/// The half-space `normal . x >= offset` of the part frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ground {
+    /// Points up; any length.
+    pub normal: DVec3,
+    /// Height of the ground along the unit normal [m].
+    pub offset: f64,
+}
+
+impl ProposeOptions {
+    /// Step of the position grid [m].
+    pub fn spacing(&self, gripper: &Gripper) -> f64 {
+        self.spacing.unwrap_or_else(|| Bounds2::of(&gripper.pad).size().min_element() / 5.0)
+    }
+
+    /// # Errors
+    /// When a value is not finite or out of its range.
+    pub(super) fn validate(&self) -> Result<()> {
+        let positive = |name: &str, value: f64| {
+            if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Error::input(name, format!("is {value}"), "give a finite value above zero")) }
+        };
+        let not_negative = |name: &str, value: f64| {
+            if value >= 0.0 && value.is_finite() { Ok(()) } else { Err(Error::input(name, format!("is {value}"), "give a finite value, zero or more")) }
+        };
+        if let Some(spacing) = self.spacing {
+            positive("spacing", spacing)?;
+        }
+        positive("angle step", self.angle_step)?;
+        if self.angle_step < 1e-4 {
+            return Err(Error::input("angle step", format!("is {} rad", self.angle_step), "give at least 0.01 degrees"));
+        }
+        for (name, share) in [("smallest contact", self.min_contact), ("smallest share of the pad", self.min_pad_share)] {
+            if !(0.0..=1.0).contains(&share) {
+                return Err(Error::input(name, format!("is {share}"), "give a share, 0 to 1"));
+            }
+        }
+        if let Some(offset) = self.max_offset {
+            not_negative("largest distance from the centre of mass", offset)?;
+        }
+        if let Some(cone) = self.approach_cone {
+            not_negative("approach cone", cone.half_angle)?;
+            positive("approach cone axis", cone.axis.length())?;
+        }
+        if let Some(ground) = self.ground {
+            positive("ground normal", ground.normal.length())?;
+            not_negative("ground offset", ground.offset.abs())?;
+        }
+        for [low, high] in &self.keep_out {
+            if !low.is_finite() || !high.is_finite() || !low.cmple(*high).all() {
+                return Err(Error::input("keep-out box", format!("from {low} to {high}"), "give its smallest, then its largest coordinates"));
+            }
+        }
+        not_negative("opening", self.opening)?;
+        not_negative("smallest opening", self.min_opening)?;
+        not_negative("clearance", self.clearance)?;
+        not_negative("approach", self.approach)
+    }
+}
+
+/// Why a candidate is no grip.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Rejection {
+    /// Counts face pairs, not candidates: their distance is outside the stroke.
+    Stroke,
+    /// Counts face pairs, not candidates: a face is not among the chosen ones.
+    FaceNotChosen,
+    /// The approach direction lies outside the cone.
+    ApproachOutsideCone,
+    /// The grip origin is too far from the centre of mass.
+    TooFarFromCentreOfMass,
+    /// The contact area on a face is below the floor.
+    ContactTooSmall,
+    /// A body would go below the ground.
+    Ground {
+        /// Its name.
+        body: String,
+    },
+    /// A body would enter a keep-out box.
+    KeepOut {
+        /// Its name.
+        body: String,
+    },
+    /// A body meets the part in the grip or while the jaws close.
+    PartInterference {
+        /// Its name.
+        body: String,
+    },
+    /// A body meets the part on the way there.
+    ApproachBlocked {
+        /// Its name.
+        body: String,
+    },
+}
+
+impl Rejection {
+    /// Name for summaries: snake case, the body after a colon.
+    pub fn name(&self) -> String {
+        let with = |kind: &str, body: &str| format!("{kind}:{}", body.replace(char::is_whitespace, "_"));
+        match self {
+            Self::Stroke => "face_pair_outside_stroke".into(),
+            Self::FaceNotChosen => "face_pair_not_chosen".into(),
+            Self::ApproachOutsideCone => "approach_outside_cone".into(),
+            Self::TooFarFromCentreOfMass => "too_far_from_centre_of_mass".into(),
+            Self::ContactTooSmall => "contact_too_small".into(),
+            Self::Ground { body } => with("ground", body),
+            Self::KeepOut { body } => with("keep_out", body),
+            Self::PartInterference { body } => with("part_interference", body),
+            Self::ApproachBlocked { body } => with("approach_blocked", body),
+        }
+    }
+}

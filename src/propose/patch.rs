@@ -1,0 +1,612 @@
+//! Where a pad touches a face: classification and exact clipping of a convex pad against the face's boundary.
+//!
+//! Most pads of a dense set lie wholly inside a face or wholly beside it. A grid over the boundary answers those with
+//! four look-ups, so that only pads over an edge are clipped, and those against the few edges near them. The clipping
+//! follows the boundary in and out of the pad (Weiler and Atherton 1977, for a convex window), which gives proper
+//! polygons with holes; where the geometry is too nearly degenerate for that, the boolean operation of the library.
+
+use glam::DVec2;
+
+use crate::geometry::polygon::{self, Bounds2, ring_area, rings};
+use crate::geometry::{contains, overlay};
+use crate::model::{Patch, Polygon, Ring};
+
+/// Boundary within this share of the pad's size inside the pad's outline counts as flush with it: above all rounding of
+/// the arithmetic, below anything that could be felt (0.02 nm on 20 mm).
+const FLUSH: f64 = 1e-9;
+/// Pieces with less area than this share of their bounding square are rounding (as in [`overlay`]).
+const SLIVER: f64 = 1e-6;
+/// Cells of the grid per axis, at most.
+const MOST_CELLS: usize = 400;
+
+/// A pad outline turned to an approach angle, about the grip origin.
+#[derive(Debug, Clone)]
+pub(super) struct TurnedPad {
+    /// The outline, counter-clockwise.
+    ring: Ring,
+    /// The outline drawn in by the flush tolerance: the clip window.
+    window: Ring,
+    /// Unit outward normals and distances of the window's sides; side `k` runs from corner `k` to `k + 1`.
+    sides: Vec<(DVec2, f64)>,
+    bounds: Bounds2,
+    area: f64,
+}
+
+impl TurnedPad {
+    /// The convex counter-clockwise outline `pad` turned by `angle`.
+    pub(super) fn new(pad: &[DVec2], angle: f64) -> Self {
+        let turn = DVec2::from_angle(angle);
+        let ring: Ring = pad.iter().map(|&point| turn.rotate(point)).collect();
+        let bounds = Bounds2::of(&ring);
+        let scale = bounds.size().max_element();
+        let sides: Vec<(DVec2, f64)> = ring
+            .iter()
+            .zip(ring.iter().cycle().skip(1))
+            .map(|(&a, &b)| {
+                let normal = -(b - a).perp().normalize();
+                (normal, normal.dot(a) - FLUSH * scale)
+            })
+            .collect();
+        let corner = |k: usize| {
+            let ((m, g), (n, h)) = (sides[(k + sides.len() - 1) % sides.len()], sides[k]);
+            DVec2::new(g * n.y - h * m.y, h * m.x - g * n.x) / m.perp_dot(n)
+        };
+        let window = (0..sides.len()).map(corner).collect();
+        Self { area: ring_area(&ring), window, sides, bounds, ring }
+    }
+
+    pub(super) fn area(&self) -> f64 {
+        self.area
+    }
+}
+
+/// How a pad meets a face.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Touch {
+    /// Not at all.
+    Empty,
+    /// The whole pad lies on the face.
+    Whole,
+    /// Part of it does, with this area [m^2]; the outline is in the [`Scratch`].
+    Part(f64),
+}
+
+/// Buffers of one thread.
+#[derive(Debug, Default)]
+pub(super) struct Scratch {
+    seen: Vec<u32>,
+    epoch: u32,
+    pieces: Vec<Piece>,
+    piece_of_edge: Vec<u32>,
+    events: Vec<Event>,
+    visited: Vec<bool>,
+    points: Vec<DVec2>,
+    /// End of each loop in `points`.
+    ends: Vec<usize>,
+    /// Outline from the library, where the walk gave up.
+    fallback: Option<Patch>,
+}
+
+/// The part of one boundary edge inside the window.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    edge: u32,
+    start: DVec2,
+    end: DVec2,
+    /// Window side crossed on the way in; `None` when the edge starts inside.
+    entry: Option<usize>,
+    exit: Option<usize>,
+}
+
+/// A crossing of the window's outline, by position along it.
+#[derive(Debug, Clone, Copy)]
+struct Event {
+    side: usize,
+    along: f64,
+    piece: u32,
+    entry: bool,
+}
+
+/// A face, or coplanar faces, as boundary edges with a grid over them.
+#[derive(Debug)]
+pub(super) struct PatchIndex {
+    polygons: Patch,
+    /// Edge `i` runs from `start[i]` to `start[next[i]]`.
+    start: Vec<DVec2>,
+    next: Vec<u32>,
+    grid: Grid,
+    /// Edges of each cell: `edges[first[cell]..first[cell + 1]]`.
+    first: Vec<u32>,
+    edges: Vec<u32>,
+    /// `sums[(y, x)]`: entries of all cells below `(x, y)`.
+    sums: Vec<u32>,
+    /// Whether a cell's centre lies inside (meant for cells without edges).
+    inside: Vec<bool>,
+    /// Edges that pass the height of each row, anywhere.
+    row_first: Vec<u32>,
+    row_edges: Vec<u32>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Grid {
+    origin: DVec2,
+    cell: f64,
+    nx: usize,
+    ny: usize,
+}
+
+impl Grid {
+    fn column(&self, x: f64) -> usize {
+        (((x - self.origin.x) / self.cell).max(0.0) as usize).min(self.nx - 1)
+    }
+
+    fn row(&self, y: f64) -> usize {
+        (((y - self.origin.y) / self.cell).max(0.0) as usize).min(self.ny - 1)
+    }
+
+    /// Whether coordinates beyond the grid stay out of its border cells.
+    fn covers(&self, bounds: Bounds2) -> bool {
+        let max = self.origin + self.cell * DVec2::new(self.nx as f64, self.ny as f64);
+        bounds.min.cmplt(max).all() && bounds.max.cmpgt(self.origin).all()
+    }
+}
+
+impl PatchIndex {
+    /// Indexes normalised `polygons` for queries within `region`, with cells of about `cell` [m].
+    pub(super) fn new(polygons: Patch, region: Bounds2, cell: f64) -> Self {
+        let (mut start, mut next) = (Vec::new(), Vec::new());
+        for ring in polygons.iter().flat_map(rings) {
+            let base = start.len();
+            start.extend_from_slice(ring);
+            next.extend((0..ring.len()).map(|index| (base + (index + 1) % ring.len()) as u32));
+        }
+        let size = region.size().max(DVec2::splat(1e-9));
+        let cell = cell.max(size.max_element() / MOST_CELLS as f64);
+        let cells = |length: f64| ((length / cell).ceil() as usize).max(1);
+        let grid = Grid { origin: region.min, cell, nx: cells(size.x), ny: cells(size.y) };
+
+        let mut by_cell: Vec<(u32, u32)> = Vec::new();
+        let mut by_row: Vec<(u32, u32)> = Vec::new();
+        for (edge, (&a, &next)) in start.iter().zip(&next).enumerate() {
+            let b = start[next as usize];
+            let bounds = Bounds2 { min: a.min(b), max: a.max(b) };
+            let height = Bounds2 { min: DVec2::new(grid.origin.x, bounds.min.y), max: DVec2::new(grid.origin.x + cell, bounds.max.y) };
+            if !grid.covers(height) {
+                continue;
+            }
+            let (low, high) = (grid.row(bounds.min.y), grid.row(bounds.max.y));
+            by_row.extend((low..=high).map(|row| (row as u32, edge as u32)));
+            if !grid.covers(bounds) {
+                continue;
+            }
+            for row in low..=high {
+                // The stretch of the edge within this row (with a hair of slack) bounds its columns.
+                let slack = 1e-6 * cell;
+                let (y0, y1) = (grid.origin.y + row as f64 * cell - slack, grid.origin.y + (row + 1) as f64 * cell + slack);
+                let at = |y: f64| if (b.y - a.y).abs() < slack { None } else { Some(a.x + (b.x - a.x) * ((y - a.y) / (b.y - a.y)).clamp(0.0, 1.0)) };
+                let (x0, x1) = match (at(y0), at(y1)) {
+                    (Some(x0), Some(x1)) => (x0.min(x1), x0.max(x1)),
+                    _ => (bounds.min.x, bounds.max.x),
+                };
+                by_cell.extend((grid.column(x0 - slack)..=grid.column(x1 + slack)).map(|column| ((row * grid.nx + column) as u32, edge as u32)));
+            }
+        }
+        let (first, edges) = bucket(by_cell, grid.nx * grid.ny);
+        let (row_first, row_edges) = bucket(by_row, grid.ny);
+        let mut sums = vec![0_u32; (grid.nx + 1) * (grid.ny + 1)];
+        for y in 0..grid.ny {
+            let mut run = 0;
+            for x in 0..grid.nx {
+                let cell = y * grid.nx + x;
+                run += first[cell + 1] - first[cell];
+                sums[(y + 1) * (grid.nx + 1) + x + 1] = sums[y * (grid.nx + 1) + x + 1] + run;
+            }
+        }
+        let mut index = Self { polygons, start, next, grid, first, edges, sums, inside: Vec::new(), row_first, row_edges };
+        index.inside = index.fill();
+        index
+    }
+
+    /// Even-odd state of all cell centres, row by row.
+    fn fill(&self) -> Vec<bool> {
+        let mut inside = vec![false; self.grid.nx * self.grid.ny];
+        let mut crossings = Vec::new();
+        for row in 0..self.grid.ny {
+            let y = self.grid.origin.y + (row as f64 + 0.5) * self.grid.cell;
+            crossings.clear();
+            for &edge in self.row(row) {
+                let (a, b) = self.ends(edge);
+                if (a.y > y) != (b.y > y) {
+                    crossings.push(a.x + (b.x - a.x) * ((y - a.y) / (b.y - a.y)));
+                }
+            }
+            crossings.sort_by(f64::total_cmp);
+            for column in 0..self.grid.nx {
+                let x = self.grid.origin.x + (column as f64 + 0.5) * self.grid.cell;
+                inside[row * self.grid.nx + column] = crossings.partition_point(|&crossing| crossing < x) % 2 == 1;
+            }
+        }
+        inside
+    }
+
+    fn row(&self, row: usize) -> &[u32] {
+        &self.row_edges[self.row_first[row] as usize..self.row_first[row + 1] as usize]
+    }
+
+    fn ends(&self, edge: u32) -> (DVec2, DVec2) {
+        (self.start[edge as usize], self.start[self.next[edge as usize] as usize])
+    }
+
+    /// Even-odd membership with exact predicates, by the edges of one row. `point` must lie in the region.
+    pub(super) fn contains(&self, point: DVec2) -> bool {
+        self.row(self.grid.row(point.y)).iter().fold(false, |inside, &edge| {
+            let (a, b) = self.ends(edge);
+            inside ^ polygon::crosses_right(a, b, point)
+        })
+    }
+
+    /// Whether the square of half side `reach` about `point` certainly holds nothing of the patch.
+    pub(super) fn is_far(&self, point: DVec2, reach: f64) -> bool {
+        let [x0, x1, y0, y1] = self.cells(Bounds2 { min: point - reach, max: point + reach });
+        self.edges_in(x0, x1, y0, y1) == 0 && !self.inside[y0 * self.grid.nx + x0]
+    }
+
+    fn cells(&self, bounds: Bounds2) -> [usize; 4] {
+        [self.grid.column(bounds.min.x), self.grid.column(bounds.max.x), self.grid.row(bounds.min.y), self.grid.row(bounds.max.y)]
+    }
+
+    fn edges_in(&self, x0: usize, x1: usize, y0: usize, y1: usize) -> u32 {
+        let sum = |x: usize, y: usize| self.sums[y * (self.grid.nx + 1) + x];
+        sum(x1 + 1, y1 + 1) + sum(x0, y0) - sum(x0, y1 + 1) - sum(x1 + 1, y0)
+    }
+
+    /// How the pad, its origin at `place`, meets the patch. After [`Touch::Part`] the outline lies in `scratch`.
+    pub(super) fn touch(&self, pad: &TurnedPad, place: DVec2, scratch: &mut Scratch) -> Touch {
+        let bounds = Bounds2 { min: pad.bounds.min + place, max: pad.bounds.max + place };
+        let [x0, x1, y0, y1] = self.cells(bounds);
+        if self.edges_in(x0, x1, y0, y1) == 0 {
+            return if self.inside[y0 * self.grid.nx + x0] { Touch::Whole } else { Touch::Empty };
+        }
+        self.collect_pieces(pad, place, [x0, x1, y0, y1], scratch);
+        if scratch.pieces.is_empty() {
+            // The middle of the pad is an inner point, so no edge passes through it.
+            let middle = pad.ring.iter().sum::<DVec2>() / pad.ring.len() as f64 + place;
+            return if self.contains(middle) { Touch::Whole } else { Touch::Empty };
+        }
+        scratch.fallback = None;
+        if !self.walk(pad, place, scratch) {
+            let ring: Ring = pad.window.iter().map(|&point| point + place).collect();
+            let mut patch = overlay::intersect_convex(&ring, &self.polygons);
+            for polygon in &mut patch {
+                *polygon = polygon::transform(polygon, &glam::DAffine2::from_translation(-place));
+            }
+            scratch.fallback = Some(patch);
+        }
+        let area = match &scratch.fallback {
+            Some(patch) => polygon::patch_area(patch),
+            None => loops(scratch).map(ring_area).sum(),
+        };
+        if area <= SLIVER * pad.area { Touch::Empty } else { Touch::Part(area) }
+    }
+
+    /// Edges near the pad, each clipped to the window (Cyrus and Beck 1978), relative to `place`.
+    fn collect_pieces(&self, pad: &TurnedPad, place: DVec2, [x0, x1, y0, y1]: [usize; 4], scratch: &mut Scratch) {
+        if scratch.seen.len() < self.start.len() {
+            scratch.seen.resize(self.start.len(), 0);
+            scratch.piece_of_edge.resize(self.start.len(), 0);
+        }
+        if scratch.epoch == u32::MAX {
+            scratch.seen.fill(0);
+            scratch.epoch = 0;
+        }
+        scratch.epoch += 1;
+        scratch.pieces.clear();
+        for row in y0..=y1 {
+            let cells = row * self.grid.nx;
+            let span = self.first[cells + x0] as usize..self.first[cells + x1 + 1] as usize;
+            for &edge in &self.edges[span] {
+                if scratch.seen[edge as usize] == scratch.epoch {
+                    continue;
+                }
+                scratch.seen[edge as usize] = scratch.epoch;
+                let (a, b) = self.ends(edge);
+                if let Some(piece) = clip_edge(edge, a - place, b - place, &pad.sides) {
+                    scratch.piece_of_edge[edge as usize] = scratch.pieces.len() as u32;
+                    scratch.pieces.push(piece);
+                } else {
+                    scratch.piece_of_edge[edge as usize] = u32::MAX;
+                }
+            }
+        }
+    }
+
+    /// Joins the pieces along the window's outline to closed loops; `false` when the crossings do not alternate or two
+    /// of them coincide, where rounding could have mixed them up.
+    fn walk(&self, pad: &TurnedPad, place: DVec2, scratch: &mut Scratch) -> bool {
+        scratch.points.clear();
+        scratch.ends.clear();
+        scratch.events.clear();
+        let along = |side: usize, point: DVec2| {
+            let (a, b) = (pad.window[side], pad.window[(side + 1) % pad.window.len()]);
+            (point - a).dot(b - a) / (b - a).length_squared()
+        };
+        for (index, piece) in scratch.pieces.iter().enumerate() {
+            for (side, point, entry) in [(piece.entry, piece.start, true), (piece.exit, piece.end, false)] {
+                if let Some(side) = side {
+                    scratch.events.push(Event { side, along: along(side, point), piece: index as u32, entry });
+                }
+            }
+        }
+        scratch.events.sort_by(|a, b| a.side.cmp(&b.side).then(a.along.total_cmp(&b.along)));
+        let count = scratch.events.len();
+        for index in 0..count {
+            let (event, following) = (scratch.events[index], scratch.events[(index + 1) % count]);
+            let tied = count > 1 && event.side == following.side && (event.along - following.along).abs() < 1e-12;
+            if event.entry == following.entry || tied {
+                return false;
+            }
+        }
+        scratch.visited.clear();
+        scratch.visited.resize(scratch.pieces.len(), false);
+        // Loops that cross the outline.
+        for first in 0..count {
+            let event = scratch.events[first];
+            if !event.entry || scratch.visited[event.piece as usize] {
+                continue;
+            }
+            let mut piece = event.piece;
+            loop {
+                if !self.follow(piece, scratch) {
+                    return false;
+                }
+                // `follow` ended on a piece with an exit: go on along the outline to the next entry.
+                let Some(exit) = scratch
+                    .events
+                    .iter()
+                    .position(|event| !event.entry && scratch.pieces[event.piece as usize].end == scratch.points[scratch.points.len() - 1])
+                else {
+                    return false;
+                };
+                let (from, to) = (scratch.events[exit], scratch.events[(exit + 1) % count]);
+                let sides = pad.window.len();
+                let mut steps = (to.side + sides - from.side) % sides;
+                if steps == 0 && to.along < from.along {
+                    steps = sides;
+                }
+                for step in 1..=steps {
+                    scratch.points.push(pad.window[(from.side + step) % sides]);
+                }
+                piece = to.piece;
+                if piece == event.piece {
+                    break;
+                }
+                if scratch.visited[piece as usize] {
+                    return false;
+                }
+            }
+            scratch.ends.push(scratch.points.len());
+        }
+        // Loops wholly inside the window.
+        let crossed = count > 0;
+        let mut has_inner = false;
+        for index in 0..scratch.pieces.len() as u32 {
+            if scratch.visited[index as usize] {
+                continue;
+            }
+            if scratch.pieces[index as usize].entry.is_some() || !self.follow_closed(index, scratch) {
+                return false;
+            }
+            scratch.ends.push(scratch.points.len());
+            has_inner = true;
+        }
+        // Without a crossing, the outline itself bounds the contact when its corner lies on the face.
+        if !crossed && has_inner && self.contains(pad.window[0] + place) {
+            scratch.points.extend_from_slice(&pad.window);
+            scratch.ends.push(scratch.points.len());
+        }
+        true
+    }
+
+    /// Appends the chain of pieces that starts at `piece` up to its exit point.
+    fn follow(&self, mut piece: u32, scratch: &mut Scratch) -> bool {
+        loop {
+            let current = scratch.pieces[piece as usize];
+            if std::mem::replace(&mut scratch.visited[piece as usize], true) {
+                return false;
+            }
+            scratch.points.push(current.start);
+            if current.exit.is_some() {
+                scratch.points.push(current.end);
+                return true;
+            }
+            let Some(next) = self.next_piece(current.edge, scratch) else { return false };
+            piece = next;
+        }
+    }
+
+    /// Appends the closed chain of whole edges through `first`.
+    fn follow_closed(&self, first: u32, scratch: &mut Scratch) -> bool {
+        let mut piece = first;
+        loop {
+            let current = scratch.pieces[piece as usize];
+            if current.entry.is_some() || current.exit.is_some() || std::mem::replace(&mut scratch.visited[piece as usize], true) {
+                return false;
+            }
+            scratch.points.push(current.start);
+            match self.next_piece(current.edge, scratch) {
+                Some(next) if next == first => return true,
+                Some(next) => piece = next,
+                None => return false,
+            }
+        }
+    }
+
+    /// The piece of the edge after `edge`, when it starts inside the window.
+    fn next_piece(&self, edge: u32, scratch: &Scratch) -> Option<u32> {
+        let next = self.next[edge as usize] as usize;
+        let piece = (scratch.seen[next] == scratch.epoch).then(|| scratch.piece_of_edge[next])?;
+        (piece != u32::MAX && scratch.pieces[piece as usize].entry.is_none()).then_some(piece)
+    }
+}
+
+/// The outline of the last [`Touch::Part`] as proper polygons, relative to the pad's origin and turned by `-angle`,
+/// that is in the grip frame.
+pub(super) fn outline(scratch: &Scratch, angle: f64) -> Patch {
+    let turn = DVec2::from_angle(-angle);
+    let turned = |ring: &[DVec2]| -> Ring { ring.iter().map(|&point| turn.rotate(point)).collect() };
+    if let Some(patch) = &scratch.fallback {
+        return patch.iter().map(|polygon| Polygon { outer: turned(&polygon.outer), holes: polygon.holes.iter().map(|hole| turned(hole)).collect() }).collect();
+    }
+    let solid = |ring: &&[DVec2]| {
+        let size = Bounds2::of(*ring).size().max_element();
+        ring_area(ring).abs() > SLIVER * size * size
+    };
+    let (outer, holes): (Vec<&[DVec2]>, Vec<&[DVec2]>) = loops(scratch).filter(solid).partition(|ring| ring_area(ring) > 0.0);
+    let mut patch: Patch = outer.iter().map(|ring| Polygon { outer: ring.to_vec(), holes: Vec::new() }).collect();
+    for hole in holes {
+        // The smallest outer loop around it: islands may lie in holes.
+        let around = (0..patch.len()).filter(|&index| contains(&Polygon { outer: outer[index].to_vec(), holes: Vec::new() }, hole[0]));
+        if let Some(index) = around.min_by(|&a, &b| ring_area(outer[a]).total_cmp(&ring_area(outer[b]))) {
+            patch[index].holes.push(hole.to_vec());
+        }
+    }
+    for polygon in &mut patch {
+        polygon.outer = turned(&polygon.outer);
+        for hole in &mut polygon.holes {
+            *hole = turned(hole);
+        }
+    }
+    patch
+}
+
+fn loops(scratch: &Scratch) -> impl Iterator<Item = &[DVec2]> {
+    let starts = std::iter::once(0).chain(scratch.ends.iter().copied());
+    starts.zip(&scratch.ends).map(|(start, &end)| &scratch.points[start..end])
+}
+
+fn clip_edge(edge: u32, a: DVec2, b: DVec2, sides: &[(DVec2, f64)]) -> Option<Piece> {
+    let (mut low, mut high, mut entry, mut exit) = (0.0, 1.0, None, None);
+    for (side, &(normal, height)) in sides.iter().enumerate() {
+        let (value_a, value_b) = (normal.dot(a) - height, normal.dot(b) - height);
+        match (value_a > 0.0, value_b > 0.0) {
+            (true, true) => return None,
+            (false, false) => {}
+            (true, false) => {
+                let t = value_a / (value_a - value_b);
+                if t >= low {
+                    (low, entry) = (t, Some(side));
+                }
+            }
+            (false, true) => {
+                let t = value_a / (value_a - value_b);
+                if t <= high {
+                    (high, exit) = (t, Some(side));
+                }
+            }
+        }
+        if low >= high {
+            return None;
+        }
+    }
+    let at = |t: f64| a + (b - a) * t;
+    Some(Piece { edge, start: if entry.is_some() { at(low) } else { a }, end: if exit.is_some() { at(high) } else { b }, entry, exit })
+}
+
+/// Sorts `(bucket, value)` pairs into `count` buckets: offsets and values.
+fn bucket(pairs: Vec<(u32, u32)>, count: usize) -> (Vec<u32>, Vec<u32>) {
+    let mut first = vec![0_u32; count + 1];
+    for &(bucket, _) in &pairs {
+        first[bucket as usize + 1] += 1;
+    }
+    for index in 0..count {
+        first[index + 1] += first[index];
+    }
+    let mut fill = first.clone();
+    let mut values = vec![0; pairs.len()];
+    for (bucket, value) in pairs {
+        let slot = &mut fill[bucket as usize];
+        values[*slot as usize] = value;
+        *slot += 1;
+    }
+    (first, values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{intersect_convex, patch_area};
+    use crate::gripper::rectangle;
+    use proptest::prelude::*;
+
+    fn index(polygons: Patch) -> PatchIndex {
+        PatchIndex::new(polygons, Bounds2 { min: DVec2::splat(-3.0), max: DVec2::splat(3.0) }, 0.1)
+    }
+
+    fn touch(index: &PatchIndex, pad: &TurnedPad, place: DVec2) -> (f64, Patch) {
+        let mut scratch = Scratch::default();
+        match index.touch(pad, place, &mut scratch) {
+            Touch::Empty => (0.0, Patch::new()),
+            Touch::Whole => (pad.area(), vec![Polygon { outer: pad.ring.clone(), holes: Vec::new() }]),
+            Touch::Part(area) => (area, outline(&scratch, 0.0)),
+        }
+    }
+
+    #[test]
+    fn flush_pads_touch_wholly() {
+        let face = index(vec![Polygon { outer: rectangle(DVec2::new(4.0, 1.0)), holes: Vec::new() }]);
+        let pad = TurnedPad::new(&rectangle(DVec2::new(1.0, 1.0)), 0.0);
+        let mut scratch = Scratch::default();
+        for x in [-1.5, -0.3, 0.0, 1.5] {
+            assert_eq!(face.touch(&pad, DVec2::new(x, 0.0), &mut scratch), Touch::Whole);
+        }
+        assert_eq!(face.touch(&pad, DVec2::new(0.0, 1.0), &mut scratch), Touch::Empty);
+        let (area, patch) = touch(&face, &pad, DVec2::new(1.75, 0.25));
+        assert!((area - 0.75 * 0.75).abs() < 1e-8 && patch.len() == 1 && patch[0].outer.len() == 4, "{patch:?}");
+    }
+
+    #[test]
+    fn holes_and_islands() {
+        let hole: Ring = rectangle(DVec2::splat(0.4)).into_iter().rev().collect();
+        let plate = Polygon { outer: rectangle(DVec2::splat(4.0)), holes: vec![hole] };
+        let island = Polygon { outer: rectangle(DVec2::splat(0.2)), holes: Vec::new() };
+        let face = index(vec![plate, island]);
+        let pad = TurnedPad::new(&rectangle(DVec2::ONE), 0.3);
+        let (area, patch) = touch(&face, &pad, DVec2::new(0.05, 0.0));
+        assert!((area - (1.0 - 0.16 + 0.04)).abs() < 1e-8, "{area}");
+        assert_eq!((patch.len(), patch.iter().map(|p| p.holes.len()).sum::<usize>()), (2, 1));
+        assert!((patch_area(&patch) - area).abs() < 1e-12);
+        // half over the hole: one polygon with a notch
+        let (_, notch) = touch(&index(vec![face.polygons[0].clone()]), &pad, DVec2::new(0.5, 0.0));
+        assert_eq!((notch.len(), notch[0].holes.len()), (1, 0));
+    }
+
+    fn star(count: std::ops::Range<usize>, low: f64, high: f64) -> impl Strategy<Value = Ring> {
+        proptest::collection::vec(low..high, count).prop_map(|radii| {
+            let step = std::f64::consts::TAU / radii.len() as f64;
+            radii.iter().enumerate().map(|(index, radius)| DVec2::from_angle(index as f64 * step) * *radius).collect()
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(1000))]
+        #[test]
+        fn clipping_agrees_with_the_library(outer in star(3..30, 1.0, 2.0), hole in star(3..12, 0.1, 0.9), angle in 0.0..6.3f64, x in -2.0..2.0f64, y in -2.0..2.0f64, w in 0.05..2.0f64) {
+            let mut polygon = Polygon { outer, holes: vec![hole] };
+            // The star's chords may cut below the hole's radius: the common part of both is what even-odd makes of them.
+            let mended = overlay::even_odd(&[std::mem::take(&mut polygon.outer), polygon.holes.remove(0)]);
+            let face = index(mended.clone());
+            let pad = TurnedPad::new(&rectangle(DVec2::new(w, 0.7)), angle);
+            let place = DVec2::new(x, y);
+            let (area, patch) = touch(&face, &pad, place);
+            let ring: Ring = pad.ring.iter().map(|&point| point + place).collect();
+            let expected = intersect_convex(&ring, &mended);
+            prop_assert!((area - patch_area(&expected)).abs() < 1e-5 * w, "{area} {}", patch_area(&expected));
+            prop_assert!((area - patch_area(&patch)).abs() < 1e-5 * w, "{area} {}", patch_area(&patch));
+            let clipped: f64 = mended.iter().flat_map(rings).map(|r| ring_area(&crate::geometry::clip_ring_convex(r, &ring))).sum();
+            prop_assert!((area - clipped).abs() < 1e-5 * w);
+            // What counts as a sliver differs a little between the two.
+            let count = |patch: &Patch| patch.iter().filter(|polygon| polygon::area(polygon) > 1e-3 * w).count();
+            prop_assert_eq!(count(&patch), count(&expected));
+        }
+    }
+}

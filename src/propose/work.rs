@@ -1,0 +1,276 @@
+//! One work item: all positions of a stretch of a site at one angle.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+use rustc_hash::FxHashMap;
+
+use super::interference::View;
+use super::options::Rejection;
+use super::patch::{Scratch, Touch, TurnedPad, outline};
+use super::sweep::{Stage, Sweep};
+use super::tree::Tree;
+use super::{Item, Prepared, Proposer};
+use crate::geometry::polygon;
+use crate::gripper::half_turn;
+use crate::model::{Contact, Frame, Grip, Patch, Polygon, Ring};
+use crate::part::PairKind;
+
+/// What came of an item.
+#[derive(Debug, Default)]
+pub(super) struct Outcome {
+    pub(super) grips: Vec<Grip>,
+    pub(super) candidates: u64,
+    pub(super) rejections: Vec<(Rejection, u64)>,
+}
+
+/// Buffers of one thread.
+#[derive(Debug, Default)]
+pub(super) struct Buffers {
+    scratch: [Scratch; 2],
+    places: Vec<DVec2>,
+    alive: Vec<u32>,
+    whole: Vec<[bool; 2]>,
+    blocked: Vec<bool>,
+}
+
+/// Contacts of one item by their rounded coordinates: a pad moved along a straight edge keeps its contact.
+type Known = FxHashMap<Vec<i64>, Arc<Contact>>;
+
+/// Contacts with coordinates this near, as a share of the pad's size, are one contact.
+const SAME_CONTACT: f64 = 1e-10;
+
+/// The grip frame at `place` of the site's plane, approaching at `angle`.
+pub(super) fn frame(site: &super::Site, place: DVec2, angle: f64) -> Frame {
+    let turn = Frame { rotation: glam::DMat3::from_rotation_z(angle), origin: place.extend(0.0) };
+    site.part_from_site.compose(&turn)
+}
+
+/// The pad outline of an orientation in the grip frame before the half turn: with exchanged jaws it is mirrored.
+pub(super) fn oriented(pad: &[DVec2], flipped: bool) -> Ring {
+    if flipped { pad.iter().rev().map(|point| DVec2::new(point.x, -point.y)).collect() } else { pad.to_vec() }
+}
+
+/// The reason for which a sweep that meets the part rejects a candidate.
+pub(super) fn reason(sweep: &Sweep) -> Rejection {
+    let body = sweep.body.clone();
+    match sweep.stage {
+        Stage::Grip => Rejection::PartInterference { body },
+        Stage::Approach => Rejection::ApproachBlocked { body },
+    }
+}
+
+impl Proposer<'_> {
+    pub(super) fn evaluate(&self, item: &Item, prepared: &Prepared<'_>, tree: &Tree, buffers: &mut Buffers) -> Outcome {
+        let mut outcome = Outcome::default();
+        let mut known = Known::default();
+        // Numbers of the poses already taken, for the flips of an unsymmetric gripper.
+        let mut taken: FxHashMap<u64, ()> = FxHashMap::default();
+        for orientation in 0..self.orientations() {
+            let flipped = orientation == 1;
+            outcome.candidates += item.positions.len() as u64;
+            self.survivors(item, prepared, tree, flipped, buffers, &mut outcome);
+            let site = prepared.site;
+            let angle = site.angles[item.angle];
+            let pad = TurnedPad::new(&oriented(&self.gripper.pad, flipped), angle);
+            let alive = std::mem::take(&mut buffers.alive);
+            for &index in &alive {
+                let place = site.positions[item.positions.start + index as usize];
+                let contact = self.contact(prepared, &pad, place, angle, flipped, buffers.whole[index as usize], &mut buffers.scratch, &mut known);
+                let mut grip = Grip {
+                    id: item.id + u64::from(index) * self.stride(),
+                    part_from_grip: frame(site, place, angle),
+                    width: site.width,
+                    face_i: site.face_at(0, self.part, place),
+                    face_ii: site.face_at(1, self.part, place),
+                    angle,
+                    contact,
+                    inside: site.kind == PairKind::Internal,
+                    flip_of: None,
+                };
+                if flipped {
+                    turn(&mut grip);
+                    grip.flip_of = taken.contains_key(&(grip.id)).then_some(grip.id);
+                    grip.id += 1;
+                } else if self.options.flips && self.symmetric {
+                    let mut flip = grip.clone();
+                    turn(&mut flip);
+                    flip.contact = self.mirrored(&grip.contact, &mut known);
+                    flip.flip_of = Some(grip.id);
+                    flip.id += 1;
+                    outcome.grips.push(grip);
+                    grip = flip;
+                } else if !self.symmetric {
+                    taken.insert(grip.id, ());
+                }
+                outcome.grips.push(grip);
+            }
+            buffers.alive = alive;
+        }
+        outcome.grips.sort_by_key(|grip| grip.id);
+        outcome
+    }
+
+    /// Leaves in `buffers.alive` the item's positions without a reason against them, and counts the others.
+    fn survivors(&self, item: &Item, prepared: &Prepared<'_>, tree: &Tree, flipped: bool, buffers: &mut Buffers, outcome: &mut Outcome) {
+        let site = prepared.site;
+        let angle = site.angles[item.angle];
+        let positions = &site.positions[item.positions.clone()];
+        let mut reject = |reason: Rejection, count: usize| {
+            if count > 0 {
+                outcome.rejections.push((reason, count as u64));
+            }
+        };
+        buffers.alive.clear();
+        let origin_frame = frame(site, DVec2::ZERO, angle);
+        if !self.environment.allows(origin_frame.rotation.x_axis) {
+            reject(Rejection::ApproachOutsideCone, positions.len());
+            return;
+        }
+        buffers.alive.extend(0..positions.len() as u32);
+        let keep = |alive: &mut Vec<u32>, test: &mut dyn FnMut(u32) -> bool| {
+            let before = alive.len();
+            alive.retain(|&index| test(index));
+            before - alive.len()
+        };
+
+        if let Some(most) = self.options.max_offset {
+            let centre = self.part.mass_properties(1.0).centre_of_mass;
+            let lost = keep(&mut buffers.alive, &mut |index| site.part_from_site.point(positions[index as usize].extend(0.0)).distance(centre) <= most);
+            reject(Rejection::TooFarFromCentreOfMass, lost);
+        }
+
+        let pad = TurnedPad::new(&oriented(&self.gripper.pad, flipped), angle);
+        let floor = self.contact_floor(site, pad.area());
+        buffers.whole.clear();
+        buffers.whole.resize(positions.len(), [true; 2]);
+        let (scratch, whole) = (&mut buffers.scratch, &mut buffers.whole);
+        let lost = keep(&mut buffers.alive, &mut |index| {
+            (0..2).all(|side| match prepared.patches[side].touch(&pad, positions[index as usize], &mut scratch[side]) {
+                Touch::Empty => false,
+                Touch::Whole => true,
+                Touch::Part(area) => {
+                    whole[index as usize][side] = false;
+                    area >= floor
+                }
+            })
+        });
+        reject(Rejection::ContactTooSmall, lost);
+
+        if !self.environment.is_empty() {
+            let sweeps = &prepared.outer_sweeps[usize::from(flipped)];
+            let depths = self.environment.depths(sweeps, &origin_frame);
+            let mut lost: Vec<(Rejection, usize)> = Vec::new();
+            let mut note = |reason: Rejection| match lost.iter_mut().find(|(known, _)| *known == reason) {
+                Some((_, count)) => *count += 1,
+                None => lost.push((reason, 1)),
+            };
+            keep(&mut buffers.alive, &mut |index| {
+                let grip = frame(site, positions[index as usize], angle);
+                if let Some(sweep) = self.environment.grounded(&depths, grip.origin) {
+                    note(Rejection::Ground { body: sweeps[sweep].body.clone() });
+                    return false;
+                }
+                if let Some((sweep, _)) = self.environment.kept_out(sweeps, &grip) {
+                    note(Rejection::KeepOut { body: sweeps[sweep].body.clone() });
+                    return false;
+                }
+                true
+            });
+            lost.into_iter().for_each(|(reason, count)| reject(reason, count));
+        }
+
+        let view = self.view(site, tree, angle);
+        buffers.places.clear();
+        buffers.places.extend(positions.iter().map(|&position| self.place(site, &view, position)));
+        buffers.blocked.clear();
+        buffers.blocked.resize(positions.len(), false);
+        for sweep in &prepared.sweeps[usize::from(flipped)] {
+            if buffers.alive.is_empty() {
+                return;
+            }
+            view.test(sweep, &buffers.places, &mut buffers.alive, &mut buffers.blocked);
+            let blocked = &buffers.blocked;
+            let lost = keep(&mut buffers.alive, &mut |index| !blocked[index as usize]);
+            reject(reason(sweep), lost);
+        }
+        buffers.alive.sort_unstable();
+    }
+
+    /// Smallest contact area at a site [m^2]; reached up to rounding is enough.
+    pub(super) fn contact_floor(&self, site: &super::Site, pad: f64) -> f64 {
+        (self.options.min_contact * pad.min(site.overlap)).max(self.options.min_pad_share * pad) * (1.0 - 1e-9)
+    }
+
+    /// The part in the grip axes of a site at an angle.
+    pub(super) fn view<'t>(&self, site: &super::Site, tree: &'t Tree, angle: f64) -> View<'t> {
+        View::new(tree, DVec2::from_angle(site.turn + angle), site.origin.z)
+    }
+
+    /// A position of a site in the view's grip axes.
+    pub(super) fn place(&self, site: &super::Site, view: &View<'_>, position: DVec2) -> DVec2 {
+        view.turned(site.origin.truncate() + DVec2::from_angle(site.turn).rotate(position))
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "one call; a struct would only rename them")]
+    fn contact(
+        &self,
+        prepared: &Prepared<'_>,
+        pad: &TurnedPad,
+        place: DVec2,
+        angle: f64,
+        flipped: bool,
+        whole: [bool; 2],
+        scratch: &mut [Scratch; 2],
+        known: &mut Known,
+    ) -> Arc<Contact> {
+        if whole == [true; 2] {
+            return Arc::clone(&self.whole);
+        }
+        let mut patch = |side: usize| -> Patch {
+            match prepared.patches[side].touch(pad, place, &mut scratch[side]) {
+                Touch::Empty => Patch::new(),
+                Touch::Whole => vec![Polygon { outer: oriented(&self.gripper.pad, flipped), holes: Vec::new() }],
+                Touch::Part(_) => outline(&scratch[side], angle),
+            }
+        };
+        let contact = Contact { face_i: patch(0), face_ii: patch(1) };
+        self.shared(if flipped { mirror(&contact) } else { contact }, known)
+    }
+
+    /// The contact with exchanged jaws.
+    fn mirrored(&self, contact: &Arc<Contact>, known: &mut Known) -> Arc<Contact> {
+        if Arc::ptr_eq(contact, &self.whole) { Arc::clone(&self.whole) } else { self.shared(mirror(contact), known) }
+    }
+
+    fn shared(&self, contact: Contact, known: &mut Known) -> Arc<Contact> {
+        let step = SAME_CONTACT * self.gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
+        let mut key = Vec::new();
+        for patch in [&contact.face_i, &contact.face_ii] {
+            for ring in patch.iter().flat_map(polygon::rings) {
+                key.extend(ring.iter().flat_map(|point| [(point.x / step).round() as i64, (point.y / step).round() as i64]));
+                key.push(i64::MAX);
+            }
+            key.push(i64::MIN);
+        }
+        Arc::clone(known.entry(key).or_insert_with(|| Arc::new(contact)))
+    }
+}
+
+/// Exchanges the jaws of a grip: half a turn about the approach axis.
+fn turn(grip: &mut Grip) {
+    grip.part_from_grip.rotation *= half_turn();
+    std::mem::swap(&mut grip.face_i, &mut grip.face_ii);
+}
+
+/// A contact seen after half a turn about the approach axis.
+fn mirror(contact: &Contact) -> Contact {
+    let map = glam::DAffine2::from_mat2(glam::DMat2::from_diagonal(DVec2::new(1.0, -1.0)));
+    let patch = |patch: &Patch| patch.iter().map(|shape| polygon::transform(shape, &map)).collect();
+    Contact { face_i: patch(&contact.face_ii), face_ii: patch(&contact.face_i) }
+}
+
+/// Unit approach direction of a grip in the part frame.
+pub(super) fn approach(frame: &Frame) -> DVec3 {
+    frame.rotation.x_axis
+}
