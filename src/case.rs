@@ -63,7 +63,7 @@ pub fn read(path: &Path) -> Result<Vec<Case>> {
         let line = text[..stream.byte_offset().min(text.len())].lines().count();
         let value = value.map_err(|error| Error::input(&name, format!("is not JSON: {error}"), SHAPE))?;
         let mut take = |place: String, value: serde_json::Value| -> Result<()> {
-            cases.push(case(&place, value)?);
+            cases.push(parse(&place, value)?);
             Ok(())
         };
         match value {
@@ -89,7 +89,11 @@ pub fn read(path: &Path) -> Result<Vec<Case>> {
     Ok(cases)
 }
 
-fn case(place: &str, value: serde_json::Value) -> Result<Case> {
+/// One case from its JSON value; `place` is file and place for messages.
+///
+/// # Errors
+/// When the value is not of the form.
+pub fn parse(place: &str, value: serde_json::Value) -> Result<Case> {
     let raw: Raw = serde_json::from_value(value).map_err(|error| Error::input(place, error.to_string(), SHAPE))?;
     let id = raw.id.map(|id| id.as_str().map_or_else(|| id.to_string(), str::to_string));
     let contact = Contact { face_i: raw.a_i, face_ii: raw.a_ii };

@@ -1,9 +1,13 @@
 //! The command line: flags to options, options to calls of the library, answers to text. Thin.
 
+mod backend;
+mod bench;
 mod defaults;
+mod devices;
 mod figures;
 mod gripper;
 mod part;
+mod score;
 mod shell;
 mod solve;
 
@@ -26,6 +30,9 @@ struct Cli {
 enum Command {
     Part(part::Args),
     Solve(solve::Args),
+    Score(score::Args),
+    Devices(devices::Args),
+    Bench(bench::Args),
     Gripper(gripper::Args),
     Figures(figures::Args),
     Completions(shell::CompletionsArgs),
@@ -38,6 +45,9 @@ pub(crate) fn main() -> ExitCode {
         defaults::apply(&Cli::command(), std::env::args_os().collect(), Path::new(defaults::FILE)).and_then(|line| match Cli::parse_from(line).command {
             Command::Part(args) => part::run(args),
             Command::Solve(args) => solve::run(args),
+            Command::Score(args) => score::run(args),
+            Command::Devices(args) => devices::run(args),
+            Command::Bench(args) => bench::run(args),
             Command::Gripper(args) => gripper::run(args),
             Command::Figures(args) => figures::run(args),
             Command::Completions(args) => shell::completions(args),

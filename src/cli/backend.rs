@@ -1,0 +1,29 @@
+//! The flags that choose where seeds are computed, shared by the subcommands that score.
+
+use clap::Args as ClapArgs;
+use gripfast::backend::{Choice, SeedSet, Selection, select};
+
+#[derive(Debug, ClapArgs)]
+pub(crate) struct BackendArgs {
+    /// Where slip twists are searched: auto, cpu or gpu. gpu without a graphics processor is an error; the answers are the same.
+    #[arg(long, default_value = "auto", value_name = "auto|cpu|gpu")]
+    pub(crate) backend: Choice,
+    /// Graphics adapter, by its number or part of its name as `gripfast devices` lists them [default: GRIPFAST_ADAPTER].
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub(crate) adapter: Option<String>,
+    /// Slip twists tried for each load before the exact solver, at least.
+    #[arg(long, value_name = "N", default_value_t = 81)]
+    pub(crate) seeds: usize,
+}
+
+impl BackendArgs {
+    /// Opens the backend.
+    pub(crate) fn select(&self) -> anyhow::Result<Selection> {
+        Ok(select(self.backend, self.adapter.as_deref())?)
+    }
+
+    /// The set of twists.
+    pub(crate) fn seed_set(&self) -> anyhow::Result<SeedSet> {
+        Ok(SeedSet::with_at_least(self.seeds)?)
+    }
+}
