@@ -4,6 +4,7 @@ mod backend;
 mod bench;
 mod defaults;
 mod devices;
+mod export;
 mod figures;
 mod gripper;
 mod part;
@@ -35,6 +36,7 @@ enum Command {
     Bench(bench::Args),
     Gripper(gripper::Args),
     Figures(figures::Args),
+    Export(export::Args),
     Completions(shell::CompletionsArgs),
     Man(shell::ManArgs),
 }
@@ -50,6 +52,7 @@ pub(crate) fn main() -> ExitCode {
             Command::Bench(args) => bench::run(args),
             Command::Gripper(args) => gripper::run(args),
             Command::Figures(args) => figures::run(args),
+            Command::Export(args) => export::run(args),
             Command::Completions(args) => shell::completions(args),
             Command::Man(args) => shell::man(args),
         });

@@ -1,1 +1,260 @@
-//! To be written.
+//! Result files for other programs. Each format is described field by field in `docs/formats.md`.
+//!
+//! Every pose is that of a tool frame in the part frame: axes by [`Convention`], origin by [`Origin`], metres, right-handed.
+
+mod acronym;
+mod glb;
+mod graspgen;
+mod graspnet;
+mod isaac;
+mod moveit;
+mod parquet;
+mod table;
+mod tool;
+mod yaml;
+
+use std::io::Write;
+use std::path::Path;
+
+use crate::error::{Error, Result};
+use crate::gripper::Gripper;
+use crate::model::Frame;
+use crate::part::Mesh;
+use crate::results::{GripSet, RankedGrip};
+
+pub use table::{Column, Table, Values, table};
+pub use tool::{Convention, Joint, Origin};
+
+/// A file format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Native JSON, read by every subcommand.
+    Json,
+    /// Native JSON Lines: the set without grips, then a grip a line.
+    JsonLines,
+    /// A table of comma-separated values.
+    Csv,
+    /// The same table as Apache Parquet.
+    Parquet,
+    /// NVIDIA Isaac's `isaac_grasp` YAML.
+    IsaacGrasp,
+    /// GraspGen's JSON.
+    GraspGen,
+    /// A list of `moveit_msgs/Grasp` as YAML.
+    MoveIt,
+    /// GraspNet's rows of 17 numbers in a NumPy archive.
+    GraspNet,
+    /// ACRONYM's layout in HDF5.
+    Acronym,
+    /// Binary glTF: the part with grippers in place.
+    Glb,
+}
+
+impl Format {
+    /// Every format with its name on the command line and the file endings that stand for it.
+    pub const ALL: [(Self, &'static str, &'static [&'static str]); 10] = [
+        (Self::Json, "json", &[".json"]),
+        (Self::JsonLines, "jsonl", &[".jsonl", ".ndjson"]),
+        (Self::Csv, "csv", &[".csv"]),
+        (Self::Parquet, "parquet", &[".parquet"]),
+        (Self::IsaacGrasp, "isaac_grasp", &[".isaac_grasp.yaml", ".isaac_grasp.yml"]),
+        (Self::GraspGen, "graspgen", &[".graspgen.json"]),
+        (Self::MoveIt, "moveit", &[".moveit.yaml", ".moveit.yml"]),
+        (Self::GraspNet, "graspnet", &[".npz"]),
+        (Self::Acronym, "acronym", &[".h5", ".hdf5"]),
+        (Self::Glb, "glb", &[".glb"]),
+    ];
+
+    /// The format of this name.
+    ///
+    /// # Errors
+    /// When there is none; the message lists them.
+    pub fn parse(place: &str, name: &str) -> Result<Self> {
+        let wanted = name.to_ascii_lowercase().replace('-', "_");
+        Self::ALL.iter().find(|known| known.1 == wanted).map(|known| known.0).ok_or_else(|| {
+            let names = Self::ALL.map(|known| known.1).join(", ");
+            Error::input(place, format!("'{name}' is not a format"), format!("use one of: {names}"))
+        })
+    }
+
+    /// The format that the ending of a file name stands for; the longest ending wins.
+    ///
+    /// # Errors
+    /// When none does, or the ending is used by several formats.
+    pub fn from_path(path: &Path) -> Result<Self> {
+        let name = path.file_name().map(|name| name.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+        let place = path.display().to_string();
+        if [".yaml", ".yml"].iter().any(|ending| name.ends_with(ending)) && !Self::ALL.iter().any(|known| known.2.iter().any(|ending| name.ends_with(ending))) {
+            return Err(Error::input(place, "YAML is used by isaac_grasp and by moveit", "add --format isaac_grasp or --format moveit"));
+        }
+        let endings = Self::ALL.iter().flat_map(|known| known.2.iter().map(move |ending| (known.0, *ending)));
+        endings.filter(|(_, ending)| name.ends_with(ending)).max_by_key(|(_, ending)| ending.len()).map(|known| known.0).ok_or_else(|| {
+            let names = Self::ALL.map(|known| known.1).join(", ");
+            Error::input(place, "the file's ending names no format", format!("add --format, one of: {names}"))
+        })
+    }
+
+    /// Tool axes that readers of this format expect.
+    pub fn convention(self) -> Convention {
+        match self {
+            Self::GraspGen | Self::Acronym => Convention::GraspGen,
+            Self::GraspNet => Convention::GraspNet,
+            Self::MoveIt => Convention::MoveIt,
+            _ => Convention::Standard,
+        }
+    }
+}
+
+/// How to export.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// Axes of the tool frame; the format's own when absent.
+    pub convention: Option<Convention>,
+    /// Origin of the tool frame.
+    pub origin: Origin,
+    /// Writes only this many, best first.
+    pub top: Option<usize>,
+    /// Distance of the opened pads [m]; the gripper's largest when absent.
+    pub opening: Option<f64>,
+    /// Joints of the gripper as functions of the pads' distance.
+    pub joints: Vec<Joint>,
+    /// Pad friction for formats that hold pass or fail; the gripper's when absent.
+    pub pad_friction: Option<f64>,
+    /// Straight way of the approach and the retreat [m].
+    pub approach: f64,
+    /// Name of the part frame (moveit, isaac_grasp).
+    pub part_frame: String,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            convention: None,
+            origin: Origin::Pads,
+            top: None,
+            opening: None,
+            joints: vec![Joint::default()],
+            pad_friction: None,
+            approach: 0.1,
+            part_frame: "part".into(),
+        }
+    }
+}
+
+/// A set with what an exporter asks of it.
+struct View<'a> {
+    set: &'a GripSet,
+    gripper: Option<Gripper>,
+    options: &'a Options,
+    grip_from_tool: Frame,
+    convention: Convention,
+}
+
+impl<'a> View<'a> {
+    fn new(set: &'a GripSet, format: Format, options: &'a Options) -> Result<Self> {
+        let convention = options.convention.unwrap_or_else(|| format.convention());
+        let gripper = serde_json::from_value::<Gripper>(set.gripper.clone());
+        let grip_from_tool = tool::grip_from_tool(convention, options.origin, gripper.as_ref().ok())?;
+        // What the format cannot do without.
+        if matches!(format, Format::GraspNet | Format::Glb)
+            && let Err(error) = &gripper
+        {
+            return Err(Error::input("gripper in the result file", format!("cannot be read: {error}"), "write the result anew with `gripfast plan`"));
+        }
+        Ok(Self { set, gripper: gripper.ok(), options, grip_from_tool, convention })
+    }
+
+    fn grips(&self) -> &'a [RankedGrip] {
+        let grips = &self.set.grips;
+        &grips[..self.options.top.unwrap_or(grips.len()).min(grips.len())]
+    }
+
+    /// The tool frame in the part frame.
+    fn pose(&self, grip: &RankedGrip) -> Frame {
+        grip.grip.part_from_grip.compose(&self.grip_from_tool)
+    }
+
+    /// Distance of the opened pads [m], never less than the grip's own.
+    fn opening(&self, grip: &RankedGrip) -> f64 {
+        let stroke = || self.gripper.as_ref().map(|gripper| gripper.stroke[1]);
+        self.options.opening.or_else(stroke).unwrap_or(grip.grip.width).max(grip.grip.width)
+    }
+
+    /// Whether the pads' friction holds the worst load; without a known friction, whether any would.
+    fn holds(&self, grip: &RankedGrip) -> bool {
+        let friction = self.options.pad_friction.or_else(|| self.gripper.as_ref().and_then(|gripper| gripper.pad_friction));
+        grip.worst.mu_s.is_some_and(|mu_s| friction.is_none_or(|friction| mu_s <= friction))
+    }
+
+    /// The tool frame in words.
+    fn tool_frame(&self) -> String {
+        format!("{}, origin {}", self.convention.axes(), self.options.origin)
+    }
+}
+
+/// A quality in (0, 1] that falls with `mu_s`: 1 when no friction is needed, 1/2 at `mu_s = 1`, 0 when no friction holds.
+fn quality(grip: &RankedGrip) -> f64 {
+    grip.worst.mu_s.map_or(0.0, |mu_s| 1.0 / (1.0 + mu_s))
+}
+
+/// Rows of the homogeneous matrix of a frame.
+fn matrix(frame: &Frame) -> [[f64; 4]; 4] {
+    let r = frame.rotation.transpose();
+    let t = frame.origin;
+    [[r.x_axis.x, r.x_axis.y, r.x_axis.z, t.x], [r.y_axis.x, r.y_axis.y, r.y_axis.z, t.y], [r.z_axis.x, r.z_axis.y, r.z_axis.z, t.z], [0.0, 0.0, 0.0, 1.0]]
+}
+
+/// Writes `set` to `path`, whole or not at all. `part` is the part's mesh, which only [`Format::Glb`] draws.
+///
+/// # Errors
+/// When the format is not built in, needs something that the set lacks (a gripper that can be read, its flange), or the file cannot
+/// be written.
+pub fn write(set: &GripSet, format: Format, path: &Path, options: &Options, part: Option<&Mesh>) -> Result<()> {
+    check(format)?;
+    let view = View::new(set, format, options)?;
+    crate::file::write(path, |writer| write_view(&view, format, writer, part))
+}
+
+/// Writes `set` to a writer; see [`write`].
+///
+/// # Errors
+/// As [`write`].
+pub fn write_to(set: &GripSet, format: Format, writer: &mut (impl Write + Send), options: &Options, part: Option<&Mesh>) -> Result<()> {
+    check(format)?;
+    let view = View::new(set, format, options)?;
+    write_view(&view, format, writer, part).map_err(|error| Error::io(Path::new("standard output"), "write", error))
+}
+
+/// Refuses a format that this build lacks before anything is written.
+fn check(format: Format) -> Result<()> {
+    match format {
+        Format::Parquet if !cfg!(feature = "parquet") => Err(Error::input(
+            "--format parquet",
+            "this build has no Parquet",
+            "use a released binary or build with `cargo build --release --features parquet`; csv holds the same columns",
+        )),
+        Format::Acronym if !cfg!(feature = "hdf5") => Err(Error::input(
+            "--format acronym",
+            "this build has no HDF5",
+            "use a released binary or build with `cargo build --release --features hdf5`; graspgen holds the same poses as JSON",
+        )),
+        _ => Ok(()),
+    }
+}
+
+fn write_view(view: &View<'_>, format: Format, writer: &mut (impl Write + Send), part: Option<&Mesh>) -> std::io::Result<()> {
+    match format {
+        Format::Json | Format::JsonLines => {
+            let set = GripSet { grips: view.grips().to_vec(), ..view.set.clone() };
+            if format == Format::Json { set.write_json(writer) } else { set.write_json_lines(writer) }
+        }
+        Format::Csv => table::write_csv(&table::from_view(view), writer),
+        Format::Parquet => parquet::write(view, writer),
+        Format::IsaacGrasp => isaac::write(view, writer),
+        Format::GraspGen => graspgen::write(view, writer),
+        Format::MoveIt => moveit::write(view, writer),
+        Format::GraspNet => graspnet::write(view, writer),
+        Format::Acronym => acronym::write(view, writer),
+        Format::Glb => glb::write(view, writer, part),
+    }
+}

@@ -1,0 +1,126 @@
+//! `gripfast export`: a result file in the format of another program.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args as ClapArgs;
+use gripfast::export::{self, Convention, Format, Joint, Options, Origin};
+use gripfast::part::{Part, ReadOptions, Unit};
+use gripfast::results::GripSet;
+use gripfast::units::Quantity;
+
+/// Grippers drawn into a GLB when `--top` is not given: more hide the part.
+const GLB_TOP: usize = 10;
+
+/// Writes a result file in the format of another program.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "EXAMPLES:\n  gripfast export grips.json -o grips.csv\n  gripfast export grips.json -o grips.npz --top 1000\n  \
+gripfast export grips.json --format isaac_grasp -o grips.yaml --joint panda_finger_joint1:0.5 --origin 103.4mm\n  \
+gripfast export grips.json --format moveit -o - --origin flange\n\nFORMATS (docs/formats.md describes each field):\n  \
+json, jsonl   native          csv, parquet  a table\n  isaac_grasp   YAML            graspgen      JSON\n  moveit        YAML            graspnet      .npz\n  acronym       HDF5            glb           part with grippers, to look at")]
+pub(crate) struct Args {
+    /// Result file written by `gripfast plan -o`, JSON or JSON Lines.
+    grips: PathBuf,
+    /// Format; by the ending of -o when not given.
+    #[arg(long, value_name = "NAME")]
+    format: Option<String>,
+    /// File to write; `-` is standard output.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Axes of the tool frame: standard, moveit (z approach, y closing), graspgen (z, x), graspnet, dexnet (x, y).
+    /// The format's own when not given.
+    #[arg(long, value_name = "NAME")]
+    convention: Option<String>,
+    /// Origin of the tool frame: pads (midway between them), flange, or a distance behind the pads.
+    #[arg(long, value_name = "ORIGIN", default_value = "pads")]
+    origin: String,
+    /// Write only the best N (glb: 10 when not given).
+    #[arg(long, value_name = "N")]
+    top: Option<usize>,
+    /// Distance of the pads before closing; the gripper's largest when not given.
+    #[arg(long, value_name = "LENGTH")]
+    opening: Option<String>,
+    /// A joint of the gripper as NAME:SCALE:OFFSET, position = SCALE x distance of the pads in metres + OFFSET
+    /// (isaac_grasp, moveit). Give it once for each joint.
+    #[arg(long, value_name = "JOINT", allow_hyphen_values = true)]
+    joint: Vec<String>,
+    /// Friction of the pads on the part, for formats that hold pass or fail; the gripper's when not given.
+    #[arg(long, value_name = "MU")]
+    pad_friction: Option<f64>,
+    /// Straight way of approach and retreat (moveit).
+    #[arg(long, value_name = "LENGTH", default_value = "100mm")]
+    approach: String,
+    /// Name of the part's frame (isaac_grasp, moveit).
+    #[arg(long, value_name = "NAME", default_value = "part")]
+    part_frame: String,
+    /// The part's mesh (glb); the file named in the result when not given.
+    #[arg(long, value_name = "FILE")]
+    part: Option<PathBuf>,
+}
+
+/// Runs the subcommand.
+pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let to_stdout = args.output.as_os_str() == "-";
+    let format = match &args.format {
+        Some(name) => Format::parse("--format", name)?,
+        None if to_stdout => anyhow::bail!(gripfast::error::Error::input("-o -", "standard output has no ending that names a format", "add --format")),
+        None => Format::from_path(&args.output)?,
+    };
+    let length = |place: &str, text: &str| -> anyhow::Result<f64> {
+        let value = Quantity::Length.parse(place, text)?;
+        if value < 0.0 {
+            anyhow::bail!(gripfast::error::Error::input(place, format!("'{text}' is negative"), "give a length of zero or more"));
+        }
+        Ok(value)
+    };
+    if let Some(friction) = args.pad_friction
+        && !(friction.is_finite() && friction >= 0.0)
+    {
+        anyhow::bail!(gripfast::error::Error::input("--pad-friction", format!("{friction} is no friction coefficient"), "give a number of zero or more"));
+    }
+    let joints = args.joint.iter().map(|text| Joint::parse("--joint", text)).collect::<Result<Vec<_>, _>>()?;
+    let options = Options {
+        convention: args.convention.as_deref().map(|name| Convention::parse("--convention", name)).transpose()?,
+        origin: Origin::parse("--origin", &args.origin)?,
+        top: args.top.or((format == Format::Glb).then_some(GLB_TOP)),
+        opening: args.opening.as_deref().map(|text| length("--opening", text)).transpose()?,
+        joints: if joints.is_empty() { vec![Joint::default()] } else { joints },
+        pad_friction: args.pad_friction,
+        approach: length("--approach", &args.approach)?,
+        part_frame: args.part_frame,
+    };
+    let set = GripSet::read(&args.grips)?;
+    let part = if format == Format::Glb { Some(read_part(&set, &args.grips, args.part.as_deref())?) } else { None };
+    let mesh = part.as_ref().map(|part| &part.mesh);
+    if to_stdout {
+        let mut output = std::io::stdout();
+        export::write_to(&set, format, &mut output, &options, mesh)?;
+        output.flush()?;
+    } else {
+        export::write(&set, format, &args.output, &options, mesh)?;
+        let count = options.top.unwrap_or(usize::MAX).min(set.grips.len());
+        eprintln!("{}: {count} grips", args.output.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The part of a result: the file given, or the one named in it, from the working folder or beside the result file.
+pub(crate) fn read_part(set: &GripSet, result: &Path, given: Option<&Path>) -> anyhow::Result<Part> {
+    let named = Path::new(&set.part.file);
+    let beside = result.parent().map(|folder| folder.join(named));
+    let path = match given {
+        Some(path) => path.to_path_buf(),
+        None if named.exists() => named.to_path_buf(),
+        None => match beside.filter(|path| path.exists()) {
+            Some(path) => path,
+            None => anyhow::bail!(gripfast::error::Error::input(
+                result.display().to_string(),
+                format!("the part '{}' that it names is not there", set.part.file),
+                "give its place with --part FILE",
+            )),
+        },
+    };
+    let unit = Unit::ALL.into_iter().find(|unit| (unit.metres() / set.part.unit_m - 1.0).abs() < 1e-9);
+    Ok(Part::read(&path, &ReadOptions { unit })?)
+}

@@ -1,0 +1,57 @@
+//! GraspGen's grasp dataset JSON (its `GRASP_DATASET_FORMAT` page), with width and friction beside the poses.
+
+use std::io::Write;
+
+use serde::Serialize;
+
+use super::{View, matrix};
+
+#[derive(Serialize)]
+struct File<'a> {
+    object: Object<'a>,
+    grasps: Grasps,
+    gripfast: Notes<'a>,
+}
+
+#[derive(Serialize)]
+struct Object<'a> {
+    file: &'a str,
+    scale: f64,
+}
+
+#[derive(Serialize)]
+struct Grasps {
+    transforms: Vec<[[f64; 4]; 4]>,
+    object_in_gripper: Vec<bool>,
+    width: Vec<f64>,
+    min_friction: Vec<Option<f64>>,
+    id: Vec<u64>,
+}
+
+#[derive(Serialize)]
+struct Notes<'a> {
+    tool_frame: String,
+    gripper: Option<&'a str>,
+    version: &'a str,
+}
+
+pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result<()> {
+    let grips = view.grips();
+    let file = File {
+        object: Object { file: &view.set.part.file, scale: view.set.part.unit_m },
+        grasps: Grasps {
+            transforms: grips.iter().map(|grip| matrix(&view.pose(grip))).collect(),
+            object_in_gripper: grips.iter().map(|grip| view.holds(grip)).collect(),
+            width: grips.iter().map(|grip| grip.grip.width).collect(),
+            min_friction: grips.iter().map(|grip| grip.worst.mu_s).collect(),
+            id: grips.iter().map(|grip| grip.grip.id).collect(),
+        },
+        gripfast: Notes {
+            tool_frame: view.tool_frame(),
+            gripper: view.gripper.as_ref().map(|gripper| gripper.name.as_str()),
+            version: &view.set.provenance.gripfast,
+        },
+    };
+    serde_json::to_writer(&mut *writer, &file)?;
+    writer.write_all(b"\n")
+}

@@ -1,0 +1,139 @@
+//! One row per grip: the columns that CSV and Parquet share.
+
+use std::io::Write;
+
+use glam::{DQuat, DVec3};
+
+use super::{Format, Options, View};
+use crate::error::Result;
+use crate::geometry::patch_area;
+use crate::model::Slip;
+use crate::results::{GripSet, RankedGrip};
+
+/// A column with its name, which ends in the unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Name, e.g. `width_m`.
+    pub name: &'static str,
+    /// One value per grip.
+    pub values: Values,
+}
+
+/// The values of a column; `None` where there is none.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// Whole numbers.
+    Integer(Vec<u64>),
+    /// Numbers, never nan or infinite.
+    Number(Vec<Option<f64>>),
+    /// Words.
+    Text(Vec<String>),
+}
+
+/// Columns of equal length.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// In the order in which they are written.
+    pub columns: Vec<Column>,
+    /// Number of grips.
+    pub rows: usize,
+}
+
+/// The table of a set.
+///
+/// # Errors
+/// When the tool frame's origin is the flange and the gripper states none.
+pub fn table(set: &GripSet, options: &Options) -> Result<Table> {
+    Ok(from_view(&View::new(set, Format::Csv, options)?))
+}
+
+pub(super) fn from_view(view: &View<'_>) -> Table {
+    let grips = view.grips();
+    let integer = |name, value: &dyn Fn(&RankedGrip) -> u64| Column { name, values: Values::Integer(grips.iter().map(value).collect()) };
+    let text = |name, value: &dyn Fn(&RankedGrip) -> String| Column { name, values: Values::Text(grips.iter().map(value).collect()) };
+    let number = |name, value: &dyn Fn(&RankedGrip) -> Option<f64>| Column {
+        name,
+        values: Values::Number(grips.iter().map(|grip| value(grip).filter(|value| value.is_finite())).collect()),
+    };
+    let vector = |names: [&'static str; 3], value: &dyn Fn(&RankedGrip) -> DVec3| {
+        names.into_iter().enumerate().map(move |(axis, name)| number(name, &|grip| Some(value(grip)[axis]))).collect::<Vec<_>>()
+    };
+    let quaternion = |grip: &RankedGrip| positive(DQuat::from_mat3(&view.pose(grip).rotation)).to_array();
+
+    let mut columns = vec![
+        integer("rank", &|grip| grip.rank),
+        integer("id", &|grip| grip.grip.id),
+        number("score", &|grip| grip.score),
+        number("mu_s", &|grip| grip.worst.mu_s),
+        text("status", &|grip| word(&grip.worst.status)),
+        integer("load", &|grip| u64::from(grip.worst.load)),
+        text("load_name", &|grip| view.set.loads.get(grip.worst.load as usize).map(|load| load.name.clone()).unwrap_or_default()),
+        number("width_m", &|grip| Some(grip.grip.width)),
+    ];
+    columns.extend(vector(["x_m", "y_m", "z_m"], &|grip| view.pose(grip).origin));
+    columns.extend(["qx", "qy", "qz", "qw"].into_iter().enumerate().map(|(index, name)| number(name, &|grip| Some(quaternion(grip)[index]))));
+    columns.extend(vector(["approach_x", "approach_y", "approach_z"], &|grip| grip.grip.part_from_grip.rotation.x_axis));
+    columns.extend(vector(["closing_x", "closing_y", "closing_z"], &|grip| grip.grip.part_from_grip.rotation.z_axis));
+    columns.extend([
+        text("tool_frame", &|_| view.tool_frame()),
+        integer("face_i", &|grip| u64::from(grip.grip.face_i)),
+        integer("face_ii", &|grip| u64::from(grip.grip.face_ii)),
+        number("angle_rad", &|grip| Some(grip.grip.angle)),
+        number("area_i_m2", &|grip| Some(patch_area(&grip.grip.contact.face_i))),
+        number("area_ii_m2", &|grip| Some(patch_area(&grip.grip.contact.face_ii))),
+        number("contact_share", &|grip| Some(grip.contact_share)),
+        number("twist_margin", &|grip| Some(grip.twist_margin)),
+        number("alpha_rad", &|grip| Some(grip.alpha)),
+        number("delta_d_m", &|grip| Some(grip.delta_d)),
+        number("safety", &|grip| grip.safety),
+        number("force_needed_n", &|grip| grip.force_needed),
+        text("slip", &|grip| match grip.worst.slip {
+            Some(Slip::Rotation { .. }) => "rotation".into(),
+            Some(Slip::Translation { .. }) => "translation".into(),
+            Some(Slip::None) => "none".into(),
+            None => String::new(),
+        }),
+        number("slip_c1_m", &|grip| slip_centre(grip).map(|c| c[0])),
+        number("slip_c2_m", &|grip| slip_centre(grip).map(|c| c[1])),
+    ]);
+    columns.extend(vector(["force_1_n", "force_2_n", "force_3_n"], &|grip| grip.worst.wrench.force));
+    columns.extend(vector(["moment_1_nm", "moment_2_nm", "moment_3_nm"], &|grip| grip.worst.wrench.moment));
+    columns.extend([
+        number("mu_lower", &|grip| grip.worst.bounds.map(|bounds| bounds.lower)),
+        number("mu_upper", &|grip| grip.worst.bounds.map(|bounds| bounds.upper)),
+        number("residual", &|grip| Some(grip.worst.residual)),
+    ]);
+    Table { columns, rows: grips.len() }
+}
+
+/// The quaternion with a scalar part that is not negative: one of the two that mean the same rotation.
+pub(super) fn positive(quaternion: DQuat) -> DQuat {
+    let quaternion = quaternion.normalize();
+    if quaternion.w < 0.0 { -quaternion } else { quaternion }
+}
+
+fn slip_centre(grip: &RankedGrip) -> Option<[f64; 2]> {
+    match grip.worst.slip {
+        Some(Slip::Rotation { c, .. }) => Some(c),
+        _ => None,
+    }
+}
+
+/// A unit variant as the result file spells it.
+fn word(value: &impl serde::Serialize) -> String {
+    serde_json::to_value(value).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
+pub(super) fn write_csv(table: &Table, writer: &mut impl Write) -> std::io::Result<()> {
+    let mut csv = csv::Writer::from_writer(writer);
+    csv.write_record(table.columns.iter().map(|column| column.name))?;
+    for row in 0..table.rows {
+        csv.write_record(table.columns.iter().map(|column| match &column.values {
+            Values::Integer(values) => values[row].to_string(),
+            // The shortest text that reads back as the same number.
+            Values::Number(values) => values[row].map(|value| format!("{value:?}")).unwrap_or_default(),
+            Values::Text(values) => values[row].clone(),
+        }))?;
+    }
+    csv.flush()
+}

@@ -1,0 +1,202 @@
+//! The tool frame of a file: which axes it has, where its origin lies, and the joints that hold the opening.
+
+use std::fmt;
+
+use glam::{DMat3, DVec3};
+
+use crate::error::{Error, Result};
+use crate::gripper::Gripper;
+use crate::model::Frame;
+use crate::units::Quantity;
+
+/// Which tool axis approaches and which one closes; the third makes a right-handed frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Convention {
+    /// z approach, y closing.
+    Standard,
+    /// z approach, x closing (GraspGen, ACRONYM).
+    GraspGen,
+    /// x approach, y closing (GraspNet).
+    GraspNet,
+    /// x approach, y closing (Dex-Net).
+    DexNet,
+    /// z approach, y closing (MoveIt).
+    MoveIt,
+}
+
+impl Convention {
+    /// Every convention with its name.
+    pub const ALL: [(Self, &'static str); 5] =
+        [(Self::Standard, "standard"), (Self::GraspGen, "graspgen"), (Self::GraspNet, "graspnet"), (Self::DexNet, "dexnet"), (Self::MoveIt, "moveit")];
+
+    /// The convention of this name.
+    ///
+    /// # Errors
+    /// When there is none; the message lists them.
+    pub fn parse(place: &str, name: &str) -> Result<Self> {
+        Self::ALL.iter().find(|known| known.1.eq_ignore_ascii_case(name)).map(|known| known.0).ok_or_else(|| {
+            let names = Self::ALL.map(|(convention, name)| format!("{name} ({})", convention.axes())).join(", ");
+            Error::input(place, format!("'{name}' is not a convention"), format!("use one of: {names}"))
+        })
+    }
+
+    /// The axes in words.
+    pub fn axes(self) -> &'static str {
+        match self {
+            Self::Standard | Self::MoveIt => "z approach, y closing",
+            Self::GraspGen => "z approach, x closing",
+            Self::GraspNet | Self::DexNet => "x approach, y closing",
+        }
+    }
+
+    /// Tool axes in the grip frame (x1 approach, x3 closing), as columns.
+    pub fn rotation(self) -> DMat3 {
+        let (approach, closing) = (DVec3::X, DVec3::Z);
+        match self {
+            Self::Standard | Self::MoveIt => DMat3::from_cols(closing.cross(approach), closing, approach),
+            Self::GraspGen => DMat3::from_cols(closing, approach.cross(closing), approach),
+            Self::GraspNet | Self::DexNet => DMat3::from_cols(approach, closing, approach.cross(closing)),
+        }
+    }
+}
+
+/// Where the tool frame's origin lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Origin {
+    /// Midway between the pads, at the grip frame's origin.
+    Pads,
+    /// At the gripper's flange, as its file states it.
+    Flange,
+    /// This far behind the pads, against the approach [m].
+    Behind(f64),
+}
+
+impl Origin {
+    /// Parses `pads`, `flange` or a length.
+    ///
+    /// # Errors
+    /// When the text is none of these.
+    pub fn parse(place: &str, text: &str) -> Result<Self> {
+        match text {
+            "pads" => Ok(Self::Pads),
+            "flange" => Ok(Self::Flange),
+            _ => match Quantity::Length.parse(place, text) {
+                Ok(distance) => Ok(Self::Behind(distance)),
+                Err(_) => Err(Error::input(place, format!("'{text}' is not an origin"), "use pads, flange, or a distance behind the pads, e.g. 103.4mm")),
+            },
+        }
+    }
+}
+
+impl fmt::Display for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Pads => f.write_str("midway between the pads"),
+            Self::Flange => f.write_str("at the flange"),
+            Self::Behind(distance) => write!(f, "{} mm behind the pads", distance * 1e3),
+        }
+    }
+}
+
+/// A joint of the gripper: `position = scale * width + offset`, width the distance of the pads [m].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Joint {
+    /// Its name in the robot model.
+    pub name: String,
+    /// Joint units per metre.
+    pub scale: f64,
+    /// Joint units.
+    pub offset: f64,
+}
+
+impl Default for Joint {
+    /// A joint called `width` that is the distance of the pads.
+    fn default() -> Self {
+        Self { name: "width".into(), scale: 1.0, offset: 0.0 }
+    }
+}
+
+impl Joint {
+    /// Parses `NAME`, `NAME:SCALE` or `NAME:SCALE:OFFSET`.
+    ///
+    /// # Errors
+    /// When the name is empty, or scale or offset is not a finite number.
+    pub fn parse(place: &str, text: &str) -> Result<Self> {
+        let wrong = |problem: String| Error::input(place, problem, "write NAME:SCALE:OFFSET, e.g. panda_finger_joint1:0.5 or finger_joint:-9.41:0.8");
+        let mut pieces = text.split(':');
+        let name = pieces.next().unwrap_or_default().trim().to_owned();
+        let mut number = |default: f64| match pieces.next() {
+            None => Ok(default),
+            Some(piece) => {
+                piece.trim().parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| wrong(format!("'{text}': '{piece}' is not a number")))
+            }
+        };
+        let (scale, offset) = (number(1.0)?, number(0.0)?);
+        if name.is_empty() || pieces.next().is_some() {
+            return Err(wrong(format!("'{text}' is not a joint")));
+        }
+        Ok(Self { name, scale, offset })
+    }
+
+    /// Position at this distance of the pads [m].
+    pub fn position(&self, width: f64) -> f64 {
+        self.scale * width + self.offset
+    }
+}
+
+/// The tool frame in the grip frame.
+///
+/// # Errors
+/// When the flange is asked for and the gripper states none.
+pub(super) fn grip_from_tool(convention: Convention, origin: Origin, gripper: Option<&Gripper>) -> Result<Frame> {
+    let origin = match origin {
+        Origin::Pads => DVec3::ZERO,
+        Origin::Behind(distance) => DVec3::X * -distance,
+        Origin::Flange => match gripper.and_then(|gripper| gripper.grip_from_flange) {
+            Some(flange) => flange.origin,
+            None => {
+                return Err(Error::input(
+                    "--origin flange",
+                    "the gripper of this result states no flange",
+                    "add [flange] to the gripper file and plan anew, or give the distance behind the pads, e.g. --origin 103.4mm",
+                ));
+            }
+        },
+    };
+    Ok(Frame { rotation: convention.rotation(), origin })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_convention_is_right_handed_with_its_axes_where_it_says() {
+        for (convention, name) in Convention::ALL {
+            let rotation = convention.rotation();
+            assert!((rotation.determinant() - 1.0).abs() < 1e-15, "{name}");
+            let axis = |letter: &str| match letter {
+                "x" => rotation.x_axis,
+                "y" => rotation.y_axis,
+                _ => rotation.z_axis,
+            };
+            let words: Vec<&str> = convention.axes().split([' ', ',']).collect();
+            assert_eq!((words[1], words[4]), ("approach", "closing"));
+            assert_eq!((axis(words[0]), axis(words[3])), (DVec3::X, DVec3::Z), "{name}");
+            assert_eq!(Convention::parse("--convention", name).unwrap(), convention);
+        }
+        assert!(Convention::parse("--convention", "other").unwrap_err().to_string().contains("graspgen (z approach, x closing)"));
+    }
+
+    #[test]
+    fn origins_and_joints_from_text() {
+        assert_eq!(Origin::parse("--origin", "103.4mm").unwrap(), Origin::Behind(0.1034));
+        assert!(Origin::parse("--origin", "103.4").is_err());
+        let joint = Joint::parse("--joint", "finger_joint:-9.41:0.8").unwrap();
+        assert!((joint.position(0.085) - 0.00015).abs() < 1e-12);
+        assert_eq!(Joint::parse("--joint", "a:0.5").unwrap(), Joint { name: "a".into(), scale: 0.5, offset: 0.0 });
+        for bad in ["", ":1", "a:x", "a:1:2:3", "a:nan"] {
+            assert!(Joint::parse("--joint", bad).is_err(), "{bad}");
+        }
+    }
+}
