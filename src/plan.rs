@@ -2,13 +2,20 @@
 //!
 //! Candidates flow through in chunks: proposed, scored under every load, measured; only the best [`Settings::keep`] stay.
 
+use std::collections::BTreeMap;
+
+use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::backend::{Backend, Batch, Problem, ScoreOptions, Scored, SeedSet};
+use crate::error::Result;
+use crate::geometry::patch_area;
 use crate::load::wrench_in_grip;
-use crate::mechanics::{Options, Pads, Refiner, Separation, inverse, refused, solve_pads, twist_out};
-use crate::model::{Grip, Score, Status};
+use crate::mechanics::twist_out::{self, TwistOut};
+use crate::mechanics::{Options, Pads, inverse, refused};
+use crate::model::{Grip, Patch, Status, Wrench};
 use crate::part::MassProperties;
-use crate::rank::{self, Weights};
+use crate::rank::{self, Ranking, Weights};
 use crate::results::{LoadCase, LoadScore, RankedGrip};
 
 /// What decides the answer, beside part, gripper and loads.
@@ -22,29 +29,10 @@ pub struct Settings {
     pub delta: f64,
     /// Pad friction while closing, for alpha.
     pub mu_c: f64,
-    /// Pad friction for safety and the force needed; `None`: the gripper's, if it states one.
+    /// Pad friction, for safety and the force needed.
     pub pad_friction: Option<f64>,
-    /// What to do with grips that separate.
-    pub separation: Separation,
-    /// Minimiser that polishes the final answers.
-    pub refiner: Refiner,
-    /// Whether to keep `mu_s` of every load.
-    pub all_loads: bool,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            force: 50.0,
-            weights: Weights::default(),
-            delta: 0.0,
-            mu_c: 0.0,
-            pad_friction: None,
-            separation: Separation::Solve,
-            refiner: Refiner::Newton,
-            all_loads: false,
-        }
-    }
+    /// How loads are solved.
+    pub score: ScoreOptions,
 }
 
 /// Scores grips of one part under one set of loads.
@@ -56,47 +44,52 @@ pub struct Assessor<'a> {
     pub mass: MassProperties,
     /// Settings.
     pub settings: &'a Settings,
+    /// Where the seeds are computed.
+    pub backend: &'a Backend,
+    /// The twists tried.
+    pub seeds: &'a SeedSet,
 }
 
+/// Loads of one call of the backend: bounds the memory whatever the number of grips and loads.
+const LOADS_AT_ONCE: usize = 1 << 20;
+
 impl Assessor<'_> {
-    /// Scores every grip under its worst load, in order. The answers do not depend on the number of threads.
-    pub fn assess(&self, grips: Vec<Grip>) -> Vec<RankedGrip> {
-        grips.into_par_iter().map(|grip| self.assess_one(grip)).collect()
+    /// Scores every grip under its worst load, in order. The answers depend neither on the number of threads nor on the
+    /// backend.
+    ///
+    /// # Errors
+    /// As [`Backend::score`].
+    pub fn assess(&self, grips: Vec<Grip>) -> Result<Vec<RankedGrip>> {
+        let mut ranked = Vec::with_capacity(grips.len());
+        let mut grips = grips.into_iter().peekable();
+        while grips.peek().is_some() {
+            let block: Vec<Grip> = grips.by_ref().take((LOADS_AT_ONCE / self.loads.len().max(1)).max(1)).collect();
+            ranked.extend(self.assess_block(block)?);
+        }
+        Ok(ranked)
     }
 
-    fn assess_one(&self, grip: Grip) -> RankedGrip {
-        let options = Options { separation: self.settings.separation, refiner: self.settings.refiner, ..Options::default() };
-        let pads = Pads::new(&grip.contact);
-        let scores: Vec<(crate::model::Wrench, Score)> = self
-            .loads
-            .iter()
-            .map(|load| {
-                let wrench = wrench_in_grip(&load.wrench, self.mass.centre_of_mass, &grip.part_from_grip);
-                let score = match &pads {
-                    Some(pads) => solve_pads(pads, grip.width, self.settings.force, &wrench, &options),
-                    None => refused(Status::NoContact, 0),
-                };
-                (wrench, score)
-            })
-            .collect();
-        let worst = worst(scores.iter().map(|(_, score)| score));
-        let (wrench, score) = scores[worst];
-        let mu_by_load = if self.settings.all_loads { scores.iter().map(|(_, score)| score.mu_s).collect() } else { Vec::new() };
-        self.measure(grip, worst as u32, wrench, &score, pads.as_ref(), mu_by_load)
+    fn assess_block(&self, grips: Vec<Grip>) -> Result<Vec<RankedGrip>> {
+        let in_grip = |grip: &Grip| -> Vec<Wrench> {
+            self.loads.iter().map(|load| wrench_in_grip(&load.wrench, self.mass.centre_of_mass, &grip.part_from_grip)).collect()
+        };
+        let wrenches: Vec<Vec<Wrench>> = grips.par_iter().map(in_grip).collect();
+        let problems = grips.iter().zip(&wrenches);
+        let problems = problems.map(|(grip, wrenches)| Problem { contact: &grip.contact, distance: grip.width, force: self.settings.force, wrenches });
+        let batch = Batch { problems: problems.collect() };
+        let scored = self.backend.score(&batch, self.seeds, &self.settings.score)?;
+        let jobs = grips.into_par_iter().zip(wrenches.par_iter()).zip(scored);
+        Ok(jobs.map(|((grip, wrenches), scored)| self.measure(grip, wrenches, &scored)).collect())
     }
 
-    /// The rest of a grip's numbers from its worst load.
-    fn measure(&self, grip: Grip, load: u32, wrench: crate::model::Wrench, score: &Score, pads: Option<&Pads>, mu_by_load: Vec<Option<f64>>) -> RankedGrip {
-        let lever = twist_out::TwistOut::new(&grip.contact);
+    /// A grip's numbers from its worst load; the gripping force needed is left to [`Assessor::finish`].
+    fn measure(&self, grip: Grip, wrenches: &[Wrench], scored: &Scored) -> RankedGrip {
+        let (load, score) = scored.worst.unwrap_or((0, refused(Status::NoContact, 0)));
+        let wrench = wrenches.get(load).copied().unwrap_or_default();
+        let lever = TwistOut::new(&grip.contact);
         let least = lever.least_lever().map_or(0.0, |lever| lever.width);
-        let nominal = pads.map(|pads| [0, 1].map(|k| pads.moments[k][0] * pads.length * pads.length));
-        let contact_share = nominal.map_or(0.0, |[i, ii]| (score.contact_area_i / i).min(score.contact_area_ii / ii));
-        let friction = self.settings.pad_friction;
-        let options = Options { separation: self.settings.separation, ..Options::default() };
-        let force_needed = friction
-            .zip(pads)
-            .filter(|_| score.status.holds())
-            .and_then(|(friction, pads)| inverse::force_needed(pads, grip.width, &wrench, friction, &options));
+        let share = |left: f64, patch: &Patch| left / patch_area(patch);
+        let contact_share = share(score.contact_area_i, &grip.contact.face_i).min(share(score.contact_area_ii, &grip.contact.face_ii));
         RankedGrip {
             rank: 0,
             score: None,
@@ -104,10 +97,10 @@ impl Assessor<'_> {
             delta_d: twist_out::delta_d(grip.width, least),
             contact_share,
             twist_margin: lever.margin(self.settings.force, &wrench),
-            safety: friction.zip(score.mu_s).filter(|(_, mu)| *mu > 0.0).map(|(friction, mu)| friction / mu),
-            force_needed,
+            safety: self.settings.pad_friction.zip(score.mu_s).filter(|(_, mu)| *mu > 0.0).map(|(friction, mu)| friction / mu),
+            force_needed: None,
             worst: LoadScore {
-                load,
+                load: load as u32,
                 wrench,
                 status: score.status,
                 mu_s: score.mu_s,
@@ -116,26 +109,63 @@ impl Assessor<'_> {
                 bounds: score.bounds,
                 residual: score.residual,
             },
-            mu_by_load,
+            mu_by_load: scored.all.iter().map(|score| score.mu_s).collect(),
             grip,
         }
     }
+
+    /// Adds what only the grips of the final list need: the gripping force needed under the worst load.
+    pub fn finish(&self, grips: &mut [RankedGrip]) {
+        let Some(friction) = self.settings.pad_friction else { return };
+        let options = Options { separation: self.settings.score.separation, ..Options::default() };
+        grips.par_iter_mut().for_each(|ranked| {
+            let grip = &ranked.grip;
+            ranked.force_needed = Pads::new(&grip.contact).and_then(|pads| inverse::force_needed(&pads, grip.width, &ranked.worst.wrench, friction, &options));
+        });
+    }
 }
 
-/// Index of the worst score: one without a usable `mu_s` first, then the largest `mu_s`; scores within [`rank::TIE`] of
-/// each other count as equal and the first of them is taken.
-pub fn worst<'a>(scores: impl Iterator<Item = &'a Score>) -> usize {
-    let mut worst: Option<(usize, Option<f64>)> = None;
-    for (index, score) in scores.enumerate() {
-        let mu = score.mu_s.filter(|_| score.status.holds());
-        let worse = match (worst, mu) {
-            (None, _) | (Some((_, Some(_))), None) => true,
-            (Some((_, Some(known))), Some(mu)) => mu > known * (1.0 + rank::TIE),
-            (Some((_, None)), _) => false,
-        };
-        if worse {
-            worst = Some((index, mu));
+/// Collects scored grips chunk by chunk, keeping the best.
+#[derive(Debug, Default)]
+pub struct Collector {
+    kept: Vec<RankedGrip>,
+    ranked: u64,
+    rejections: BTreeMap<String, u64>,
+}
+
+impl Collector {
+    /// Takes a chunk; afterwards at most `2 keep` grips and the chunk are held.
+    pub fn add(&mut self, grips: Vec<RankedGrip>, keep: usize, weights: Weights) {
+        for mut grip in grips {
+            match grip.worst.mu_s.filter(|_| grip.worst.status.holds()) {
+                Some(mu) => {
+                    let score = weights.score(mu, grip.alpha);
+                    grip.score = score.is_finite().then_some(score);
+                    self.ranked += 1;
+                    self.kept.push(grip);
+                }
+                None => *self.rejections.entry(rank::status_name(grip.worst.status)).or_default() += 1,
+            }
+        }
+        if self.kept.len() > keep.saturating_mul(2) {
+            let value = |grip: &RankedGrip| grip.score.unwrap_or(f64::INFINITY);
+            self.kept.sort_by(|a, b| value(b).total_cmp(&value(a)).then(a.grip.id.cmp(&b.grip.id)));
+            self.kept.truncate(keep);
         }
     }
-    worst.map_or(0, |(index, _)| index)
+
+    /// Grips ranked so far.
+    pub fn ranked(&self) -> u64 {
+        self.ranked
+    }
+
+    /// The final order with counts; `size` is the diagonal of the part's bounding box [m].
+    pub fn finish(self, centre_of_mass: DVec3, size: f64, options: &rank::Options) -> Ranking {
+        let mut ranking = rank::rank(self.kept, centre_of_mass, size, options);
+        for (reason, count) in self.rejections {
+            *ranking.rejections.entry(reason).or_default() += count;
+        }
+        ranking.ranked = self.ranked;
+        ranking
+    }
 }

@@ -124,7 +124,7 @@ pub fn rank(grips: Vec<RankedGrip>, centre_of_mass: DVec3, size: f64, options: &
 }
 
 /// The status as the result file spells it.
-fn status_name(status: Status) -> String {
+pub fn status_name(status: Status) -> String {
     match serde_json::to_value(status) {
         Ok(serde_json::Value::String(name)) => name,
         _ => format!("{status:?}"),
@@ -185,6 +185,12 @@ fn merge(grips: Vec<(f64, RankedGrip)>, runs: &[usize], centre_of_mass: DVec3, m
         }
     }
     kept
+}
+
+/// At most `top` of the ranked `grips` that differ in place, approach and face pair, best first. `size`: diagonal of the part's
+/// bounding box [m].
+pub fn choose_diverse(grips: &[RankedGrip], top: usize, size: f64) -> Vec<&RankedGrip> {
+    grips.iter().zip(diverse(grips, top, size)).filter_map(|(grip, chosen)| chosen.then_some(grip)).collect()
 }
 
 /// Marks `top` grips of an ordered list that differ: each lies at least a distance from every one chosen before it, and the distance

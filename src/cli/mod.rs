@@ -2,12 +2,14 @@
 
 mod backend;
 mod bench;
+mod candidates;
 mod defaults;
 mod devices;
 mod export;
 mod figures;
 mod gripper;
 mod part;
+mod plan;
 mod score;
 mod shell;
 mod solve;
@@ -29,6 +31,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Plan(Box<plan::Args>),
     Part(part::Args),
     Solve(solve::Args),
     Score(score::Args),
@@ -46,6 +49,7 @@ pub(crate) fn main() -> ExitCode {
     let outcome =
         defaults::apply(&Cli::command(), std::env::args_os().collect(), Path::new(defaults::FILE)).and_then(|line| match Cli::parse_from(line).command {
             Command::Part(args) => part::run(args),
+            Command::Plan(args) => plan::run(*args),
             Command::Solve(args) => solve::run(args),
             Command::Score(args) => score::run(args),
             Command::Devices(args) => devices::run(args),

@@ -1,0 +1,131 @@
+//! Flags that say which grips to propose.
+
+use clap::Args;
+use glam::DVec3;
+use gripfast::error::{Error, Result};
+use gripfast::gripper::Gripper;
+use gripfast::propose::{Cone, Ground, ProposeOptions};
+use gripfast::units::Quantity;
+
+#[derive(Debug, Args)]
+pub(crate) struct CandidateArgs {
+    /// Step of the position grid [default: a fifth of the pad's shorter side].
+    #[arg(long)]
+    spacing: Option<String>,
+    /// Step of the approach angle.
+    #[arg(long, default_value = "15deg")]
+    angle_step: String,
+    /// Smallest contact area on either face, as a share of the pad's area.
+    #[arg(long, default_value_t = 0.25, value_name = "SHARE")]
+    min_contact: f64,
+    /// Largest distance of the grip from the centre of mass.
+    #[arg(long, value_name = "LENGTH")]
+    max_offset: Option<String>,
+    /// Only approaches within a cone, e.g. -z:45deg or 0/0/-1:45deg (part frame).
+    #[arg(long, value_name = "DIR:ANGLE", allow_hyphen_values = true)]
+    approach: Option<String>,
+    /// The gripper must stay above this plane, e.g. +z:0mm (normal and height, part frame).
+    #[arg(long, value_name = "DIR:HEIGHT", allow_hyphen_values = true)]
+    ground: Option<String>,
+    /// Box that the gripper must not enter: x,y,z:x,y,z with units, e.g. 0mm,0mm,0mm:10mm,20mm,5mm; may be repeated.
+    #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
+    keep_out: Vec<String>,
+    /// Only these planar faces, e.g. 0,1,4 (see `gripfast part`).
+    #[arg(long, value_delimiter = ',', value_name = "FACES")]
+    faces: Option<Vec<u32>>,
+    /// Also grips that open into a slot (needs a gripper with outer pads).
+    #[arg(long)]
+    inside: bool,
+    /// List each grip with exchanged jaws as well.
+    #[arg(long)]
+    flips: bool,
+    /// Way by which each jaw opens beyond contact for the approach.
+    #[arg(long, default_value = "5mm")]
+    opening: String,
+    /// Distance kept between gripper and part, but for the pads.
+    #[arg(long, default_value = "0mm")]
+    clearance: String,
+}
+
+impl CandidateArgs {
+    pub(crate) fn options(&self) -> Result<ProposeOptions> {
+        let length = |flag: &str, text: &str| Quantity::Length.parse(flag, text);
+        Ok(ProposeOptions {
+            spacing: self.spacing.as_deref().map(|text| length("--spacing", text)).transpose()?,
+            angle_step: Quantity::Angle.parse("--angle-step", &self.angle_step)?,
+            min_contact: self.min_contact,
+            max_offset: self.max_offset.as_deref().map(|text| length("--max-offset", text)).transpose()?,
+            approach_cone: self.approach.as_deref().map(cone).transpose()?,
+            ground: self.ground.as_deref().map(ground).transpose()?,
+            keep_out: self.keep_out.iter().map(|text| keep_out(text)).collect::<Result<_>>()?,
+            faces: self.faces.clone(),
+            inside: self.inside,
+            flips: self.flips,
+            opening: length("--opening", &self.opening)?,
+            clearance: length("--clearance", &self.clearance)?,
+            ..ProposeOptions::default()
+        })
+    }
+
+    /// Whether grips with exchanged jaws are listed.
+    pub(crate) fn flips(&self) -> bool {
+        self.flips
+    }
+
+    /// The settings that decide what is proposed, for the result file.
+    pub(crate) fn settings(options: &ProposeOptions, gripper: &Gripper) -> Vec<(&'static str, serde_json::Value)> {
+        vec![
+            ("spacing_m", options.spacing(gripper).into()),
+            ("angle_step_rad", options.angle_step.into()),
+            ("min_contact_share", options.min_contact.into()),
+            ("max_offset_m", options.max_offset.into()),
+            ("opening_m", options.opening.into()),
+            ("clearance_m", options.clearance.into()),
+            ("inside", options.inside.into()),
+            ("flips", options.flips.into()),
+        ]
+    }
+}
+
+/// `+x`, `-z`, ... or three numbers joined by slashes.
+pub(crate) fn direction(flag: &str, text: &str) -> Result<DVec3> {
+    let axis = |text: &str| match text {
+        "x" | "+x" => Some(DVec3::X),
+        "-x" => Some(-DVec3::X),
+        "y" | "+y" => Some(DVec3::Y),
+        "-y" => Some(-DVec3::Y),
+        "z" | "+z" => Some(DVec3::Z),
+        "-z" => Some(-DVec3::Z),
+        _ => None,
+    };
+    let numbers = || {
+        let numbers: Vec<f64> = text.split('/').map(str::parse).collect::<std::result::Result<_, _>>().ok()?;
+        let vector = DVec3::from_array(numbers.try_into().ok()?);
+        (vector.is_finite() && vector.length() > 0.0).then_some(vector)
+    };
+    axis(text).or_else(numbers).ok_or_else(|| Error::input(flag, format!("'{text}' is no direction"), "give +x, -z, ... or three numbers such as 0/0.5/-1"))
+}
+
+fn two<'a>(flag: &str, text: &'a str, shape: &str) -> Result<(&'a str, &'a str)> {
+    text.split_once(':').ok_or_else(|| Error::input(flag, format!("'{text}' has no colon"), format!("give {shape}")))
+}
+
+fn cone(text: &str) -> Result<Cone> {
+    let (axis, angle) = two("--approach", text, "DIR:ANGLE, e.g. -z:45deg")?;
+    Ok(Cone { axis: direction("--approach", axis)?, half_angle: Quantity::Angle.parse("--approach", angle)? })
+}
+
+fn ground(text: &str) -> Result<Ground> {
+    let (normal, height) = two("--ground", text, "DIR:HEIGHT, e.g. +z:0mm")?;
+    Ok(Ground { normal: direction("--ground", normal)?, offset: Quantity::Length.parse("--ground", height)? })
+}
+
+fn keep_out(text: &str) -> Result<[DVec3; 2]> {
+    let (low, high) = two("--keep-out", text, "LOW:HIGH, e.g. 0mm,0mm,0mm:10mm,20mm,5mm")?;
+    let corner = |text: &str| -> Result<DVec3> {
+        let values: Vec<f64> = text.split(',').map(|value| Quantity::Length.parse("--keep-out", value)).collect::<Result<_>>()?;
+        let values: [f64; 3] = values.try_into().map_err(|_| Error::input("--keep-out", format!("'{text}' is not three lengths"), "give x,y,z with units"))?;
+        Ok(DVec3::from_array(values))
+    };
+    Ok([corner(low)?, corner(high)?])
+}
