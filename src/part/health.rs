@@ -36,6 +36,10 @@ pub struct Health {
     pub tangled_edge_at: Option<DVec3>,
     /// Edges at which no choice of windings agrees (a one-sided surface).
     pub one_sided_edges: usize,
+    /// Pairs of shells that pass through each other: their common volume is counted twice.
+    pub crossing_shells: usize,
+    /// Where two of them do [m].
+    pub crossing_at: Option<DVec3>,
     /// The surface bounds material everywhere: no open edge, windings agree. Otherwise mass properties are estimates.
     pub watertight: bool,
     /// Things a user should look at, in words.
@@ -64,6 +68,13 @@ impl Health {
         add(self.shells_reversed, "inside-out shell reversed", "inside-out shells reversed", String::new());
         if self.shells > 1 {
             lines.push(format!("{} shells, of which {} hollow, {} inside the material of another", self.shells, self.voids, self.embedded));
+        }
+        if let Some(at) = self.crossing_at {
+            let at = at * 1e3;
+            lines.push(format!(
+                "{} pairs of shells pass through each other (one at {:.3}, {:.3}, {:.3} mm): unite them in the CAD system; volume is counted twice there",
+                self.crossing_shells, at.x, at.y, at.z
+            ));
         }
         lines.extend(self.warnings.iter().cloned());
         lines

@@ -12,12 +12,16 @@ use crate::error::{Error, Result};
 use crate::model::{Frame, Polygon};
 
 mod boundary;
+mod cracks;
+mod crossing;
 mod faces;
+mod facets;
 pub mod health;
 mod mass;
 mod orient;
 mod pairs;
 mod read;
+mod regions;
 mod repair;
 mod topology;
 mod unit;
@@ -185,8 +189,8 @@ impl Part {
     }
 
     fn build(soup: weld::Soup, unit: Unit, place: &str) -> Result<Self> {
-        let repaired = repair::repair(soup, unit.metres(), place)?;
-        let faces = faces::planar_faces(&repaired);
+        let mut repaired = repair::repair(soup, unit.metres(), place)?;
+        let faces = faces::planar_faces(&mut repaired);
         let unit_mass = repaired.mass();
         Ok(Self { name: String::new(), file: PathBuf::new(), unit_m: unit.metres(), mesh: repaired.mesh, health: repaired.health, faces, unit_mass })
     }

@@ -20,12 +20,15 @@ pub(super) enum Role {
     Embedded,
 }
 
-/// A connected surface, connected across edges that exactly two triangles share.
+/// A connected surface.
 #[derive(Debug, Clone)]
 pub(super) struct Shell {
     pub role: Role,
     /// Volume integrals about the apex given to [`orient`].
     pub integrals: Integrals,
+    /// Bounding box [m].
+    pub low: DVec3,
+    pub high: DVec3,
 }
 
 struct Draft {
@@ -33,11 +36,14 @@ struct Draft {
     high: DVec3,
     area: f64,
     reversed_area: f64,
-    open: bool,
+    triangles: usize,
+    /// Half-edges without a neighbour.
+    loose: usize,
 }
 
 /// Labels the shells, makes their windings agree and turns them outward (hollows: out of the material, inward).
-/// Returns the shell of every triangle and the shells. `edges` stays valid but for directions.
+/// Returns the shell of every triangle and the shells.
+/// Where anything was reversed `edges` must be found again.
 pub(super) fn orient(mesh: &mut Mesh, edges: &Edges, apex: DVec3, health: &mut Health) -> (Vec<u32>, Vec<Shell>) {
     let count = mesh.triangles.len();
     let mut shell_of = vec![NONE; count];
@@ -50,7 +56,7 @@ pub(super) fn orient(mesh: &mut Mesh, edges: &Edges, apex: DVec3, health: &mut H
         }
         let shell = drafts.len() as u32;
         let first = mesh.vertices[mesh.triangles[seed as usize][0] as usize];
-        let mut draft = Draft { low: first, high: first, area: 0.0, reversed_area: 0.0, open: false };
+        let mut draft = Draft { low: first, high: first, area: 0.0, reversed_area: 0.0, triangles: 0, loose: 0 };
         shell_of[seed as usize] = shell;
         stack.push(seed);
         while let Some(triangle) = stack.pop() {
@@ -58,6 +64,7 @@ pub(super) fn orient(mesh: &mut Mesh, edges: &Edges, apex: DVec3, health: &mut H
             let area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
             let turned = reversed[triangle as usize];
             draft.area += area;
+            draft.triangles += 1;
             draft.reversed_area += if turned { area } else { 0.0 };
             for (corner, half) in corners.into_iter().zip(triangle * 3..) {
                 draft.low = draft.low.min(corner);
@@ -79,8 +86,8 @@ pub(super) fn orient(mesh: &mut Mesh, edges: &Edges, apex: DVec3, health: &mut H
         }
         drafts.push(draft);
     }
-    for &half in &edges.open {
-        drafts[shell_of[(half / 3) as usize] as usize].open = true;
+    for &half in edges.open.iter().chain(&edges.unpaired) {
+        drafts[shell_of[(half / 3) as usize] as usize].loose += 1;
     }
     // The winding of most of a shell's area is taken for the file's; the rest of it is reversed.
     for (index, triangle) in mesh.triangles.iter_mut().enumerate() {
@@ -91,7 +98,9 @@ pub(super) fn orient(mesh: &mut Mesh, edges: &Edges, apex: DVec3, health: &mut H
         }
     }
     let members = Members::new(&shell_of, drafts.len());
-    let mut shells: Vec<Shell> = (0..drafts.len()).map(|shell| Shell { role: Role::Body, integrals: mass::integrate(mesh, members.of(shell), apex) }).collect();
+    let mut shells: Vec<Shell> = (0..drafts.len())
+        .map(|shell| Shell { role: Role::Body, integrals: mass::integrate(mesh, members.of(shell), apex), low: drafts[shell].low, high: drafts[shell].high })
+        .collect();
     let inside_out: Vec<bool> = (0..drafts.len()).map(|shell| signed_volume(mesh, &members, &drafts[shell], &shells[shell], shell) < 0.0).collect();
     assign_roles(mesh, &members, &drafts, &inside_out, &mut shells);
     let mut reverse = vec![false; shells.len()];
@@ -122,8 +131,11 @@ pub(super) fn orient(mesh: &mut Mesh, edges: &Edges, apex: DVec3, health: &mut H
 /// Volume whose sign tells the sense of a shell. An open one has no volume of its own: about the middle of its box the
 /// sign is right for whatever is nearly a body; a nearly flat one keeps the file's winding.
 fn signed_volume(mesh: &Mesh, members: &Members, draft: &Draft, shell: &Shell, index: usize) -> f64 {
-    if !draft.open {
+    if draft.loose == 0 {
         return shell.integrals.volume();
+    }
+    if draft.loose > draft.triangles {
+        return 0.0; // fragments: a closed surface has three half-edges with a neighbour per triangle
     }
     let size = draft.high - draft.low;
     let volume = mass::integrate(mesh, members.of(index), (draft.low + draft.high) / 2.0).volume();
@@ -135,7 +147,7 @@ fn signed_volume(mesh: &Mesh, members: &Members, draft: &Draft, shell: &Shell, i
 fn assign_roles(mesh: &Mesh, members: &Members, drafts: &[Draft], inside_out: &[bool], shells: &mut [Shell]) {
     // Larger boxes first: a container comes before what it contains.
     let extent = |shell: usize| (drafts[shell].high - drafts[shell].low).length_squared();
-    let mut order: Vec<usize> = (0..shells.len()).filter(|&shell| !drafts[shell].open).collect();
+    let mut order: Vec<usize> = (0..shells.len()).filter(|&shell| drafts[shell].loose == 0).collect();
     order.sort_by(|&a, &b| extent(b).total_cmp(&extent(a)).then(a.cmp(&b)));
     for (position, &inner) in order.iter().enumerate() {
         let draft = &drafts[inner];

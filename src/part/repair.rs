@@ -3,12 +3,21 @@
 
 use glam::DVec3;
 
+use super::cracks;
+use super::crossing::{Crossing, crossing};
 use super::mass::Integrals;
 use super::orient::{self, Role, Shell};
 use super::topology::{self, Edges, NONE, ends};
 use super::weld::Soup;
 use super::{Health, MassProperties, Mesh};
 use crate::error::{Error, Result};
+
+/// Distance within which corners at an opening are taken for one, as a share of the bounding box's diagonal: 1 um on 100 mm.
+const JOIN: f64 = 1e-5;
+/// Width of a needle as a share of that distance.
+const NEEDLE: f64 = 0.1;
+/// Most rounds of mending: a triangle has one of its edges cut in each.
+const ROUNDS: usize = 6;
 
 /// The repaired surface and what is known about it.
 pub(super) struct Repaired {
@@ -20,7 +29,7 @@ pub(super) struct Repaired {
     pub shells: Vec<Shell>,
     /// Diagonal of the bounding box [m].
     pub diagonal: f64,
-    /// Uncertainty of the coordinates from 32-bit floats [m].
+    /// Rounding of the coordinates to 32-bit floats [m].
     pub noise: f64,
     apex: DVec3,
 }
@@ -57,20 +66,36 @@ pub(super) fn repair(soup: Soup, scale: f64, place: &str) -> Result<Repaired> {
             "export the part as a surface mesh; check that its coordinates were not all rounded to the same value",
         ));
     }
-    let noise = low.abs().max(high.abs()).max_element() * f64::from(f32::EPSILON);
-    let mut edges = topology::edges(mesh.vertices.len(), &mesh.triangles);
-    if !edges.tangled.is_empty() && remove_duplicates(&mut mesh, &mut health) {
-        edges = topology::edges(mesh.vertices.len(), &mesh.triangles);
+    // Half a unit in the last place of the largest coordinate (in the file's unit, but the ratio is much the same).
+    let noise = low.abs().max(high.abs()).max_element().log2().floor().exp2() * f64::from(f32::EPSILON) / 2.0;
+    if noise > JOIN * diagonal {
+        health
+            .warnings
+            .push(format!("the part lies so far from the origin that its coordinates are exact to {:.3} um only; move it there and export again", noise * 1e6));
+    }
+    let tolerance = (JOIN * diagonal).max(4.0 * noise);
+    let mut edges = topology::edges(&mesh);
+    mend(&mut mesh, &mut edges, tolerance, &mut health);
+    if mesh.triangles.is_empty() {
+        return Err(Error::input(place, "no triangle has an area above rounding", "export the part as a surface mesh"));
     }
     let apex = (low + high) / 2.0;
     let (shell_of, shells) = orient::orient(&mut mesh, &edges, apex, &mut health);
-    if !edges.tangled.is_empty() && (health.windings_reversed > 0 || health.shells_reversed > 0) {
-        edges = topology::edges(mesh.vertices.len(), &mesh.triangles); // which edges are balanced has changed
+    if health.windings_reversed > 0 || health.shells_reversed > 0 {
+        edges = topology::edges(&mesh); // a reversed triangle numbers its half-edges anew
     }
     if health.one_sided_edges > 0 {
         separate_disagreeing(&mesh, &mut edges);
     }
     report_edges(&mesh, &edges, &mut health);
+    match crossing(&mesh, &shell_of, &shells, tolerance) {
+        Crossing::None => {}
+        Crossing::Found(count, place) => {
+            health.crossing_shells = count;
+            health.crossing_at = Some(place);
+        }
+        Crossing::Unchecked => health.warnings.push("whether the shells pass through each other was not checked (too many triangles)".to_string()),
+    }
     Ok(Repaired { mesh, health, edges, shell_of, shells, diagonal, noise, apex })
 }
 
@@ -81,6 +106,39 @@ fn separate_disagreeing(mesh: &Mesh, edges: &mut Edges) {
         if twin != NONE && ends(&mesh.triangles, half).0 == ends(&mesh.triangles, twin).0 {
             edges.twin[half as usize] = NONE;
             edges.twin[twin as usize] = NONE;
+        }
+    }
+}
+
+/// Removes duplicates and needles, joins vertices and cuts edges until nothing open or tangled can be mended any more.
+fn mend(mesh: &mut Mesh, edges: &mut Edges, tolerance: f64, health: &mut Health) {
+    // Each round may make the next one's work possible; real files need one or two.
+    for _ in 0..ROUNDS {
+        if edges.open.is_empty() && edges.tangled.is_empty() {
+            return;
+        }
+        let mut changed = 0;
+        let mut note = |mesh: &Mesh, edges: &mut Edges, count: usize, total: &mut usize| {
+            if count > 0 {
+                changed += count;
+                *total += count;
+                *edges = topology::edges(mesh);
+            }
+        };
+        if !edges.tangled.is_empty() {
+            let count = remove_duplicates(mesh);
+            note(mesh, edges, count, &mut health.duplicates_removed);
+        }
+        let count = cracks::remove_needles(mesh, edges, NEEDLE * tolerance);
+        note(mesh, edges, count, &mut health.degenerate_removed);
+        if !edges.open.is_empty() {
+            let count = cracks::join_vertices(mesh, edges, tolerance);
+            note(mesh, edges, count, &mut health.vertices_joined);
+            let count = cracks::split_edges(mesh, edges, tolerance);
+            note(mesh, edges, count, &mut health.edges_split);
+        }
+        if changed == 0 {
+            return;
         }
     }
 }
@@ -97,12 +155,13 @@ fn report_edges(mesh: &Mesh, edges: &Edges, health: &mut Health) {
     health.open_edge_at = longest(&edges.open);
     health.tangled_edges = edges.tangled.len();
     health.tangled_edge_at = longest(&edges.tangled);
-    health.watertight = edges.open.is_empty() && edges.unbalanced == 0 && health.one_sided_edges == 0;
+    health.watertight = edges.open.is_empty() && edges.unpaired.is_empty() && health.one_sided_edges == 0;
 }
 
 /// Removes repeated triangles, in whatever order and sense their corners are listed. Two of opposite senses in a mesh
 /// that is not two-sided throughout are the wall between two bodies glued together: both go, so that one body is left.
-fn remove_duplicates(mesh: &mut Mesh, health: &mut Health) -> bool {
+/// Returns how many went.
+fn remove_duplicates(mesh: &mut Mesh) -> usize {
     let even = |[a, b, c]: [u32; 3]| (a < b) ^ (b < c) ^ (a < c); // sense of the corners against ascending order
     let mut keys: Vec<([u32; 3], u32)> = mesh
         .triangles
@@ -135,6 +194,5 @@ fn remove_duplicates(mesh: &mut Mesh, health: &mut Health) -> bool {
     let before = mesh.triangles.len();
     let mut flags = drop.into_iter();
     mesh.triangles.retain(|_| !flags.next().unwrap_or(false));
-    health.duplicates_removed += before - mesh.triangles.len();
-    before != mesh.triangles.len()
+    before - mesh.triangles.len()
 }

@@ -83,8 +83,10 @@ struct Source<'a> {
 impl Source<'_> {
     /// The bytes at hand without consuming them; empty at the end of the file.
     fn peek(&mut self) -> Result<&[u8]> {
-        let path = self.path;
-        self.reader.fill_buf().map_err(|source| Error::io(path, "read", source))
+        if let Err(fault) = self.reader.fill_buf() {
+            return Err(self.fault(fault));
+        }
+        Ok(self.reader.buffer())
     }
 
     /// A damaged or unreadable stream: a decompression fault is bad input, anything else the system's.

@@ -176,7 +176,7 @@ fn ascii(source: &mut Source<'_>) -> Result<Soup> {
                 let mut values = [0.0; 3];
                 for value in &mut values {
                     let word = words.next().ok_or_else(|| source.bad_at(place(), "a vertex needs three numbers", REMEDY))?;
-                    *value = word.parse::<f64>().map_err(|_| source.bad_at(place(), format!("'{}' is not a number", shorten(word)), REMEDY))?;
+                    *value = number_of(word).ok_or_else(|| source.bad_at(place(), format!("'{}' is not a number", shorten(word)), REMEDY))?;
                     if !value.is_finite() {
                         return Err(source.bad_at(place(), format!("coordinate '{}' is not finite", shorten(word)), REMEDY));
                     }
@@ -201,6 +201,15 @@ fn ascii(source: &mut Source<'_>) -> Result<Soup> {
         return Err(source.bad_at(format!("line {number}"), "the file ends within a facet", "the file was cut short: export or copy it again"));
     }
     Ok(welder.finish(None, Vec::new()))
+}
+
+/// A coordinate. Nine significant digits or fewer are a 32-bit value as writers print it: it is rounded back, so that the
+/// text and the binary form of a mesh are the same mesh.
+fn number_of(word: &str) -> Option<f64> {
+    let value: f64 = word.parse().ok()?;
+    let mantissa = word.split(['e', 'E']).next().unwrap_or(word);
+    let digits = mantissa.trim_start_matches(['+', '-', '0', '.']).bytes().filter(u8::is_ascii_digit).count();
+    Some(if digits <= 9 { f64::from(value as f32) } else { value })
 }
 
 /// The first characters of a word from the file, for a message.

@@ -1,0 +1,242 @@
+//! Planar regions by growing.
+//!
+//! A region starts at the largest triangle left and takes in neighbours whose corners lie within a distance of the
+//! region's plane and whose normals agree within an angle; both tests are needed. The distance is scaled to the part.
+//! The angle is widened for a narrow triangle by what the uncertainty of its corners can tilt it: refining a plane in
+//! 32-bit floats leaves slivers whose normals point anywhere. The plane is refitted each time the region has doubled.
+
+use glam::{DMat3, DVec3};
+use nalgebra::Matrix3;
+
+use super::Mesh;
+use super::repair::Repaired;
+use super::topology::NONE;
+
+/// Angle between a wide triangle and its face: 0.2 degrees.
+const ANGLE: f64 = 0.2 * std::f64::consts::PI / 180.0;
+
+/// How exactly a triangle must lie in a region's plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Flatness {
+    /// Distance of a corner from the plane [m].
+    pub distance: f64,
+    /// Uncertainty of a corner [m]; it widens the angle allowed to narrow triangles.
+    pub uncertainty: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plane {
+    pub normal: DVec3,
+    pub offset: f64,
+    /// How far the normal may be tilted by the uncertainty of the corners it was made of [rad].
+    tilt: f64,
+}
+
+impl Plane {
+    fn distance(&self, point: DVec3) -> f64 {
+        (self.normal.dot(point) - self.offset).abs()
+    }
+}
+
+/// Area-weighted sums over triangles: area, normal, first and second moments about a reference near the region.
+#[derive(Debug, Clone, Copy)]
+struct Sums {
+    reference: DVec3,
+    area: f64,
+    vector: DVec3,
+    first: DVec3,
+    second: DMat3,
+}
+
+impl Sums {
+    fn new(reference: DVec3) -> Self {
+        Self { reference, area: 0.0, vector: DVec3::ZERO, first: DVec3::ZERO, second: DMat3::ZERO }
+    }
+
+    fn add(&mut self, corners: [DVec3; 3], twice_normal: DVec3) {
+        let area = twice_normal.length() / 2.0;
+        self.area += area;
+        self.vector += twice_normal / 2.0;
+        let [a, b, c] = corners.map(|corner| corner - self.reference);
+        let sum = a + b + c;
+        self.first += area / 3.0 * sum;
+        // int x x^T over a triangle = A/12 (aa^T + bb^T + cc^T + ss^T), s the sum of the corners.
+        let weight = area / 12.0;
+        for v in [a, b, c, sum] {
+            self.second += DMat3::from_cols(v * v.x, v * v.y, v * v.z) * weight;
+        }
+    }
+
+    fn centre(&self) -> DVec3 {
+        if self.area > 0.0 { self.reference + self.first / self.area } else { self.reference }
+    }
+
+    /// Least-squares plane, and how far `uncertainty` of the corners tilts it.
+    fn fit(&self, uncertainty: f64) -> Option<Plane> {
+        let outward = self.vector.try_normalize()?;
+        let mean = self.first / self.area;
+        let covariance = self.second * (1.0 / self.area) - DMat3::from_cols(mean * mean.x, mean * mean.y, mean * mean.z);
+        let eigen = Matrix3::from_column_slice(&covariance.to_cols_array()).symmetric_eigen();
+        let mut order = [0, 1, 2];
+        order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+        let axis = eigen.eigenvectors.column(order[0]);
+        let fitted = DVec3::new(axis[0], axis[1], axis[2]).normalize();
+        let fitted = if fitted.dot(outward) < 0.0 { -fitted } else { fitted };
+        // For a needle the third axis is as thin as the second: there the sum of the triangles' normals is better.
+        let normal = if fitted.dot(outward) > 0.99 { fitted } else { outward };
+        // A rectangle of width w has variance w^2/12 across.
+        let width = (12.0 * eigen.eigenvalues[order[1]].max(0.0)).sqrt();
+        Some(Plane { normal, offset: normal.dot(self.centre()), tilt: 2.0 * uncertainty / width.max(uncertainty) })
+    }
+}
+
+/// A grown region: a range of the list of triangles.
+pub(super) struct Region {
+    begin: usize,
+    end: usize,
+    pub plane: Plane,
+    pub area: f64,
+    pub centre: DVec3,
+}
+
+/// A partition of the triangles.
+pub(super) struct Regions {
+    pub all: Vec<Region>,
+    /// Triangles in order of regions.
+    pub order: Vec<u32>,
+    /// Region of each triangle.
+    pub of: Vec<u32>,
+}
+
+impl Regions {
+    /// Triangles of region `index`.
+    pub(super) fn triangles(&self, index: usize) -> &[u32] {
+        &self.order[self.all[index].begin..self.all[index].end]
+    }
+}
+
+fn twice_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
+    (b - a).cross(c - a)
+}
+
+/// Partitions the triangles into planar regions.
+pub(super) fn grow(part: &Repaired, flatness: Flatness) -> Regions {
+    let mesh = &part.mesh;
+    let count = mesh.triangles.len();
+    let Flatness { distance, uncertainty } = flatness;
+    let mut order = Vec::with_capacity(count);
+    let mut region_of = vec![NONE; count];
+    let mut regions = Vec::new();
+    let mut refused = Vec::new();
+    for seed in seeds(mesh) {
+        if region_of[seed as usize] != NONE {
+            continue;
+        }
+        let number = regions.len() as u32;
+        let begin = order.len();
+        let corners = mesh.corners(seed);
+        let cross = twice_normal(corners);
+        let mut sums = Sums::new(corners[0]);
+        sums.add(corners, cross);
+        region_of[seed as usize] = number;
+        order.push(seed);
+        let Some(mut plane) = sums.fit(uncertainty) else {
+            // Not even a direction: alone, without area.
+            let plane = Plane { normal: DVec3::Z, offset: corners[0].z, tilt: 0.0 };
+            regions.push(Region { begin, end: order.len(), plane, area: 0.0, centre: corners[0] });
+            continue;
+        };
+        plane.normal = cross.normalize();
+        plane.offset = plane.normal.dot(corners[0]);
+        let mut refit_at = 2;
+        let mut next = begin;
+        refused.clear();
+        loop {
+            while next < order.len() {
+                let triangle = order[next];
+                next += 1;
+                for half in triangle * 3..triangle * 3 + 3 {
+                    let twin = part.edges.twin[half as usize];
+                    if twin == NONE || region_of[(twin / 3) as usize] != NONE {
+                        continue;
+                    }
+                    let other = twin / 3;
+                    if take(mesh, other, &plane, distance, uncertainty, &mut sums) {
+                        region_of[other as usize] = number;
+                        order.push(other);
+                    } else {
+                        refused.push(other);
+                    }
+                }
+                if order.len() - begin >= refit_at {
+                    refit_at *= 2;
+                    plane = sums.fit(uncertainty).unwrap_or(plane);
+                }
+            }
+            // With the final plane the triangles refused by an earlier, poorer one get another chance.
+            plane = sums.fit(uncertainty).unwrap_or(plane);
+            let before = order.len();
+            refused.retain(|&other| {
+                if region_of[other as usize] != NONE {
+                    return false;
+                }
+                let taken = take(mesh, other, &plane, distance, uncertainty, &mut sums);
+                if taken {
+                    region_of[other as usize] = number;
+                    order.push(other);
+                }
+                !taken
+            });
+            if order.len() == before {
+                break;
+            }
+        }
+        regions.push(Region { begin, end: order.len(), plane, area: sums.area, centre: sums.centre() });
+    }
+    Regions { all: regions, order, of: region_of }
+}
+
+/// Adds a triangle to the sums if it lies in the plane.
+fn take(mesh: &Mesh, triangle: u32, plane: &Plane, distance: f64, uncertainty: f64, sums: &mut Sums) -> bool {
+    let corners = mesh.corners(triangle);
+    if corners.iter().any(|&corner| plane.distance(corner) > distance) {
+        return false;
+    }
+    let cross = twice_normal(corners);
+    let [a, b, c] = corners;
+    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared()).sqrt();
+    let twice_area = cross.length();
+    // Altitude over the longest edge: corners off by u tilt the triangle by up to 2 u / altitude.
+    let allowed = ANGLE + plane.tilt + 2.0 * uncertainty * longest / twice_area.max(f64::MIN_POSITIVE);
+    // A sliver narrower than the uncertainty has no direction: the distance alone decides.
+    if allowed < 1.0 && cross.dot(plane.normal) < allowed.cos() * twice_area {
+        return false;
+    }
+    sums.add(corners, cross);
+    true
+}
+
+/// Triangles by falling area, in steps of a factor of two: a counting sort by the exponent, file order within a step.
+fn seeds(mesh: &Mesh) -> Vec<u32> {
+    let exponents: Vec<u16> = (0..mesh.triangles.len() as u32)
+        .map(|triangle| {
+            let squared = twice_normal(mesh.corners(triangle)).length_squared();
+            // Exponent of the squared area; half of it is that of the area.
+            (0x7ff - ((squared.to_bits() >> 52) as u16 & 0x7ff)) / 2
+        })
+        .collect();
+    let mut starts = vec![0_u32; 0x402];
+    for &exponent in &exponents {
+        starts[exponent as usize + 1] += 1;
+    }
+    for index in 1..starts.len() {
+        starts[index] += starts[index - 1];
+    }
+    let mut seeds = vec![0; exponents.len()];
+    for (triangle, &exponent) in exponents.iter().enumerate() {
+        let slot = &mut starts[exponent as usize];
+        seeds[*slot as usize] = triangle as u32;
+        *slot += 1;
+    }
+    seeds
+}

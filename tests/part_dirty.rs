@@ -1,0 +1,302 @@
+//! Known defects added to clean meshes. Those that leave the shape alone must give the clean part's faces; the others a
+//! report or a refusal that names place and remedy.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use gripfast::part::{Part, ReadOptions, Unit};
+
+type Triangle = [DVec3; 3];
+
+/// A multiplicative congruential generator: the defects are the same on every machine.
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        (self.unit() * count as f64) as usize
+    }
+}
+
+fn shared() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/parts");
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    eprintln!("SKIPPED: {} is absent", folder.display());
+    None
+}
+
+/// Clean watertight binary STL files to spoil.
+const CLEAN: [&str; 8] = [
+    "parts/trimesh__plate_holes.STL",
+    "gen/gen_hexnut_M10_simple.stl",
+    "gen/gen_vslot_20x20_100.stl",
+    "gen/gen_lbracket_openbuilds.stl",
+    "gen/gen_spurgear_m2_z24.stl",
+    "gen/gen_pillowblock_cq.stl",
+    "gen/gen_bearing_608.stl",
+    "derived/trimesh__featuretype.STEP__occt_lin0.05_ang0.3.stl",
+];
+
+fn load(path: &Path) -> Vec<Triangle> {
+    let bytes = std::fs::read(path).unwrap();
+    let float = |at: usize| f64::from(f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()));
+    let point = |at: usize| DVec3::new(float(at), float(at + 4), float(at + 8));
+    (0..(bytes.len() - 84) / 50).map(|index| [12, 24, 36].map(|at| point(84 + 50 * index + at))).collect()
+}
+
+fn binary(triangles: &[Triangle], header: &[u8], count: u32, attribute: u16) -> Vec<u8> {
+    let mut bytes = vec![b' '; 80];
+    bytes[..header.len()].copy_from_slice(header);
+    bytes.extend(count.to_le_bytes());
+    for triangle in triangles {
+        let normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalize_or_zero();
+        for vector in std::iter::once(&normal).chain(triangle) {
+            bytes.extend(vector.to_array().into_iter().flat_map(|x| (x as f32).to_le_bytes()));
+        }
+        bytes.extend(attribute.to_le_bytes());
+    }
+    bytes
+}
+
+fn plain(triangles: &[Triangle]) -> Vec<u8> {
+    binary(triangles, b"spoiled", triangles.len() as u32, 0)
+}
+
+fn ascii(triangles: &[Triangle], end: &str, solids: usize) -> Vec<u8> {
+    let mut text = String::new();
+    for chunk in triangles.chunks(triangles.len().div_ceil(solids)) {
+        text += &format!("solid part{end}");
+        for triangle in chunk {
+            text += &format!("  facet normal 0 0 0{end}    outer loop{end}");
+            for corner in triangle {
+                text += &format!("      vertex {} {} {}{end}", corner.x as f32, corner.y as f32, corner.z as f32);
+            }
+            text += &format!("    endloop{end}  endfacet{end}");
+        }
+        text += &format!("endsolid part{end}");
+    }
+    text.into_bytes()
+}
+
+fn read(folder: &Path, bytes: &[u8], unit: Option<Unit>) -> gripfast::error::Result<Part> {
+    let path = folder.join("spoiled.stl");
+    std::fs::write(&path, bytes).unwrap();
+    Part::read(&path, &ReadOptions { unit })
+}
+
+fn diagonal(triangles: &[Triangle]) -> f64 {
+    let corners = || triangles.iter().flatten().copied();
+    (corners().reduce(DVec3::max).unwrap() - corners().reduce(DVec3::min).unwrap()).length()
+}
+
+/// Whether two parts have the same faces: areas to `tolerance` relative, planes to `tolerance` of the size, `moved` apart.
+fn assert_same(name: &str, mode: &str, clean: &Part, dirty: &Part, moved: DVec3, tolerance: f64) {
+    let lines = dirty.health.lines();
+    assert!(dirty.health.watertight, "{name} {mode}: {lines:?}");
+    let size = {
+        let (low, high) = clean.mesh.bounding_box();
+        (high - low).length()
+    };
+    assert_eq!(clean.faces.len(), dirty.faces.len(), "{name} {mode}: {lines:?}");
+    let mut left: Vec<_> = dirty.faces.iter().collect();
+    for face in &clean.faces {
+        let place = left.iter().position(|other| {
+            other.normal.distance(face.normal) < 100.0 * tolerance
+                && other.centroid.distance(face.centroid + moved) < 10.0 * tolerance * size
+                && (other.area - face.area).abs() < 10.0 * tolerance * (face.area + size * size * tolerance)
+                && other.polygons.iter().map(|p| p.holes.len()).eq(face.polygons.iter().map(|p| p.holes.len()))
+        });
+        let place =
+            place.unwrap_or_else(|| panic!("{name} {mode}: no match for face {} {} {} area {}: {lines:?}", face.id, face.normal, face.centroid, face.area));
+        left.remove(place);
+    }
+    let (a, b) = (clean.mass_properties(1.0), dirty.mass_properties(1.0));
+    assert!((a.volume - b.volume).abs() < 10.0 * tolerance * a.volume, "{name} {mode}: volume {} {}", a.volume, b.volume);
+}
+
+/// Whether every larger face of the clean part is found again to what the rougher coordinates allow, and little else.
+fn assert_contains(name: &str, mode: &str, clean: &Part, dirty: &Part, moved: DVec3) {
+    let lines = dirty.health.lines();
+    let total: f64 = clean.faces.iter().map(|face| face.area).sum();
+    for face in clean.faces.iter().filter(|face| face.area > 0.01 * total) {
+        let found = dirty.faces.iter().any(|other| {
+            other.normal.distance(face.normal) < 1e-2 && other.centroid.distance(face.centroid + moved) < 3e-4 && (other.area / face.area - 1.0).abs() < 0.1
+        });
+        assert!(found, "{name} {mode}: no match for face {} {} {} area {}: {lines:?}", face.id, face.normal, face.centroid, face.area);
+    }
+    let found: f64 = dirty.faces.iter().map(|face| face.area).sum();
+    assert!(found < 1.05 * total, "{name} {mode}: {} faces, {} in the clean part: {lines:?}", dirty.faces.len(), clean.faces.len());
+}
+
+#[test]
+fn defects_that_leave_the_shape_alone_change_nothing() {
+    let Some(folder) = shared() else { return };
+    let scratch = tempfile::tempdir().unwrap();
+    for name in CLEAN {
+        let t = load(&folder.join(name));
+        let n = t.len();
+        let clean = read(scratch.path(), &plain(&t), None).unwrap();
+        assert!(clean.health.watertight, "{name}");
+        let mut random = Random(7);
+        let check = |mode: &str, bytes: Vec<u8>| assert_same(name, mode, &clean, &read(scratch.path(), &bytes, None).unwrap(), DVec3::ZERO, 1e-7);
+
+        let mut shuffled = t.clone();
+        for index in (1..n).rev() {
+            shuffled.swap(index, random.below(index + 1));
+        }
+        check("shuffle", plain(&shuffled));
+        check("rotate_start", plain(&t.iter().map(|&[a, b, c]| [b, c, a]).collect::<Vec<_>>()));
+        check("flip_all", plain(&t.iter().map(|&[a, b, c]| [c, b, a]).collect::<Vec<_>>()));
+        check("flip_some", plain(&t.iter().map(|&[a, b, c]| if random.unit() < 0.1 { [c, b, a] } else { [a, b, c] }).collect::<Vec<_>>()));
+        let picks: Vec<usize> = (0..(n / 50).max(1)).map(|_| random.below(n)).collect();
+        check("dup_tri", plain(&t.iter().copied().chain(picks.iter().map(|&k| t[k])).collect::<Vec<_>>()));
+        let degenerate = picks.iter().flat_map(|&k| {
+            let [a, b, c] = t[k];
+            [[a, b, b], [a, b, (a + b) / 2.0], [c, c, c]]
+        });
+        check("degenerate", plain(&t.iter().copied().chain(degenerate).collect::<Vec<_>>()));
+        let split = |&[a, b, c]: &Triangle| [[a, (a + b) / 2.0, c], [(a + b) / 2.0, b, c]];
+        check(
+            "tjunction",
+            plain(
+                &t.iter().enumerate().flat_map(|(k, triangle)| if picks.contains(&k) { split(triangle).to_vec() } else { vec![*triangle] }).collect::<Vec<_>>(),
+            ),
+        );
+        check("dup_shell", plain(&[t.clone(), t.clone()].concat()));
+        let ninth = |t: &Vec<Triangle>| {
+            t.iter()
+                .flat_map(|&[a, b, c]| {
+                    let m = (a + b + c) / 3.0;
+                    [[a, b, m], [b, c, m], [c, a, m]]
+                })
+                .collect::<Vec<_>>()
+        };
+        check("split_planes", plain(&ninth(&ninth(&t))));
+        check("attr_bytes", binary(&t, b"x", n as u32, 0x1234));
+        check("solid_header", binary(&t, b"solid exported by a CAD system that should not do this", n as u32, 0));
+        check("ascii", ascii(&t, "\n", 1));
+        check("ascii_crlf", ascii(&t, "\r\n", 1));
+        check("ascii_multi", ascii(&t, "\n", 3));
+        check("ascii_upper", ascii(&t, "\n", 1).to_ascii_uppercase());
+
+        for (mode, factor, unit) in [("scale_m", 1e-3, Unit::Metre), ("scale_inch", 1.0 / 25.4, Unit::Inch), ("scale_um", 1e3, Unit::Micrometre)] {
+            let scaled: Vec<Triangle> = t.iter().map(|triangle| triangle.map(|corner| corner * factor)).collect();
+            assert_same(name, mode, &clean, &read(scratch.path(), &plain(&scaled), Some(unit)).unwrap(), DVec3::ZERO, 1e-6);
+            let warned = read(scratch.path(), &plain(&scaled), None).unwrap().health.warnings.join(" ");
+            let (low, high) = clean.mesh.bounding_box();
+            let largest = (high - low).max_element() * factor;
+            assert_eq!(warned.contains("implausible size"), !(1e-3..=5.0).contains(&largest), "{name} {mode}: {warned}");
+        }
+        let moved = DVec3::new(1e4, -2e4, 3e4);
+        let far = read(scratch.path(), &plain(&t.iter().map(|triangle| triangle.map(|corner| corner + moved)).collect::<Vec<_>>()), None).unwrap();
+        assert_contains(name, "translate_far", &clean, &far, moved * 1e-3);
+    }
+}
+
+#[test]
+fn defects_that_change_the_shape_are_reported() {
+    let Some(folder) = shared() else { return };
+    let scratch = tempfile::tempdir().unwrap();
+    for name in CLEAN {
+        let t = load(&folder.join(name));
+        let n = t.len();
+        let clean = read(scratch.path(), &plain(&t), None).unwrap();
+        let read = |bytes: Vec<u8>| read(scratch.path(), &bytes, None);
+        let size = diagonal(&t);
+        let mut random = Random(11);
+
+        let holed: Vec<Triangle> = t.iter().enumerate().filter(|(k, _)| k % 150 != 77).map(|(_, triangle)| *triangle).collect();
+        let part = read(plain(&holed)).unwrap();
+        assert!(!part.health.watertight && part.health.open_edges >= 3 && part.health.open_edge_at.is_some(), "{name} hole: {:?}", part.health.lines());
+
+        for (mode, share) in [("jitter5", 1e-5), ("jitter3", 1e-3)] {
+            let mut moves = std::collections::HashMap::new();
+            let mut jitter = |corner: DVec3| {
+                let by = moves
+                    .entry(corner.to_array().map(f64::to_bits))
+                    .or_insert_with(|| DVec3::new(random.unit() - 0.5, random.unit() - 0.5, random.unit() - 0.5) * 2.0 * share * size);
+                corner + *by
+            };
+            let spoiled: Vec<Triangle> = t.iter().map(|triangle| triangle.map(&mut jitter)).collect();
+            let part = read(plain(&spoiled)).unwrap();
+            if mode == "jitter5" {
+                assert_contains(name, mode, &clean, &part, DVec3::ZERO);
+                assert!(part.health.warnings.iter().any(|warning| warning.contains("rough")), "{name}: {:?}", part.health.lines());
+            }
+        }
+
+        let shift = DVec3::new(0.1, 0.07, 0.05) * size;
+        let copy: Vec<Triangle> = t.iter().copied().chain(t.iter().map(|triangle| triangle.map(|corner| corner + shift))).collect();
+        let part = read(plain(&copy)).unwrap();
+        // The copy of the plate clears the original: it is thinner than the shift.
+        let expected = usize::from(!name.contains("plate_holes"));
+        assert!(part.health.crossing_shells >= expected, "{name}: {:?}", part.health.lines());
+        assert_eq!(part.health.lines().join(" ").contains("pass through each other"), expected == 1, "{name}");
+
+        let largest = clean.faces.first().unwrap();
+        let open: Vec<Triangle> = t
+            .iter()
+            .filter(|triangle| !triangle.iter().all(|corner| (largest.normal.dot(*corner * 1e-3) - largest.offset).abs() < 1e-8 * size))
+            .copied()
+            .collect();
+        let part = read(plain(&open)).unwrap();
+        assert!(!part.health.watertight && part.health.open_edges > 0, "{name} open_plane: {:?}", part.health.lines());
+
+        for (mode, value) in [("nan", f64::NAN), ("inf", f64::INFINITY)] {
+            let mut spoiled = t.clone();
+            spoiled[n / 2][1].x = value;
+            let message = read(plain(&spoiled)).unwrap_err().to_string();
+            assert!(message.contains(&format!("triangle {}", n / 2 + 1)) && message.contains("finite") && message.contains("remedy"), "{mode}: {message}");
+        }
+        let whole = plain(&t);
+        let message = read(whole[..84 + 50 * (n / 2) + 17].to_vec()).unwrap_err().to_string();
+        assert!(message.contains(&format!("states {n} triangles but ends within triangle {}", n / 2 + 1)), "{message}");
+        let message = read(binary(&t, b"", n as u32 + 5, 0)).unwrap_err().to_string();
+        assert!(message.contains(&format!("states {} triangles", n + 5)), "{message}");
+        let message = read(binary(&t, b"", u32::MAX, 0)).unwrap_err().to_string();
+        assert!(message.contains("states 4294967295 triangles"), "{message}");
+    }
+}
+
+#[test]
+fn files_that_are_no_mesh_are_refused_with_place_and_remedy() {
+    let scratch = tempfile::tempdir().unwrap();
+    let refused = |file: &str, bytes: &[u8]| {
+        let path = scratch.path().join(file);
+        std::fs::write(&path, bytes).unwrap();
+        let message = Part::read(&path, &ReadOptions::default()).unwrap_err().to_string();
+        assert!(message.contains(file) && message.contains("remedy"), "{message}");
+        message
+    };
+    assert!(refused("empty.stl", b"").contains("empty"));
+    assert!(refused("text.stl", b"solid nothing\nfacet normal 0 0\nouter loop\nvertex 1 2\nvertex a b c\n").contains("line 4"));
+    assert!(refused("short.stl", b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n").contains("ends within a facet"));
+    assert!(refused("letter.stl", b"Dear Sir, please find enclosed no part at all. ".repeat(9).as_slice()).contains("solid"));
+    assert!(refused("bytes.stl", &[0; 40]).contains("40 bytes"));
+    assert!(refused("nothing.stl", b"solid a\nendsolid a\n").contains("no triangle"));
+    assert!(
+        refused("flat.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 1 1\nvertex 1 1 1\nvertex 1 1 1\nendloop\nendfacet\nendsolid\n")
+            .contains("area")
+    );
+    assert!(refused("part.step", b"ISO-10303-21;").contains("cascadio"));
+    assert!(refused("part.xyz", b"1 2 3").contains("unknown mesh format"));
+    assert!(refused("part", b"1 2 3").contains("suffix"));
+    assert!(refused("bad.obj", b"v 0 0 0\nv 1 0 0\nv 0 x 0\nf 1 2 3\n").contains("line 3"));
+    assert!(refused("range.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n").contains("bounds"));
+    assert!(refused("nan.obj", b"v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n").contains("finite"));
+    assert!(refused("no.ply", b"plyboy\n").contains("PLY"));
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n";
+    assert!(refused("short.ply", format!("{ply}0 0 0\n1 0 0\n").as_bytes()).contains("line 1"));
+    assert!(refused("range.ply", format!("{ply}0 0 0\n1 0 0\n0 1 0\n3 0 1 -2\n").as_bytes()).contains("face 1"));
+    assert!(refused("zipped.stl.gz", b"\x1f\x8b\x08\x00rubbish").contains("damaged"));
+    let message = Part::read(Path::new("/nowhere/at/all.stl"), &ReadOptions::default()).unwrap_err().to_string();
+    assert!(message.contains("cannot read"), "{message}");
+}
