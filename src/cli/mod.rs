@@ -10,6 +10,7 @@ mod figures;
 mod gripper;
 mod part;
 mod plan;
+mod report;
 mod score;
 mod shell;
 mod solve;
@@ -37,6 +38,7 @@ enum Command {
     Score(score::Args),
     Devices(devices::Args),
     Bench(bench::Args),
+    Report(report::Args),
     Gripper(gripper::Args),
     Figures(figures::Args),
     Export(export::Args),
@@ -54,6 +56,7 @@ pub(crate) fn main() -> ExitCode {
             Command::Score(args) => score::run(args),
             Command::Devices(args) => devices::run(args),
             Command::Bench(args) => bench::run(args),
+            Command::Report(args) => report::run(args),
             Command::Gripper(args) => gripper::run(args),
             Command::Figures(args) => figures::run(args),
             Command::Export(args) => export::run(args),

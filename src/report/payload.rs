@@ -1,0 +1,275 @@
+//! What the page carries: a JSON header in plain sight and one block of binary columns, compressed, in base64.
+//!
+//! Columns are little-endian arrays, each at a multiple of eight bytes; the header's `sections` say where. Numbers are
+//! single precision, which is more than the page prints; a missing number is NaN.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+
+use base64::Engine;
+use bytemuck::NoUninit;
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use rustc_hash::FxHashMap;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::display::{Display, TRIANGLE_BUDGET};
+use crate::error::{Error, Result};
+use crate::gripper::{Body, Gripper, Shape};
+use crate::model::{Contact, Slip};
+use crate::part::Mesh;
+use crate::results::{GripSet, RankedGrip};
+
+/// Grips that the page lists; a longer ranking is cut there and the page says so.
+pub(super) const MAX_GRIPS: usize = 100_000;
+/// Values in the table of `mu_s` by load; grips beyond it keep their worst load only.
+pub(super) const MAX_LOAD_VALUES: usize = 8_000_000;
+
+/// Header and data, ready to stand between `script` tags.
+pub(super) struct Payload {
+    /// JSON without any `<`.
+    pub(super) header: String,
+    /// Base64 of the compressed columns.
+    pub(super) data: String,
+}
+
+/// Named columns one after another.
+#[derive(Default)]
+struct Columns {
+    bytes: Vec<u8>,
+    sections: BTreeMap<&'static str, (&'static str, usize, usize)>,
+}
+
+impl Columns {
+    fn add<T: NoUninit>(&mut self, name: &'static str, kind: &'static str, values: &[T]) {
+        self.bytes.resize(self.bytes.len().next_multiple_of(8), 0);
+        self.sections.insert(name, (kind, self.bytes.len(), values.len()));
+        self.bytes.extend_from_slice(bytemuck::cast_slice(values));
+    }
+
+    fn f32(&mut self, name: &'static str, values: impl IntoIterator<Item = f64>) {
+        self.add(name, "f32", &values.into_iter().map(|value| value as f32).collect::<Vec<_>>());
+    }
+
+    fn f64(&mut self, name: &'static str, values: impl IntoIterator<Item = f64>) {
+        self.add(name, "f64", &values.into_iter().collect::<Vec<_>>());
+    }
+
+    fn u32(&mut self, name: &'static str, values: impl IntoIterator<Item = u32>) {
+        self.add(name, "u32", &values.into_iter().collect::<Vec<_>>());
+    }
+}
+
+impl Payload {
+    /// Encodes `set` and the part.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when a grip names a load that is not in the list.
+    pub(super) fn new(set: &GripSet, mesh: Option<&Mesh>) -> Result<Self> {
+        if cfg!(target_endian = "big") {
+            return Err(Error::input("report", "this machine stores numbers big-endian first", "write the page on a little-endian machine"));
+        }
+        let mut columns = Columns::default();
+        let grips = &set.grips[..set.grips.len().min(MAX_GRIPS)];
+        if let Some(grip) = grips.iter().find(|grip| grip.worst.load as usize >= set.loads.len()) {
+            let problem = format!("grip {} names load {}, but the file lists {}", grip.grip.id, grip.worst.load, set.loads.len());
+            return Err(Error::input("result file", problem, "use a file that gripfast wrote"));
+        }
+        let statuses = poses_and_scores(&mut columns, grips);
+        contacts(&mut columns, grips);
+        let by_load = loads(&mut columns, set, grips);
+        let display = mesh.and_then(|mesh| Display::new(mesh, TRIANGLE_BUDGET)).map(|display| surface(&mut columns, display));
+        let (gripper, gripper_problem) = match serde_json::from_value::<Gripper>(set.gripper.clone()) {
+            Ok(gripper) => (gripper_json(&gripper), Value::Null),
+            Err(error) => (Value::Null, Value::String(error.to_string())),
+        };
+        let header = json!({
+            "format": "gripfast-report", "version": 1, "provenance": set.provenance, "part": set.part, "display": display,
+            "gripper": gripper, "gripper_problem": gripper_problem, "loads": set.loads, "summary": set.summary,
+            "grips": { "total": set.grips.len(), "shown": grips.len() }, "statuses": statuses, "by_load": by_load,
+            "sections": columns.sections,
+        });
+        Ok(Self { header: script_safe(&header)?, data: packed(&columns.bytes)? })
+    }
+}
+
+/// JSON that cannot end the `script` element it stands in.
+fn script_safe(value: &impl Serialize) -> Result<String> {
+    let text = serde_json::to_string(value).map_err(|error| Error::input("result file", format!("cannot be written as JSON: {error}"), ""))?;
+    Ok(text.replace('<', "\\u003c"))
+}
+
+fn packed(bytes: &[u8]) -> Result<String> {
+    let failed = |error| Error::input("report", format!("compression failed: {error}"), "");
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::new(6));
+    encoder.write_all(bytes).map_err(failed)?;
+    Ok(base64::engine::general_purpose::STANDARD.encode(encoder.finish().map_err(failed)?))
+}
+
+/// One row per grip; answers with the names of the statuses in the order of their numbers.
+fn poses_and_scores(columns: &mut Columns, grips: &[RankedGrip]) -> Vec<Value> {
+    let nan = f64::NAN;
+    columns.f64("id", grips.iter().map(|g| g.grip.id as f64));
+    columns.f64("flip_of", grips.iter().map(|g| g.grip.flip_of.map_or(nan, |id| id as f64)));
+    columns.u32("rank", grips.iter().map(|g| u32::try_from(g.rank).unwrap_or(u32::MAX)));
+    columns.f32("origin", grips.iter().flat_map(|g| g.grip.part_from_grip.origin.to_array()));
+    columns.f32("rotation", grips.iter().flat_map(|g| g.grip.part_from_grip.rotation.to_cols_array()));
+    columns.f32("width", grips.iter().map(|g| g.grip.width));
+    columns.add("inside", "u8", &grips.iter().map(|g| u8::from(g.grip.inside)).collect::<Vec<_>>());
+    columns.f32("angle", grips.iter().map(|g| g.grip.angle));
+    columns.u32("face_i", grips.iter().map(|g| g.grip.face_i));
+    columns.u32("face_ii", grips.iter().map(|g| g.grip.face_ii));
+    columns.f32("score", grips.iter().map(|g| g.score.unwrap_or(nan)));
+    columns.f32("alpha", grips.iter().map(|g| g.alpha));
+    columns.f32("delta_d", grips.iter().map(|g| g.delta_d));
+    columns.f32("contact_share", grips.iter().map(|g| g.contact_share));
+    columns.f32("twist_margin", grips.iter().map(|g| g.twist_margin));
+    columns.f32("safety", grips.iter().map(|g| g.safety.unwrap_or(nan)));
+    columns.f32("force_needed", grips.iter().map(|g| g.force_needed.unwrap_or(nan)));
+    columns.u32("load", grips.iter().map(|g| g.worst.load));
+    columns.f32("mu", grips.iter().map(|g| g.worst.mu_s.unwrap_or(nan)));
+    columns.f32("wrench", grips.iter().flat_map(|g| [g.worst.wrench.force.to_array(), g.worst.wrench.moment.to_array()]).flatten());
+    columns.f32("pressure", grips.iter().flat_map(|g| g.worst.pressure.map_or([nan; 4], |p| [p.a_i0, p.a_ii0, p.a1, p.a2])));
+    columns.f32("bounds", grips.iter().flat_map(|g| g.worst.bounds.map_or([nan; 2], |b| [b.lower, b.upper])));
+    columns.f32("residual", grips.iter().map(|g| g.worst.residual));
+    // Slip: kind (0 unknown, 1 rotation, 2 translation, 3 none), then centre or direction, then sense.
+    let slip = |slip: Option<Slip>| match slip {
+        Option::None => [0.0, nan, nan, nan],
+        Some(Slip::Rotation { c, sense }) => [1.0, c[0], c[1], f64::from(sense)],
+        Some(Slip::Translation { direction }) => [2.0, direction[0], direction[1], nan],
+        Some(Slip::None) => [3.0, nan, nan, nan],
+    };
+    columns.f32("slip", grips.iter().flat_map(|g| slip(g.worst.slip)));
+    let mut statuses: Vec<Value> = Vec::new();
+    let numbers = grips.iter().map(|g| {
+        let name = serde_json::to_value(g.worst.status).unwrap_or(Value::Null);
+        let known = statuses.iter().position(|known| *known == name);
+        known.unwrap_or_else(|| {
+            statuses.push(name);
+            statuses.len() - 1
+        }) as u32
+    });
+    let numbers: Vec<u32> = numbers.collect();
+    columns.u32("status", numbers);
+    statuses
+}
+
+/// Contact areas, each written once: ring starts into the points, and per ring face (bit 0) and hole (bit 1).
+fn contacts(columns: &mut Columns, grips: &[RankedGrip]) {
+    let mut known: FxHashMap<Vec<u64>, u32> = FxHashMap::default();
+    let (mut ring_of_contact, mut point_of_ring, mut kinds, mut points) = (vec![0u32], vec![0u32], Vec::<u8>::new(), Vec::<f32>::new());
+    let numbers: Vec<u32> = grips
+        .iter()
+        .map(|grip| {
+            let contact = &*grip.grip.contact;
+            let next = known.len() as u32;
+            *known.entry(key(contact)).or_insert_with(|| {
+                for (face, patch) in [(0, &contact.face_i), (1, &contact.face_ii)] {
+                    for polygon in patch {
+                        for (hole, ring) in std::iter::once((0, &polygon.outer)).chain(polygon.holes.iter().map(|ring| (2, ring))) {
+                            points.extend(ring.iter().flat_map(|p| [p.x as f32, p.y as f32]));
+                            point_of_ring.push((points.len() / 2) as u32);
+                            kinds.push(face | hole);
+                        }
+                    }
+                }
+                ring_of_contact.push(kinds.len() as u32);
+                next
+            })
+        })
+        .collect();
+    columns.u32("contact", numbers);
+    columns.add("contact_rings", "u32", &ring_of_contact);
+    columns.add("ring_points", "u32", &point_of_ring);
+    columns.add("ring_kind", "u8", &kinds);
+    columns.add("points", "f32", &points);
+}
+
+/// The exact content of a contact as something that hashes.
+fn key(contact: &Contact) -> Vec<u64> {
+    let mut key = Vec::new();
+    for (face, patch) in [(0, &contact.face_i), (1, &contact.face_ii)] {
+        for polygon in patch {
+            for (hole, ring) in std::iter::once((0, &polygon.outer)).chain(polygon.holes.iter().map(|ring| (2, ring))) {
+                key.push((ring.len() as u64) << 2 | hole | face);
+                key.extend(ring.iter().flat_map(|p| [p.x.to_bits(), p.y.to_bits()]));
+            }
+        }
+    }
+    key
+}
+
+/// `mu_s` of each load on a logarithmic scale of 65,533 steps (0: no limit state, 1: zero), for as many grips as fit.
+fn loads(columns: &mut Columns, set: &GripSet, grips: &[RankedGrip]) -> Value {
+    let n = set.loads.len();
+    let whole = |grip: &&RankedGrip| n > 0 && grip.mu_by_load.len() == n;
+    let rows = grips.iter().take_while(whole).count().min(MAX_LOAD_VALUES / n.max(1));
+    let positive = || grips[..rows].iter().flat_map(|g| &g.mu_by_load).filter_map(|mu| *mu).filter(|mu| *mu > 0.0 && mu.is_finite());
+    let (low, high) = positive().fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), mu| (low.min(mu), high.max(mu)));
+    let (low, high) = if low < high { (low, high) } else { (if high > 0.0 { high } else { 1.0 }, high.max(1.0) * 2.0) };
+    let code = |mu: Option<f64>| match mu {
+        Some(mu) if mu > 0.0 && mu.is_finite() => 2 + ((mu / low).ln() / (high / low).ln() * 65_533.0).round().clamp(0.0, 65_533.0) as u16,
+        Some(mu) if mu <= 0.0 => 1,
+        _ => 0,
+    };
+    columns.add("by_load", "u16", &grips[..rows].iter().flat_map(|g| g.mu_by_load.iter().map(|&mu| code(mu))).collect::<Vec<_>>());
+    json!({ "rows": rows, "low": low, "high": high })
+}
+
+/// The drawable part; answers with what the page needs to read and to say about it.
+fn surface(columns: &mut Columns, display: Display) -> Value {
+    columns.add("positions", "u16", &display.positions);
+    columns.add("normals", "i8", &display.normals);
+    // Differences of neighbouring indices are small and repeat, which the compression needs.
+    let differences = |indices: &[u32]| -> Vec<i32> {
+        std::iter::once(0).chain(indices.iter().copied()).zip(indices).map(|(before, &now)| now.wrapping_sub(before) as i32).collect()
+    };
+    columns.add("triangles", "delta", &differences(&display.triangles));
+    columns.add("edges", "delta", &differences(&display.edges));
+    json!({
+        "origin": display.origin, "scale": display.scale, "triangles": display.original,
+        "shown": display.triangles.len() / 3, "deviation": display.deviation,
+    })
+}
+
+/// The gripper with each body's placement as a column-major 4x4 matrix.
+fn gripper_json(gripper: &Gripper) -> Value {
+    let body = |body: &Body| {
+        let (r, o) = (body.grip_from_body.rotation, body.grip_from_body.origin);
+        let column = |axis: glam::DVec3, w: f64| [axis.x, axis.y, axis.z, w];
+        let matrix = [column(r.x_axis, 0.0), column(r.y_axis, 0.0), column(r.z_axis, 0.0), column(o, 1.0)].concat();
+        let shape = match &body.shape {
+            Shape::Box { half } => json!({ "type": "box", "half": half }),
+            Shape::Cylinder { radius, half_height } => json!({ "type": "cylinder", "radius": radius, "half_height": half_height }),
+            Shape::Hull { points } => json!({ "type": "hull", "points": points }),
+        };
+        json!({ "name": body.name, "matrix": matrix, "shape": shape })
+    };
+    json!({
+        "name": gripper.name, "stroke": gripper.stroke, "force": gripper.force, "pad": gripper.pad,
+        "pad_friction": gripper.pad_friction, "pad_thickness": gripper.pad_thickness, "outer_pad": gripper.outer_pad,
+        "fingers": gripper.fingers.iter().map(body).collect::<Vec<_>>(), "palm": gripper.palm.iter().map(body).collect::<Vec<_>>(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_header_cannot_end_its_script_element() {
+        let text = script_safe(&json!({ "file": "</script><script>alert(1)</script><!--" })).unwrap();
+        assert!(!text.contains('<'), "{text}");
+        assert_eq!(serde_json::from_str::<Value>(&text).unwrap()["file"], "</script><script>alert(1)</script><!--");
+    }
+
+    #[test]
+    fn columns_are_aligned_and_named() {
+        let mut columns = Columns::default();
+        columns.add("a", "u8", &[1u8, 2, 3]);
+        columns.f64("b", [1.5]);
+        assert_eq!((columns.sections["a"], columns.sections["b"]), (("u8", 0, 3), ("f64", 8, 1)));
+        assert_eq!(columns.bytes.len(), 16);
+    }
+}

@@ -1,0 +1,167 @@
+// The chosen grip in numbers, its contact areas and its loads.
+
+import { css, gradient, friction, NO_LIMIT } from './colour.js';
+import { drawContact } from './contact.js';
+import { chosen, count, degrees, mm, newtons, NONE, number, percent, words } from './format.js';
+import { facts } from './run.js';
+
+export const STATUS = {
+  ok: ['Holds', 'good', 'A slip limit exists; no other was found.'],
+  separating: ['Separating', 'fair', 'Part of the pads lifts off; such grips were to be discarded.'],
+  ambiguous: ['Ambiguous', 'fair', 'A slip limit was found, but another one exists or could not be excluded.'],
+  twisted_out: ['Twists out', 'bad', 'No slip limit exists for this load: the contact twists out.'],
+  no_normal_force: ['No normal force', 'bad', 'The load along the closing axis takes the force off one pad.'],
+  no_contact: ['No contact', 'bad', 'A contact area is empty.'],
+  not_converged: ['Not converged', 'fair', 'The numbers are the best found; the residual is above its target.'],
+};
+
+export const statusOf = (name) => STATUS[name] ?? [words(name), 'fair', ''];
+const LOADS_SHOWN = 6;
+
+const vectorText = (values, factor, unit) => `(${values.map((v) => number(v * factor)).join(', ')})\u00a0${unit}`;
+
+/** Quaternion (x, y, z, w) of orthonormal columns. */
+function quaternion({ x1, x2, x3 }) {
+  const m = [[x1[0], x2[0], x3[0]], [x1[1], x2[1], x3[1]], [x1[2], x2[2], x3[2]]];
+  const trace = m[0][0] + m[1][1] + m[2][2];
+  if (trace > 0) {
+    const s = 2 * Math.sqrt(trace + 1);
+    return [(m[2][1] - m[1][2]) / s, (m[0][2] - m[2][0]) / s, (m[1][0] - m[0][1]) / s, s / 4];
+  }
+  const i = [0, 1, 2].reduce((best, k) => (m[k][k] > m[best][best] ? k : best), 0);
+  const [j, k] = [(i + 1) % 3, (i + 2) % 3];
+  const s = 2 * Math.sqrt(1 + m[i][i] - m[j][j] - m[k][k]);
+  const q = [0, 0, 0, (m[k][j] - m[j][k]) / s];
+  q[i] = s / 4;
+  q[j] = (m[j][i] + m[i][j]) / s;
+  q[k] = (m[k][i] + m[i][k]) / s;
+  return q;
+}
+
+export class Detail {
+  constructor(root, report, ball) {
+    this.root = root;
+    this.report = report;
+    this.ball = ball;
+    this.find = (selector) => root.querySelector(selector);
+    this.find('.ball-legend .bar').style.background = gradient(friction);
+    this.find('.swatch.none').style.background = css(NO_LIMIT);
+    if (ball) {
+      ball.hover = (hit) => {
+        this.find('.ball-probe').textContent = hit ? `${this.report.header.loads[hit.load].name}: ${Number.isFinite(hit.mu) ? number(hit.mu) : 'no slip limit'}` : '';
+      };
+    }
+  }
+
+  show(i) {
+    const { report } = this;
+    const c = report.column;
+    const [name, kind, meaning] = statusOf(report.status(i));
+    this.find('.grip-title').textContent = `Grip ${count(c.rank[i])}`;
+    const pill = this.find('.pill');
+    pill.className = `pill ${kind}`;
+    pill.textContent = name;
+    this.root.querySelectorAll('.pad-face').forEach((place, face) => (place.textContent = `on face ${c[face ? 'face_ii' : 'face_i'][i]}`));
+    this.find('.grip-sub').textContent = `${c.inside[i] ? 'From inside, faces' : 'Faces'} ${c.face_i[i]} and ${c.face_ii[i]}, id ${c.id[i]}${Number.isFinite(c.flip_of[i]) ? `, jaws exchanged of ${c.flip_of[i]}` : ''}`;
+    this.find('.meaning').textContent = report.status(i) === 'ok' ? '' : meaning;
+    this.numbers(i);
+    drawContact(this.find('.contact'), report, i);
+    this.loads(i);
+    this.full(i);
+  }
+
+  numbers(i) {
+    const { column: c, header } = this.report;
+    const padFriction = header.gripper?.pad_friction;
+    const tile = (id, value, note) => {
+      const place = this.find(`[data-value="${id}"]`);
+      place.querySelector('.value').textContent = value;
+      place.querySelector('.note').textContent = note;
+    };
+    tile('mu', number(c.mu[i]), 'at the worst load');
+    const safety = c.safety[i];
+    tile('safety', Number.isFinite(safety) ? `${number(safety)}\u00d7` : c.mu[i] === 0 ? '\u221e' : NONE, padFriction ? `pad friction ${chosen(padFriction)}` : 'pad friction not stated');
+    tile('squeeze', newtons(c.force_needed[i]), padFriction ? `for pad friction ${chosen(padFriction)}` : 'pad friction not stated');
+    tile('opening', mm(c.width[i]), c.inside[i] ? 'between the faces, from inside' : 'between the pads');
+    this.find('.more').replaceChildren(
+      facts([
+        ['Contact left', percent(c.contact_share[i])],
+        ['Twist-out margin', percent(c.twist_margin[i])],
+        ['Self-aligning tilt \u03b1', degrees(c.alpha[i])],
+        ['Opening to twist out \u0394d', mm(c.delta_d[i])],
+        ['Score', number(c.score[i], 4)],
+        ['Approach angle', degrees(c.angle[i])],
+      ]),
+    );
+  }
+
+  loads(i) {
+    const { header } = this.report;
+    const range = this.ball?.setGrip(i);
+    const values = this.report.byLoad(i);
+    const legend = this.find('.ball-legend');
+    legend.style.visibility = range ? 'visible' : 'hidden';
+    if (range) {
+      legend.querySelector('.min').textContent = number(range.low);
+      legend.querySelector('.max').textContent = number(range.high);
+      this.find('.missing').textContent = range.missing ? `no slip limit: ${count(range.missing)}` : '';
+      this.find('.swatch.none').hidden = !range.missing;
+    } else {
+      this.find('.missing').textContent = '';
+      this.find('.swatch.none').hidden = true;
+    }
+    const worst = this.report.column.load[i];
+    this.find('.worst-load').textContent = header.loads[worst].name;
+    const sorted = values ? [...values].map((mu) => (Number.isFinite(mu) ? mu : Infinity)).sort((a, b) => a - b) : [];
+    const part = (share) => (sorted.length ? number(sorted[Math.round((sorted.length - 1) * share)]) : NONE);
+    this.find('.spread').replaceChildren(facts([['Easiest load', part(0)], ['Median', part(0.5)], ['Hardest load', values ? part(1) : number(this.report.column.mu[i])]]));
+    const canvas = this.find('.ball');
+    canvas.setAttribute('aria-label', range
+      ? `Friction needed over ${count(header.loads.length)} loads: ${number(range.low)} to ${number(range.high)}, worst under ${header.loads[worst].name}`
+      : `Worst load ${header.loads[worst].name}; the table of all loads was not stored`);
+    this.find('.ball-note').textContent = values ? 'A point of the ball is the direction in which a load pushes the part; it turns with the view.' : 'Only the worst load of this grip was stored.';
+    const body = this.find('.loads tbody');
+    body.replaceChildren();
+    const order = values ? [...values.keys()].sort((a, b) => (Number.isFinite(values[b]) ? values[b] : Infinity) - (Number.isFinite(values[a]) ? values[a] : Infinity) || (a === worst ? -1 : b === worst ? 1 : a - b)) : [worst];
+    for (const load of order.slice(0, LOADS_SHOWN)) {
+      const row = body.insertRow();
+      if (load === worst) row.className = 'worst';
+      const name = row.insertCell();
+      name.textContent = this.shortName(load);
+      name.title = header.loads[load].name;
+      row.insertCell().textContent = number(values ? values[load] : this.report.column.mu[i]);
+    }
+    this.find('.loads caption').textContent = order.length > LOADS_SHOWN ? `The ${LOADS_SHOWN} hardest of ${count(order.length)} loads` : 'Loads, hardest first';
+  }
+
+  /** A load's name without the words that all loads begin with. */
+  shortName(load) {
+    const { loads } = this.report.header;
+    this.prefix ??= loads.length < 2 ? 0 : loads.reduce((common, { name }) => {
+      while (!name.startsWith(common)) common = common.slice(0, -1);
+      return common;
+    }, loads[0].name).search(/\S*$/);
+    return loads[load].name.slice(this.prefix) || loads[load].name;
+  }
+
+  full(i) {
+    const { column: c } = this.report;
+    const pose = this.report.pose(i);
+    const wrench = c.wrench.subarray(6 * i, 6 * i + 6);
+    const planes = this.report.pressure(i);
+    const [lower, upper] = c.bounds.subarray(2 * i, 2 * i + 2);
+    this.find('.full').replaceChildren(
+      facts([
+        ['Grip origin', vectorText(pose.origin, 1e3, 'mm')],
+        ['Approach x\u2081', vectorText(pose.x1, 1, '').trim()],
+        ['Closing x\u2083', vectorText(pose.x3, 1, '').trim()],
+        ['Quaternion x, y, z, w', vectorText(quaternion(pose), 1, '').trim()],
+        ['Force, grip frame', vectorText([...wrench.subarray(0, 3)], 1, 'N')],
+        ['Moment, grip frame', vectorText([...wrench.subarray(3)], 1, 'N\u00b7m')],
+        ['Pressure planes', planes ? `${number(planes[0][0] / 1e3)} and ${number(planes[1][0] / 1e3)}\u00a0kPa; slopes ${number(planes[0][1] / 1e6)}, ${number(planes[0][2] / 1e6)}\u00a0kPa/mm` : null],
+        ['Bounds on friction', Number.isFinite(lower) ? `${number(lower, 6)} to ${Number.isFinite(upper) ? number(upper, 6) : 'open'}` : null],
+        ['Residual', number(c.residual[i], 2)],
+      ]),
+    );
+  }
+}

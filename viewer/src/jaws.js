@@ -1,0 +1,89 @@
+// The gripper as three.js objects, in metres, in the grip frame (x1 approach, x3 closing).
+
+import {
+  BoxGeometry, BufferGeometry, CylinderGeometry, EdgesGeometry, ExtrudeGeometry, Float32BufferAttribute, Group, LineSegments,
+  Matrix4, Mesh, Path, Shape, ShapeGeometry, Vector3,
+} from 'three';
+import { ConvexGeometry } from 'three/examples/jsm/geometries/ConvexGeometry.js';
+
+/** Depth at which a pad of unknown thickness is drawn [m]. */
+const PAD_DEPTH = 0.002;
+
+function bodyGeometry(shape) {
+  if (shape.type === 'box') return new BoxGeometry(...shape.half.map((h) => 2 * h));
+  if (shape.type === 'hull') return new ConvexGeometry(shape.points.map((point) => new Vector3(...point)));
+  // three.js cylinders stand along y, the gripper file's along z.
+  return new CylinderGeometry(shape.radius, shape.radius, 2 * shape.half_height, 40).rotateX(Math.PI / 2);
+}
+
+function body(description, surface, materials) {
+  const geometry = bodyGeometry(description.shape);
+  const group = new Group();
+  group.add(new Mesh(geometry, surface), new LineSegments(new EdgesGeometry(geometry, 30), materials.jawEdge));
+  group.applyMatrix4(new Matrix4().fromArray(description.matrix));
+  return group;
+}
+
+function pad(gripper, materials) {
+  const geometry = new ExtrudeGeometry(new Shape(gripper.pad.map(([x, y]) => ({ x, y }))), { depth: gripper.pad_thickness || PAD_DEPTH, bevelEnabled: false });
+  const group = new Group();
+  group.add(new Mesh(geometry, materials.pad), new LineSegments(new EdgesGeometry(geometry, 30), materials.padEdge));
+  return group;
+}
+
+/** Two fingers, a palm and the contact areas; `place` opens the jaws. */
+export class Jaws {
+  constructor(gripper, materials) {
+    this.materials = materials;
+    this.root = new Group();
+    this.fingers = [new Group(), new Group()];
+    this.solid = new Group();
+    for (const side of this.fingers) {
+      const finger = new Group();
+      if (gripper) {
+        finger.add(pad(gripper, materials));
+        gripper.fingers.forEach((description) => finger.add(body(description, materials.jaw, materials)));
+      }
+      side.add(finger);
+      this.solid.add(side);
+    }
+    // The other finger is the first one turned by 180 degrees about the approach axis.
+    this.fingers[1].children[0].rotation.x = Math.PI;
+    gripper?.palm.forEach((description) => this.solid.add(body(description, materials.palm, materials)));
+    this.contacts = [new Group(), new Group()];
+    this.root.add(this.solid, ...this.contacts);
+  }
+
+  /** Pads at `opening`, contact areas on the faces at `width` [m], which is negative for a grip from inside. */
+  place(opening, width) {
+    this.fingers[0].position.z = opening / 2;
+    this.fingers[1].position.z = -opening / 2;
+    this.contacts[0].position.z = width / 2;
+    this.contacts[1].position.z = -width / 2;
+  }
+
+  /** Shows the contact areas of a grip (rings of `Report.contact`). */
+  setContact(rings) {
+    for (const face of [0, 1]) {
+      const group = this.contacts[face];
+      group.children.forEach((child) => child.geometry.dispose());
+      group.clear();
+      let shape = null;
+      const shapes = [];
+      const outline = [];
+      for (const ring of rings.filter((ring) => ring.face === face && ring.points.length > 2)) {
+        const points = ring.points.map(([x, y]) => ({ x, y }));
+        if (ring.hole) shape?.holes.push(new Path(points));
+        else shapes.push((shape = new Shape(points)));
+        points.forEach((from, k) => {
+          const to = points[(k + 1) % points.length];
+          outline.push(from.x, from.y, 0, to.x, to.y, 0);
+        });
+      }
+      if (shapes.length === 0) continue;
+      const line = new BufferGeometry().setAttribute('position', new Float32BufferAttribute(outline, 3));
+      group.add(new Mesh(new ShapeGeometry(shapes), this.materials.contact), new LineSegments(line, this.materials.contactEdge));
+    }
+  }
+}
+

@@ -1,0 +1,235 @@
+// Starts the page: data, list, view, detail, and what connects them.
+
+import { LoadBall } from './ball.js';
+import { css, friction, frictionScale } from './colour.js';
+import { load } from './data.js';
+import { Detail, statusOf } from './detail.js';
+import { EMPTY, pairName, pairs, select, sortKeys } from './filter.js';
+import { count, fixed, number } from './format.js';
+import { Histogram } from './histogram.js';
+import { VirtualList } from './list.js';
+import { drawRun, limits } from './run.js';
+import { View } from './scene.js';
+import { theme } from './theme.js';
+import { triad } from './triad.js';
+
+const $ = (selector) => document.querySelector(selector);
+
+async function start() {
+  const report = await load(document);
+  const { header } = report;
+  const file = header.part.file.split(/[\\/]/).pop();
+  document.title = `${file}: ${count(header.grips.total)} grips`;
+  $('#title').textContent = file;
+  $('#title').title = header.part.file;
+  $('#subtitle').textContent = [header.gripper?.name, `${count(header.grips.total)} grips`, `${count(header.loads.length)} load${header.loads.length === 1 ? '' : 's'}`].filter(Boolean).join(' \u00b7 ');
+  const scale = frictionScale(Array.from(report.column.mu));
+  let view = null;
+  try {
+    view = new View($('#view'), report, scale);
+  } catch (error) {
+    $('#no-webgl').hidden = false;
+    $('#toolbar').hidden = $('#triad').toggleAttribute('hidden', true);
+    console.warn('three-dimensional view not available:', error.message);
+  }
+  const ball = new LoadBall($('.ball'), report, view);
+  const detail = new Detail($('#panel-grip'), report, ball);
+  const turn = triad($('#triad'));
+  view?.listeners.push(() => {
+    turn(view.axes());
+    ball.draw();
+  });
+  theme($('#theme'), (dark) => {
+    view?.setTheme(dark);
+    ball.draw();
+  });
+
+  const state = { filter: { ...EMPTY }, key: 'rank', direction: 1, order: [], chosen: -1 };
+  const keys = sortKeys(report);
+  const squeeze = report.column.force_needed.some(Number.isFinite);
+  if (!squeeze) delete keys.squeeze;
+  const third = squeeze ? 'squeeze' : 'alpha';
+  $('#columns').querySelector('[data-key="squeeze"]').dataset.key = third;
+  if (!squeeze) $('#columns').querySelector('[data-key="alpha"]').textContent = 'Tilt, \u00b0';
+
+  const list = new VirtualList($('#list'), {
+    fill(row, position) {
+      const i = state.order[position];
+      const c = report.column;
+      const mu = c.mu[i];
+      const [status, kind] = statusOf(report.status(i));
+      row.replaceChildren();
+      const cell = (className, text) => {
+        const span = document.createElement('span');
+        span.className = className;
+        span.textContent = text;
+        row.append(span);
+        return span;
+      };
+      cell('rank', count(c.rank[i]));
+      const needed = cell('mu', Number.isFinite(mu) ? fixed(mu, 3) : '\u2013');
+      needed.style.setProperty('--swatch', Number.isFinite(mu) ? css(friction(scale.at(mu))) : 'transparent');
+      const value = squeeze ? c.force_needed[i] : (c.alpha[i] * 180) / Math.PI;
+      cell('number', fixed(value, value < 99.95 ? 1 : 0));
+      cell('number', fixed(c.width[i] * 1e3, 1));
+      cell('faces', pairName(report, i));
+      cell(`dot ${kind}`, '').title = status;
+      row.setAttribute('aria-label', `Rank ${c.rank[i]}, friction needed ${number(mu)}, ${squeeze ? `squeeze ${number(value)} newtons` : `tilt ${number(value)} degrees`}, opening ${number(c.width[i] * 1e3)} millimetres, faces ${c.face_i[i]} and ${c.face_ii[i]}, ${status}`);
+    },
+    choose: (position) => choose(state.order[position]),
+  });
+
+  function choose(i, { glide = true, scroll = true } = {}) {
+    state.chosen = i;
+    list.mark(state.order.indexOf(i), scroll);
+    view?.setGrip(i, glide);
+    detail.show(i);
+    const c = report.column;
+    $('#said').textContent = `Grip ${c.rank[i]}: friction needed ${number(c.mu[i])}, ${statusOf(report.status(i))[0]}`;
+    history.replaceState(null, '', `#grip=${c.id[i]}`);
+  }
+
+  const histogram = new Histogram($('#histogram'), report, scale, (low, high) => {
+    Object.assign(state.filter, { low, high });
+    relist();
+  });
+
+  function relist() {
+    state.order = select(report, state.filter, state.key, state.direction);
+    list.reset(state.order.length, state.order.indexOf(state.chosen));
+    $('#list').scrollTop = 0;
+    list.draw();
+    const all = state.order.length === report.n;
+    $('#count').textContent = all ? `${count(report.n)} grips` : `${count(state.order.length)} of ${count(report.n)} grips`;
+    $('#empty').hidden = state.order.length > 0;
+    const filtered = JSON.stringify(state.filter) !== JSON.stringify(EMPTY) || state.filter.low !== -Infinity || state.filter.high !== Infinity;
+    $('#clear').disabled = !filtered;
+    histogram.draw(all ? null : state.order);
+    view?.setListed(state.order);
+    for (const button of document.querySelectorAll('#columns button')) {
+      const active = button.dataset.key === state.key;
+      button.setAttribute('aria-pressed', String(active));
+      button.dataset.direction = active ? (state.direction > 0 ? 'up' : 'down') : '';
+    }
+    $('#sort').value = state.key;
+    const up = state.direction > 0;
+    $('#direction').textContent = up ? '\u2191' : '\u2193';
+    $('#direction').setAttribute('aria-label', up ? 'Smallest first' : 'Largest first');
+  }
+
+  function sortBy(key) {
+    state.direction = key === state.key ? -state.direction : keys[key].best;
+    state.key = key;
+    relist();
+  }
+
+  const option = (value, text) => new Option(text, value);
+  $('#sort').append(...Object.entries(keys).map(([key, { name }]) => option(key, name)));
+  $('#pair').append(option('', 'All face pairs'), ...pairs(report).map(([pair, n]) => option(pair, `${pair.replace('/', ' / ')}  (${count(n)})`)));
+  $('#status').append(option('', 'Any status'), ...header.statuses.map((name) => option(name, statusOf(name)[0])));
+  $('#columns').addEventListener('click', (event) => event.target.dataset.key && sortBy(event.target.dataset.key));
+  $('#sort').addEventListener('change', (event) => {
+    state.key = '';
+    sortBy(event.target.value);
+  });
+  $('#direction').addEventListener('click', () => sortBy(state.key));
+  for (const id of ['pair', 'status', 'text']) {
+    $(`#${id}`).addEventListener('input', (event) => {
+      state.filter[id] = event.target.value;
+      relist();
+    });
+  }
+  $('#clear').addEventListener('click', () => {
+    state.filter = { ...EMPTY };
+    for (const id of ['pair', 'status', 'text']) $(`#${id}`).value = '';
+    histogram.reset();
+    relist();
+  });
+
+  drawRun($('#run-content'), report);
+  $('#note').textContent = limits(report)[0] ?? '';
+  bindView();
+  bindTabs();
+
+  function bindView() {
+    if (!view) return;
+    view.onPick = (i) => choose(i);
+    $('#toolbar').addEventListener('click', (event) => {
+      const button = event.target.closest('button');
+      if (!button) return;
+      const { act, toggle } = button.dataset;
+      if (act === 'fit') view.fit();
+      if (act === 'grip') view.lookAtGrip();
+      if (toggle) {
+        const on = button.getAttribute('aria-pressed') !== 'true';
+        button.setAttribute('aria-pressed', String(on));
+        if (toggle === 'open') view.setOpen(on);
+        else view.show(toggle, on);
+      }
+    });
+    $('#turn').addEventListener('click', () => {
+      const force = report.load(state.chosen).wrench.force;
+      if (Math.hypot(...force) > 0) view.faceDirection(force);
+    });
+  }
+
+  function bindTabs() {
+    const tabs = [...document.querySelectorAll('[role="tab"]')];
+    const open = (tab, focus) => {
+      document.body.dataset.tab = tab.dataset.tab;
+      tabs.forEach((other) => {
+        other.setAttribute('aria-selected', String(other === tab));
+        other.tabIndex = other === tab ? 0 : -1;
+      });
+      if (focus) tab.focus();
+      list.draw();
+      ball.draw();
+    };
+    const shown = () => tabs.filter((tab) => tab.offsetParent !== null);
+    tabs.forEach((tab) => tab.addEventListener('click', () => open(tab)));
+    $('[role="tablist"]').addEventListener('keydown', (event) => {
+      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!step) return;
+      event.preventDefault();
+      const visible = shown();
+      open(visible[(visible.indexOf(document.activeElement) + step + visible.length) % visible.length], true);
+    });
+    // The list has its own column on wide screens and a tab on narrow ones.
+    const wide = window.matchMedia('(min-width: 1000px)');
+    const settle = () => {
+      $('#filter-box').open = wide.matches;
+      open(tabs.find((tab) => tab.dataset.tab === (wide.matches ? 'grip' : 'list')));
+    };
+    wide.addEventListener('change', settle);
+    settle();
+  }
+
+  document.addEventListener('keydown', (event) => {
+    if (event.key === '/' && !event.target.matches('input, select')) {
+      event.preventDefault();
+      $('#text').focus();
+    }
+  });
+
+  relist();
+  const asked = report.indexOfId.get(Number(/grip=(\d+)/.exec(location.hash)?.[1]));
+  if (report.n > 0) {
+    choose(asked ?? state.order[0], { glide: false });
+    view?.fit();
+  } else document.body.classList.add('no-grips');
+  view?.draw();
+  document.documentElement.dataset.ready = String(Math.round(performance.now()));
+  // For tests and for the curious: what is shown, as numbers.
+  window.gripfast = {
+    report, state, view,
+    jaw: (side) => (view ? [...view.jaws.fingers[side].matrixWorld.elements] : null),
+  };
+}
+
+start().catch((error) => {
+  document.documentElement.dataset.ready = 'failed';
+  const box = $('#failed');
+  box.hidden = false;
+  box.textContent = `This page could not be shown: ${error.message}`;
+  console.error(error);
+});

@@ -1,0 +1,416 @@
+// The part with the chosen grip in three dimensions. Draws only when something changed. The world is in millimetres.
+
+import {
+  AmbientLight, Box3, Box3Helper, BufferAttribute, BufferGeometry, CanvasTexture, Color, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide,
+  Group, HemisphereLight, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Points,
+  PointsMaterial, Quaternion, Raycaster, Scene, SphereGeometry, Spherical, Vector2, Vector3, WebGLRenderer,
+} from 'three';
+import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import { friction } from './colour.js';
+import { Jaws } from './jaws.js';
+
+const MM = 1000;
+const MOVE_MS = 260;
+const UP = new Vector3(0, 0, 1);
+
+const PALETTE = {
+  light: { part: '#b4bdc8', edge: '#4b5663', jaw: '#33475c', jawEdge: '#22303f', pad: '#d9762b', load: '#a3158f', sky: '#ffffff', ground: '#9aa3ad' },
+  dark: { part: '#76828f', edge: '#11161b', jaw: '#9db4cc', jawEdge: '#c9d8e6', pad: '#f0964d', load: '#ef6bd8', sky: '#f2f6fa', ground: '#4a535d' },
+};
+
+const vector = (list) => new Vector3(...list);
+
+function dotTexture() {
+  const canvas = document.createElement('canvas');
+  canvas.width = canvas.height = 32;
+  const context = canvas.getContext('2d');
+  context.fillStyle = '#fff';
+  context.beginPath();
+  context.arc(16, 16, 14.5, 0, 2 * Math.PI);
+  context.fill();
+  // A rim in the dot's own darker shade sets it off from the part.
+  context.lineWidth = 4;
+  context.strokeStyle = '#777';
+  context.beginPath();
+  context.arc(16, 16, 12.5, 0, 2 * Math.PI);
+  context.stroke();
+  return new CanvasTexture(canvas);
+}
+
+export class View {
+  /** Throws when the browser has no WebGL. */
+  constructor(host, report, scale) {
+    this.host = host;
+    this.report = report;
+    this.listeners = [];
+    this.onPick = () => {};
+    this.grip = -1;
+    this.open = false;
+    this.renderer = new WebGLRenderer({ antialias: true, alpha: true });
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
+    this.canvas = this.renderer.domElement;
+    this.canvas.tabIndex = 0;
+    this.canvas.setAttribute('role', 'application');
+    this.canvas.setAttribute('aria-label', 'Part and gripper in three dimensions. Arrow keys turn, plus and minus zoom, shift with arrows moves, F shows all.');
+    host.prepend(this.canvas);
+    this.scene = new Scene();
+    this.world = new Group();
+    this.world.scale.setScalar(MM);
+    this.scene.add(this.world);
+    this.camera = new PerspectiveCamera(28, 1, 1, 1000);
+    this.camera.up.copy(UP);
+    this.lights();
+    this.buildMaterials();
+    this.buildPart();
+    this.buildDots(scale);
+    this.buildLoad();
+    this.jaws = new Jaws(report.header.gripper, this.materials);
+    this.world.add(this.jaws.root);
+    this.controls = new OrbitControls(this.camera, this.canvas);
+    this.controls.enableDamping = false;
+    this.controls.zoomToCursor = true;
+    this.controls.addEventListener('change', () => this.render());
+    this.bindInput();
+    this.world.updateMatrixWorld(true);
+    new ResizeObserver(() => this.resize()).observe(host);
+    this.resize();
+    this.fit(0);
+  }
+
+  lights() {
+    this.sky = new HemisphereLight(0xffffff, 0x888888, 1.5);
+    this.sky.position.copy(UP);
+    // A key light from over the viewer's left shoulder: edges of the part stay readable from every side.
+    this.key = new DirectionalLight(0xffffff, 1.9);
+    this.key.position.set(-0.6, 0.9, 1);
+    this.camera.add(this.key, this.key.target, new AmbientLight(0xffffff, 0.35));
+    this.key.target.position.set(0, 0, -1);
+    this.scene.add(this.sky, this.camera);
+  }
+
+  buildMaterials() {
+    const glass = { transparent: true, depthWrite: false, side: DoubleSide };
+    const lift = { polygonOffset: true, polygonOffsetFactor: 1.5, polygonOffsetUnits: 1.5 };
+    this.materials = {
+      part: new MeshStandardMaterial({ roughness: 0.72, metalness: 0.08, side: DoubleSide, ...lift }),
+      edge: new LineBasicMaterial({ transparent: true, opacity: 0.75 }),
+      jaw: new MeshStandardMaterial({ roughness: 0.6, metalness: 0.1, opacity: 0.26, ...glass }),
+      jawEdge: new LineBasicMaterial({ transparent: true, opacity: 0.8 }),
+      palm: new MeshStandardMaterial({ roughness: 0.6, metalness: 0.1, opacity: 0.14, ...glass }),
+      pad: new MeshStandardMaterial({ roughness: 0.9, metalness: 0, opacity: 0.5, ...glass }),
+      padEdge: new LineBasicMaterial(),
+      contact: new MeshBasicMaterial({ transparent: true, opacity: 0.85, depthWrite: false, side: DoubleSide }),
+      contactEdge: new LineBasicMaterial(),
+      load: new MeshBasicMaterial({ depthTest: false, transparent: true }),
+    };
+  }
+
+  buildPart() {
+    const { display, part } = this.report.header;
+    const low = vector(part.bbox_min).multiplyScalar(MM);
+    const high = vector(part.bbox_max).multiplyScalar(MM);
+    this.box = new Box3(low, high);
+    this.middle = this.box.getCenter(new Vector3());
+    this.radius = Math.max(low.distanceTo(high) / 2, 1e-3);
+    if (!display) {
+      this.part = new Box3Helper(new Box3(vector(part.bbox_min), vector(part.bbox_max)));
+      this.part.material = this.materials.edge;
+      this.world.add(this.part);
+      return;
+    }
+    const { positions, normals, triangles, edges } = this.report.column;
+    const position = new BufferAttribute(positions, 3, true);
+    const surface = new BufferGeometry();
+    surface.setAttribute('position', position);
+    // Four bytes per normal keep each vertex aligned; three.js reads the first three.
+    surface.setAttribute('normal', new BufferAttribute(normals, 4, true));
+    surface.setIndex(new BufferAttribute(triangles, 1));
+    const lines = new BufferGeometry();
+    lines.setAttribute('position', position);
+    lines.setIndex(new BufferAttribute(edges, 1));
+    this.part = new Group();
+    this.partMesh = new Mesh(surface, this.materials.part);
+    this.part.add(this.partMesh, new LineSegments(lines, this.materials.edge));
+    this.part.position.set(...display.origin);
+    this.part.scale.setScalar(display.scale);
+    this.world.add(this.part);
+  }
+
+  /** Both pad centres of every grip, coloured by mu_s. */
+  buildDots(scale) {
+    const { n, column } = this.report;
+    const at = new Float32Array(6 * n);
+    const colour = new Uint8Array(6 * n);
+    for (let i = 0; i < n; i++) {
+      const rgb = friction(scale.at(column.mu[i]));
+      for (let side = 0; side < 2; side++) {
+        const reach = (side ? -0.5 : 0.5) * column.width[i];
+        for (let k = 0; k < 3; k++) {
+          at[6 * i + 3 * side + k] = column.origin[3 * i + k] + reach * column.rotation[9 * i + 6 + k];
+          colour[6 * i + 3 * side + k] = rgb[k];
+        }
+      }
+    }
+    const geometry = new BufferGeometry();
+    geometry.setAttribute('position', new BufferAttribute(at, 3));
+    geometry.setAttribute('color', new BufferAttribute(colour, 3, true));
+    // Vertex colours are taken as linear; the picture wants these very sRGB values.
+    const linear = new Color();
+    for (let k = 0; k < 2 * n; k++) {
+      linear.setRGB(colour[3 * k] / 255, colour[3 * k + 1] / 255, colour[3 * k + 2] / 255, 'srgb');
+      colour.set([linear.r * 255, linear.g * 255, linear.b * 255], 3 * k);
+    }
+    this.dotIndex = new Uint32Array(2 * n);
+    geometry.setIndex(new BufferAttribute(this.dotIndex, 1));
+    const material = new PointsMaterial({ size: 7, sizeAttenuation: false, vertexColors: true, map: dotTexture(), alphaTest: 0.35, transparent: true });
+    // Dots lie in the part's faces: a little towards the viewer, the faces no longer cut them.
+    const lift = (0.025 * this.radius).toExponential(6);
+    material.onBeforeCompile = (shader) => {
+      shader.vertexShader = shader.vertexShader.replace('#include <project_vertex>', `#include <project_vertex>\nmvPosition.xyz *= 1.0 - ${lift} / max(-mvPosition.z, ${lift});\ngl_Position = projectionMatrix * mvPosition;`);
+    };
+    this.dots = new Points(geometry, material);
+    this.dots.frustumCulled = false;
+    this.world.add(this.dots);
+  }
+
+  buildLoad() {
+    this.load = new Group();
+    const [shaft, head] = [0.62, 0.38];
+    const stem = new Mesh(new CylinderGeometry(0.028, 0.028, shaft, 16).translate(0, shaft / 2, 0), this.materials.load);
+    const tip = new Mesh(new ConeGeometry(0.1, head, 24).translate(0, shaft + head / 2, 0), this.materials.load);
+    this.load.add(stem, tip, new Mesh(new SphereGeometry(0.055, 20, 14), this.materials.load));
+    this.load.traverse((object) => (object.renderOrder = 10));
+    this.load.position.set(...this.report.header.part.mass.centre_of_mass);
+    this.world.add(this.load);
+  }
+
+  setTheme(dark) {
+    const colours = PALETTE[dark ? 'dark' : 'light'];
+    for (const name of ['part', 'edge', 'jaw', 'jawEdge', 'pad', 'load']) this.materials[name].color.set(colours[name]);
+    this.materials.palm.color.set(colours.jaw);
+    for (const name of ['padEdge', 'contact', 'contactEdge']) this.materials[name].color.set(colours.pad);
+    this.sky.color.set(colours.sky);
+    this.sky.groundColor.set(colours.ground);
+    this.render();
+  }
+
+  /** Shows these grips' dots, the best drawn last so that it stays on top. */
+  setListed(indices) {
+    const worstFirst = Uint32Array.from(indices).sort((a, b) => b - a);
+    worstFirst.forEach((i, k) => this.dotIndex.set([2 * i, 2 * i + 1], 2 * k));
+    this.dots.geometry.index.needsUpdate = true;
+    this.dots.geometry.setDrawRange(0, 2 * worstFirst.length);
+    this.listed = worstFirst;
+    this.render();
+  }
+
+  /** Shows grip `i` (-1: none), gliding there from the last one. */
+  setGrip(i, glide = true) {
+    const known = this.grip >= 0;
+    this.grip = i;
+    this.jaws.root.visible = i >= 0;
+    this.load.visible = false;
+    if (i < 0) return this.render();
+    const { x1, x2, x3, origin } = this.report.pose(i);
+    const to = { q: new Quaternion().setFromRotationMatrix(new Matrix4().makeBasis(vector(x1), vector(x2), vector(x3))), p: vector(origin) };
+    this.jaws.setContact(this.report.contact(i));
+    this.width = this.report.column.width[i];
+    this.inside = this.report.column.inside[i] === 1;
+    const force = vector(this.report.load(i).wrench.force);
+    if (force.length() > 0) {
+      this.load.visible = true;
+      this.load.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), force.normalize());
+      this.load.scale.setScalar((0.62 * this.radius) / MM);
+    }
+    this.glide(to, known && glide);
+  }
+
+  setOpen(open) {
+    this.open = open;
+    if (this.grip >= 0) this.glide({ q: this.jaws.root.quaternion.clone(), p: this.jaws.root.position.clone() }, true);
+  }
+
+  glide(to, smooth) {
+    cancelAnimationFrame(this.motion);
+    const root = this.jaws.root;
+    const from = { q: root.quaternion.clone(), p: root.position.clone(), opening: this.opening ?? this.width };
+    const { stroke, outer_pad: outer } = this.report.header.gripper ?? {};
+    // From inside, the fingers' outer faces touch, and the jaws let go by closing.
+    const holding = this.inside ? this.width - 2 * (outer ?? 0) : this.width;
+    const free = stroke && (this.inside ? Math.min(stroke[0], holding) : Math.max(stroke[1], holding));
+    const opening = this.open && stroke ? free : holding;
+    const step = (t) => {
+      root.quaternion.slerpQuaternions(from.q, to.q, t);
+      root.position.lerpVectors(from.p, to.p, t);
+      this.opening = from.opening + t * (opening - from.opening);
+      this.jaws.place(this.opening, this.inside ? -this.width : this.width);
+      this.render();
+    };
+    this.moving = false;
+    if (!smooth || window.matchMedia('(prefers-reduced-motion: reduce)').matches) return step(1);
+    this.moving = true;
+    const start = performance.now();
+    const frame = (now) => {
+      const t = Math.min(1, Math.max(0, (now - start) / MOVE_MS));
+      step(t * t * (3 - 2 * t));
+      this.moving = t < 1;
+      if (this.moving) this.motion = requestAnimationFrame(frame);
+    };
+    this.motion = requestAnimationFrame(frame);
+  }
+
+  show(what, visible) {
+    if (what === 'gripper') this.jaws.solid.visible = visible;
+    if (what === 'dots') this.dots.visible = visible;
+    if (what === 'load') this.load.parent[visible ? 'add' : 'remove'](this.load);
+    if (what === 'glass' && this.partMesh) {
+      const material = this.materials.part;
+      material.transparent = visible;
+      material.opacity = visible ? 0.3 : 1;
+      material.depthWrite = !visible;
+      material.needsUpdate = true;
+    }
+    this.render();
+  }
+
+  /** The whole part from a side on which grip `i`'s jaws are seen: across the closing axis, a little from its palm. */
+  fit(i = this.grip) {
+    let towards = new Vector3(1, -1.35, 0.85);
+    if (i >= 0 && i < this.report.n) {
+      const { x1, x2, x3 } = this.report.pose(i);
+      const looks = [1, -1].flatMap((x) => [1, -1].flatMap((y) => [0.85, 0.5, -0.5].map((z) => new Vector3(x, 1.35 * y, z).normalize())));
+      const worth = (look) => Math.abs(look.dot(vector(x2))) - 0.35 * look.dot(vector(x1)) + 0.25 * Math.abs(look.dot(vector(x3))) + (look.z > 0 ? 0.5 : 0) - (look.y > 0 ? 0.08 : 0);
+      towards = looks.sort((a, b) => worth(b) - worth(a))[0];
+    }
+    this.look(this.middle, towards, this.radius * 1.32);
+  }
+
+  /** The chosen grip from close by. */
+  lookAtGrip() {
+    if (this.grip < 0) return this.fit();
+    const { origin } = this.report.pose(this.grip);
+    const reach = this.report.header.gripper ? Math.max(...this.report.header.gripper.pad.flat().map(Math.abs)) : 0;
+    this.look(vector(origin).multiplyScalar(MM), this.camera.position.clone().sub(this.controls.target), Math.max(this.width, 2.5 * reach, 0.004) * 1.1 * MM);
+  }
+
+  look(target, towards, radius) {
+    const half = (Math.min(this.camera.fov, 2 * Math.atan(Math.tan((this.camera.fov * Math.PI) / 360) * this.camera.aspect) * (180 / Math.PI)) * Math.PI) / 360;
+    this.controls.target.copy(target);
+    this.camera.position.copy(target).addScaledVector(towards.clone().normalize(), radius / Math.sin(half));
+    this.controls.update();
+    this.render();
+  }
+
+  /** Turns the camera about its target by angles [rad]. */
+  orbit(sideways, upwards) {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    // three.js measures spherical angles from y; the part's up is z.
+    const spherical = new Spherical().setFromVector3(new Vector3(offset.x, offset.z, -offset.y));
+    spherical.theta += sideways;
+    spherical.phi = Math.min(Math.max(spherical.phi + upwards, 0.02), Math.PI - 0.02);
+    const turned = new Vector3().setFromSpherical(spherical);
+    this.camera.position.copy(this.controls.target).add(new Vector3(turned.x, -turned.z, turned.y));
+    this.controls.update();
+    this.render();
+  }
+
+  /** Looks against the direction `d` of the part frame, so that a load along `d` points at the viewer. */
+  faceDirection(d) {
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    const tilted = vector(d).normalize().add(new Vector3(0.18, -0.22, 0.2)).normalize();
+    this.camera.position.copy(this.controls.target).addScaledVector(tilted, distance);
+    this.controls.update();
+    this.render();
+  }
+
+  zoom(factor) {
+    this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
+    this.controls.update();
+    this.render();
+  }
+
+  bindInput() {
+    this.canvas.addEventListener('keydown', (event) => {
+      if (event.altKey || event.ctrlKey || event.metaKey) return;
+      const arrow = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+      if (arrow && event.shiftKey) {
+        const step = this.camera.position.distanceTo(this.controls.target) * 0.03;
+        const move = new Vector3(arrow[0] * step, -arrow[1] * step, 0).applyQuaternion(this.camera.quaternion);
+        this.camera.position.sub(move);
+        this.controls.target.sub(move);
+        this.controls.update();
+        this.render();
+      } else if (arrow) this.orbit(arrow[0] * 0.12, arrow[1] * 0.12);
+      else if (event.key === '+' || event.key === '=') this.zoom(1 / 1.15);
+      else if (event.key === '-') this.zoom(1.15);
+      else if (event.key === 'f' || event.key === 'F') this.fit();
+      else return;
+      event.preventDefault();
+    });
+    let down = null;
+    this.canvas.addEventListener('pointerdown', (event) => (down = [event.clientX, event.clientY]));
+    this.canvas.addEventListener('pointerup', (event) => {
+      if (down && Math.hypot(event.clientX - down[0], event.clientY - down[1]) < 5) this.pick(event);
+      down = null;
+    });
+  }
+
+  /** The listed grip whose dot is under the pointer and not hidden by the part. */
+  pick(event) {
+    if (!this.dots.visible || !this.listed) return;
+    const rect = this.canvas.getBoundingClientRect();
+    const at = [event.clientX - rect.left, event.clientY - rect.top];
+    const place = this.dots.geometry.attributes.position;
+    const point = new Vector3();
+    const hits = [];
+    for (const i of this.listed) {
+      for (let side = 0; side < 2; side++) {
+        point.fromBufferAttribute(place, 2 * i + side).multiplyScalar(MM);
+        const depth = point.distanceTo(this.camera.position);
+        point.project(this.camera);
+        const away = Math.hypot(((point.x + 1) / 2) * rect.width - at[0], ((1 - point.y) / 2) * rect.height - at[1]);
+        if (away < 9) hits.push({ i, depth, away });
+      }
+    }
+    if (hits.length === 0) return;
+    const caster = new Raycaster();
+    caster.setFromCamera(new Vector2((at[0] / rect.width) * 2 - 1, 1 - (at[1] / rect.height) * 2), this.camera);
+    const wall = (this.partMesh ? caster.intersectObject(this.partMesh)[0]?.distance : null) ?? Infinity;
+    const seen = hits.filter((hit) => hit.depth < wall + 0.02 * this.radius);
+    // Grips of many angles share one place: the best of the nearest dots is meant.
+    const nearest = Math.min(...seen.map((hit) => hit.away));
+    const best = seen.filter((hit) => hit.away < nearest + 1.5).sort((a, b) => a.i - b.i)[0];
+    if (best) this.onPick(best.i);
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.host;
+    if (width === 0 || height === 0) return;
+    this.renderer.setSize(width, height);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.draw();
+  }
+
+  render() {
+    this.pending ??= requestAnimationFrame(() => this.draw());
+  }
+
+  draw() {
+    if (this.pending) cancelAnimationFrame(this.pending);
+    this.pending = undefined;
+    const distance = this.camera.position.distanceTo(this.middle);
+    const reach = this.radius * 8;
+    this.camera.near = Math.max(distance - reach, distance * 0.01, this.radius * 0.002);
+    this.camera.far = distance + reach;
+    this.camera.updateProjectionMatrix();
+    this.renderer.render(this.scene, this.camera);
+    this.listeners.forEach((listener) => listener());
+  }
+
+  /** Rows of the rotation that takes part directions to the picture: right, up, towards the viewer. */
+  axes() {
+    const e = this.camera.matrixWorld.elements;
+    return [[e[0], e[1], e[2]], [e[4], e[5], e[6]], [e[8], e[9], e[10]]];
+  }
+}

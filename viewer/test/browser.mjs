@@ -1,0 +1,270 @@
+// Drives pages in a real browser: node test/browser.mjs SMALL.html LARGE.html [FOLDER FOR SCREENSHOTS]
+// SMALL: some dozens of grips with a hostile part name; LARGE: 10,000 grips on a part that was simplified.
+// Exits with 1 and says what failed. CHROMIUM names the browser (default /usr/bin/chromium).
+
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join, resolve } from 'node:path';
+import { pathToFileURL } from 'node:url';
+import { chromium } from 'playwright-core';
+
+const [small, large, shots] = process.argv.slice(2).map((path) => resolve(path));
+const FLAGS = ['--headless', '--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update',
+  '--disable-sync', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
+const failures = [];
+const check = (name, good, detail = '') => {
+  console.log(`${good ? 'ok  ' : 'FAIL'} ${name}${detail === '' ? '' : ` (${detail})`}`);
+  if (!good) failures.push(name);
+};
+
+const profile = mkdtempSync(join(tmpdir(), 'gripfast-browser-'));
+const browser = await chromium.launchPersistentContext(profile, {
+  executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium', args: FLAGS, headless: true, viewport: null, hasTouch: true,
+});
+
+/** A page at its address with everything that may go wrong noted. */
+async function open(path, { width = 1440, height = 900, scheme = 'light', hash = '' } = {}) {
+  const page = await browser.newPage();
+  page.trouble = [];
+  page.requests = [];
+  page.on('console', (message) => ['error', 'warning'].includes(message.type()) && page.trouble.push(message.text()));
+  page.on('pageerror', (error) => page.trouble.push(error.message));
+  page.on('dialog', (dialog) => (page.trouble.push(`dialog ${dialog.message()}`), dialog.dismiss()));
+  page.on('request', (request) => page.requests.push(request.url()));
+  await page.setViewportSize({ width, height });
+  await page.emulateMedia({ colorScheme: scheme });
+  await page.addInitScript(() => {
+    window.shifts = 0;
+    window.shifted = [];
+    new PerformanceObserver((list) => list.getEntries().forEach((entry) => {
+      window.shifts += entry.value;
+      window.shifted.push(...entry.sources.map(({ node }) => node?.id || node?.className || node?.nodeName));
+    })).observe({ type: 'layout-shift', buffered: true });
+  });
+  const address = pathToFileURL(path).href + hash;
+  const session = await page.context().newCDPSession(page);
+  await session.send('Performance.enable', { timeDomain: 'threadTicks' });
+  await page.goto(address);
+  await page.waitForFunction(() => document.documentElement.dataset.ready, null, { timeout: 120_000 });
+  const metrics = Object.fromEntries((await session.send('Performance.getMetrics')).metrics.map(({ name, value }) => [name, value]));
+  page.work = metrics.TaskDuration;
+  page.address = address;
+  return page;
+}
+
+/** Number of different colours, and share of the commonest, in a picture of an element. */
+async function colours(page, selector) {
+  const picture = (await page.locator(selector).first().screenshot()).toString('base64');
+  return page.evaluate(async (data) => {
+    const image = new Image();
+    image.src = `data:image/png;base64,${data}`;
+    await image.decode();
+    const canvas = new OffscreenCanvas(image.width, image.height);
+    const context = canvas.getContext('2d');
+    context.drawImage(image, 0, 0);
+    const { data: bytes } = context.getImageData(0, 0, image.width, image.height);
+    const seen = new Map();
+    for (let i = 0; i < bytes.length; i += 4) {
+      const key = ((bytes[i] >> 3) << 10) | ((bytes[i + 1] >> 3) << 5) | (bytes[i + 2] >> 3);
+      seen.set(key, (seen.get(key) ?? 0) + 1);
+    }
+    return { different: seen.size, commonest: (Math.max(...seen.values()) * 4) / bytes.length };
+  }, picture);
+}
+
+const shot = (page, name) => (shots ? page.screenshot({ path: join(shots, `${name}.png`) }) : null);
+const state = (page) => page.evaluate(() => ({
+  order: window.gripfast.state.order.slice(0, 2000), chosen: window.gripfast.state.chosen, jaw: window.gripfast.jaw(0),
+  camera: window.gripfast.view.camera.position.toArray(), id: window.gripfast.report.column.id[window.gripfast.state.chosen],
+}));
+const column = (page, name) => page.evaluate((name) => window.gripfast.state.order.map((i) => window.gripfast.report.column[name][i]), name);
+const ascending = (values) => values.every((value, i) => i === 0 || !(values[i - 1] > value));
+const moved = (a, b) => a.some((value, i) => Math.abs(value - b[i]) > 1e-3);
+/** Until the jaws have arrived and the last frame is drawn. */
+const rest = async (page) => {
+  await page.waitForTimeout(50);
+  await page.waitForFunction(() => !window.gripfast.view.moving && !window.gripfast.view.pending, null, { timeout: 20_000 });
+};
+
+async function wholePage() {
+  const page = await open(small);
+  check('nothing but the file itself is loaded', page.requests.every((url) => url === page.address || url.startsWith('data:')), page.requests.slice(1).join());
+  check('a hostile part name stays text', (await page.textContent('#title')).includes('<img'), await page.textContent('#title'));
+  const view = await colours(page, '#view canvas');
+  check('the part is drawn', view.different > 60 && view.commonest < 0.7, JSON.stringify(view));
+  for (const face of [0, 1]) {
+    const map = await colours(page, `.pair figure:nth-child(${face + 1}) svg`);
+    check(`the pressure map of pad ${face + 1} is drawn`, map.different > 25 && map.commonest < 0.9, JSON.stringify(map));
+  }
+  const ball = await colours(page, '.ball');
+  check('the load ball is drawn', ball.different > 25, JSON.stringify(ball));
+  await shot(page, 'laptop-light');
+
+  // The list: order, filters, keyboard.
+  check('grips come ranked', ascending(await column(page, 'rank')));
+  await page.click('#columns [data-key="opening"]');
+  check('a column head sorts', ascending(await column(page, 'width')));
+  await page.click('#columns [data-key="opening"]');
+  check('a second click reverses', ascending((await column(page, 'width')).reverse()));
+  await page.selectOption('#sort', 'margin');
+  check('the menu sorts, best first', ascending((await column(page, 'twist_margin')).reverse()));
+  await page.selectOption('#sort', 'rank');
+  const all = (await column(page, 'rank')).length;
+  const pair = await page.locator('#pair option').nth(1).getAttribute('value');
+  await page.selectOption('#pair', pair);
+  const faces = await column(page, 'face_i');
+  check('a face pair filters', faces.length > 0 && faces.length < all && faces.every((face) => face === Number(pair.split('/')[0])), `${faces.length} of ${all}`);
+  await page.click('#clear');
+  await page.fill('#text', '#3 ');
+  check('text filters', (await column(page, 'rank')).every((rank) => String(rank).startsWith('3')) && (await column(page, 'rank')).length > 0);
+  await page.fill('#text', 'no such grip');
+  check('an empty list says so', await page.isVisible('#empty'));
+  await page.click('#clear');
+  await page.locator('#histogram input').nth(1).focus();
+  for (let i = 0; i < 40; i++) await page.keyboard.press('ArrowLeft');
+  const listed = await column(page, 'mu');
+  check('the friction range filters', listed.length > 0 && listed.length < all && Math.max(...listed) < Math.max(...(await page.evaluate(() => [...window.gripfast.report.column.mu].filter(Number.isFinite)))), `${listed.length} of ${all}`);
+  await page.click('#clear');
+  check('clearing lists all again', (await column(page, 'rank')).length === all);
+
+  const before = await state(page);
+  await page.focus('#list');
+  await page.keyboard.press('End');
+  await rest(page);
+  const after = await state(page);
+  check('the keyboard chooses a grip', after.chosen === after.order[after.order.length - 1]);
+  check('choosing a grip moves the jaws', moved(before.jaw, after.jaw));
+  check('the chosen row is named to assistive technology', (await page.getAttribute('#list', 'aria-activedescendant')) === `row-${all - 1}`);
+  check('the address names the grip', page.url().endsWith(`#grip=${after.id}`));
+  await page.click('.row[data-position="' + (all - 3) + '"]');
+  check('the mouse chooses a grip', (await state(page)).chosen === after.order[all - 3]);
+  await rest(page);
+  const closed = (await state(page)).jaw;
+  await page.click('[data-toggle="open"]');
+  await rest(page);
+  check('the jaws open', moved(closed, (await state(page)).jaw));
+
+  // The view: mouse, wheel, keyboard, touch.
+  const turn = async (name, action) => {
+    const from = (await state(page)).camera;
+    await action();
+    await rest(page);
+    check(name, moved(from, (await state(page)).camera));
+  };
+  const box = await page.locator('#view canvas').boundingBox();
+  const [x, y] = [box.x + box.width / 2, box.y + box.height * 0.6];
+  await turn('the mouse turns the view', async () => {
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    await page.mouse.move(x + 90, y - 30, { steps: 4 });
+    await page.mouse.up();
+  });
+  await turn('the wheel zooms', () => page.mouse.wheel(0, -240));
+  await turn('the keyboard turns the view', async () => {
+    await page.focus('#view canvas');
+    await page.keyboard.press('ArrowLeft');
+  });
+  await turn('touch turns the view', async () => {
+    const session = await page.context().newCDPSession(page);
+    const touch = (type, points) => session.send('Input.dispatchTouchEvent', { type, touchPoints: points });
+    await touch('touchStart', [{ x, y }]);
+    for (let i = 1; i <= 4; i++) await touch('touchMove', [{ x: x - 15 * i, y }]);
+    await touch('touchEnd', []);
+  });
+  await turn('the whole part comes back', () => page.click('[data-act="fit"]'));
+  const spot = await page.evaluate(() => {
+    const { view, state } = window.gripfast;
+    const rect = view.canvas.getBoundingClientRect();
+    const place = view.dots.geometry.attributes.position;
+    const point = view.camera.position.clone();
+    for (const i of state.order) {
+      if (i === state.chosen) continue;
+      point.fromBufferAttribute(place, 2 * i).multiplyScalar(1000).project(view.camera);
+      const [x, y] = [rect.left + ((point.x + 1) / 2) * rect.width, rect.top + ((1 - point.y) / 2) * rect.height];
+      const before = view.onPick;
+      let hit = -1;
+      view.onPick = (found) => (hit = found);
+      view.pick({ clientX: x, clientY: y });
+      view.onPick = before;
+      if (hit >= 0 && hit !== state.chosen) return { x, y, hit };
+    }
+    return null;
+  });
+  if (spot) await page.mouse.click(spot.x, spot.y);
+  check('a dot on the part chooses its grip', spot !== null && (await state(page)).chosen === spot.hit);
+
+  const nameless = await page.evaluate(() => [...document.querySelectorAll('button, input, select, canvas, [role="img"], [role="tab"], [role="listbox"], [role="option"], section')]
+    .filter((node) => node.offsetParent !== null || node.tagName === 'svg')
+    .filter((node) => !(node.getAttribute('aria-label') || node.getAttribute('aria-labelledby') || node.labels?.length || node.textContent.trim() || node.title || node.closest('#run-content')))
+    .map((node) => node.outerHTML.slice(0, 80)));
+  check('every control has a name', nameless.length === 0, nameless.join());
+  await page.click('#tab-run');
+  check('the run panel tells of rejections', (await page.textContent('#run-content')).includes('Contact too small'));
+  await shot(page, 'laptop-run');
+  check('no layout shift', (await page.evaluate(() => window.shifts)) < 0.02, await page.evaluate(() => `${window.shifts.toFixed(4)} ${window.shifted.join()}`));
+  check('no console errors', page.trouble.length === 0, page.trouble.join('; '));
+  await page.close();
+}
+
+async function linkAndTheme() {
+  const page = await open(small, { scheme: 'dark', hash: '#grip=5' });
+  check('an address with a grip opens on it', (await state(page)).id === 5);
+  const ground = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  const dark = await ground();
+  await shot(page, 'laptop-dark');
+  await page.locator('#theme input[value="light"]').check({ force: true });
+  check('dark follows the system, the switch overrides it', dark !== (await ground()) && dark === 'rgb(13, 17, 21)', dark);
+  await page.locator('#theme input[value="auto"]').check({ force: true });
+  check('no trouble in the dark', page.trouble.length === 0, page.trouble.join('; '));
+  await page.close();
+}
+
+async function phone() {
+  const page = await open(small, { width: 390, height: 844 });
+  const wide = () => page.evaluate(() => document.documentElement.scrollWidth - window.innerWidth);
+  for (const tab of ['list', 'grip', 'run']) {
+    await page.click(`#tab-${tab}`);
+    check(`the ${tab} panel fits a phone`, (await wide()) <= 0 && (await page.isVisible(`#panel-${tab}`)), String(await wide()));
+    await shot(page, `phone-${tab}`);
+  }
+  await page.click('#tab-list');
+  await page.click('.row[data-position="2"]');
+  check('a tap chooses on a phone', (await state(page)).chosen === (await state(page)).order[2]);
+  check('no layout shift on a phone', (await page.evaluate(() => window.shifts)) < 0.02, await page.evaluate(() => `${window.shifts.toFixed(4)} ${window.shifted.join()}`));
+  await page.close();
+}
+
+async function tenThousand() {
+  const page = await open(large);
+  const ready = Number(await page.getAttribute('html', 'data-ready'));
+  console.log(`     10,000 grips: shown after ${ready} ms with ${page.work.toFixed(2)} s of the page's own processor time`);
+  check('10,000 grips open within 2 s of processor time', page.work < 2, page.work.toFixed(2));
+  check('only the rows in sight exist', (await page.locator('.row').count()) < 60);
+  check('the page says that the part was simplified', /simplified for display: 1\d\d.\d{3} of/.test(await page.textContent('#note')), await page.textContent('#note'));
+  const start = Date.now();
+  await page.focus('#list');
+  await page.keyboard.press('End');
+  await page.waitForSelector('.row[data-position="9999"]');
+  console.log(`     last of 10,000 reached in ${Date.now() - start} ms`);
+  const took = await page.evaluate(() => {
+    const from = performance.now();
+    document.querySelector('#columns [data-key="mu"]').click();
+    return performance.now() - from;
+  });
+  check('10,000 grips sort quickly', took < 500, `${took.toFixed(0)} ms`);
+  check('no trouble with 10,000 grips', page.trouble.length === 0, page.trouble.join('; '));
+  await shot(page, 'large');
+  await page.close();
+}
+
+try {
+  await wholePage();
+  await linkAndTheme();
+  await phone();
+  if (large) await tenThousand();
+} finally {
+  await browser.close();
+  rmSync(profile, { recursive: true, force: true });
+}
+console.log(failures.length ? `${failures.length} checks failed: ${failures.join('; ')}` : 'all checks passed');
+process.exit(failures.length ? 1 : 0);
