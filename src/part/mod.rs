@@ -144,7 +144,7 @@ pub struct Part {
 impl Part {
     /// Reads, welds, repairs and orients the mesh in `path`, and finds its planar faces.
     ///
-    /// STL (binary, ASCII), OBJ, PLY, each also as `.gz`.
+    /// STL (binary, ASCII), OBJ, PLY, OFF, 3MF, glTF and GLB, each also as `.gz`.
     ///
     /// # Errors
     /// When the file cannot be read, is not what its suffix says, is damaged, holds no triangle, or holds more

@@ -1,8 +1,12 @@
 //! Mesh files: the format is chosen by the suffix, the bytes are checked against it.
 
+mod gltf;
 mod obj;
+mod off;
 mod ply;
+mod polygon;
 mod stl;
+mod threemf;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -14,7 +18,7 @@ use super::weld::{MAX_TRIANGLES, Soup, Welder};
 use crate::error::{Error, Result};
 
 /// Suffixes that are read, for messages.
-const KNOWN: &str = "stl, obj, ply (each also as .gz)";
+const KNOWN: &str = "stl, obj, ply, off, 3mf, gltf, glb (each also as .gz)";
 
 /// Reads the triangles of `path` in the file's own unit.
 ///
@@ -46,6 +50,9 @@ pub(super) fn read(path: &Path) -> Result<Soup> {
         "stl" => stl::read(&mut source)?,
         "obj" => obj::read(&mut source)?,
         "ply" => ply::read(&mut source)?,
+        "off" => off::read(&mut source)?,
+        "3mf" => threemf::read(&mut source)?,
+        "gltf" | "glb" => gltf::read(&mut source)?,
         "" => return Err(Error::input(source.place, "the file name has no suffix to tell its format", format!("name it with one of: {KNOWN}"))),
         _ => return Err(Error::input(source.place, format!("unknown mesh format '.{suffix}'"), format!("convert it to one of: {KNOWN}"))),
     };
@@ -116,7 +123,7 @@ impl Source<'_> {
         Ok(())
     }
 
-    /// Adds polygon `number` (from 1) of an indexed format, cut into a fan.
+    /// Adds polygon `number` (from 1) of an indexed format, cut into triangles. Points and lines bound no material.
     fn polygon(&self, welder: &mut Welder, vertices: &[DVec3], corners: &[u32], number: usize) -> Result<()> {
         let corner = |index: u32| {
             vertices.get(index as usize).copied().ok_or_else(|| {
@@ -124,10 +131,12 @@ impl Source<'_> {
                 self.bad_at(format!("face {number}"), problem, "repair the file or export it again")
             })
         };
-        // Points and lines bound no material: `windows` gives nothing for them.
-        let Some((&first, rest)) = corners.split_first() else { return Ok(()) };
-        for pair in rest.windows(2) {
-            welder.triangle([corner(first)?, corner(pair[0])?, corner(pair[1])?]);
+        match *corners {
+            [a, b, c] => welder.triangle([corner(a)?, corner(b)?, corner(c)?]),
+            _ => {
+                let points = corners.iter().map(|&index| corner(index)).collect::<Result<Vec<DVec3>>>()?;
+                polygon::triangulate(&points, |triangle| welder.triangle(triangle.map(|k| points[k])));
+            }
         }
         self.check_count(welder)
     }
