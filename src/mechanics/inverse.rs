@@ -1,32 +1,45 @@
 //! Questions asked the other way round: how hard to squeeze for a given pad friction, how much load before slip.
 
-use crate::model::{Score, Wrench};
+use crate::model::{Score, Status, Wrench};
 
 use super::{Options, Pads, solve_pads};
 
-/// The smallest gripping force [N] from which on `friction` holds `wrench`: at it and at every larger force tried,
-/// `mu_s <= friction`. `None` when no force up to `1e9` times the load's size does (or `friction` is not positive).
+/// The gripping force [N] needed to hold `wrench` with the pad friction `friction`: at it `mu_s` equals `friction`, or just
+/// below it the contact twists out. `None` when no force up to `1e9` times the load's size holds it (or `friction` is not positive).
 ///
-/// `mu_s` falls with the force while the contact stays whole, and need not when it separates; so the answer is found from
-/// above: from a force that holds downwards to the first that does not, then by bisection to 1e-9 relative.
+/// `mu_s` times the force hardly changes while the contact stays whole, so the force is found by proportion in a few
+/// steps. Where that does not settle (separation, several limit states) it is the smallest force from which on every
+/// larger one tried holds, by search from above and bisection to 1e-9.
 pub fn force_needed(pads: &Pads, distance: f64, wrench: &Wrench, friction: f64, options: &Options) -> Option<f64> {
     if friction.is_nan() || friction <= 0.0 {
         return None;
     }
-    let holds = |force: f64| holds(&solve_pads(pads, distance, force, wrench, options), friction);
     let size = wrench.force.length() + wrench.moment.length() / pads.length;
     if size == 0.0 {
         return Some(0.0);
     }
-    // Without coupling or separation mu_s is proportional to 1/force: the first guess is often the answer.
+    let solve = |force: f64| solve_pads(pads, distance, force, wrench, options);
+    by_proportion(1e3 * size, friction, solve).or_else(|| from_above(size, friction, solve))
+}
+
+/// Steps of [`by_proportion`]; it settles in two where the contact stays whole.
+const STEPS: usize = 12;
+
+fn by_proportion(mut force: f64, friction: f64, solve: impl Fn(f64) -> Score) -> Option<f64> {
+    for _ in 0..STEPS {
+        let score = solve(force);
+        let mu = score.mu_s.filter(|mu| score.status == Status::Ok && *mu > 0.0)?;
+        if (mu / friction - 1.0).abs() <= 1e-10 {
+            return Some(force);
+        }
+        force *= mu / friction;
+    }
+    None
+}
+
+fn from_above(size: f64, friction: f64, solve: impl Fn(f64) -> Score) -> Option<f64> {
+    let holds = |force: f64| holds(&solve(force), friction);
     let mut high = size;
-    let mut guess = None;
-    if let Some(mu) = solve_pads(pads, distance, 1e3 * size, wrench, options).mu_s {
-        guess = (mu > 0.0).then_some(1e3 * size * mu / friction);
-    }
-    if let Some(force) = guess.filter(|&force| holds(force * (1.0 + 1e-9)) && !holds(force * (1.0 - 1e-9))) {
-        return Some(force * (1.0 + 1e-9));
-    }
     while !holds(high) || !holds(2.0 * high) {
         high *= 2.0;
         if high > 1e9 * size {
@@ -60,5 +73,44 @@ pub fn load_multiple(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, fr
     match force_needed(pads, distance, wrench, friction, options) {
         Some(needed) => force / needed,
         None => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec2, DVec3};
+
+    use super::*;
+    use crate::model::{Contact, Polygon};
+
+    fn pads() -> Pads {
+        let ring = [(-0.01, -0.01), (0.01, -0.01), (0.01, 0.01), (-0.01, 0.01)].map(|(x, y)| DVec2::new(x, y)).to_vec();
+        let patch = vec![Polygon { outer: ring, holes: Vec::new() }];
+        Pads::new(&Contact { face_i: patch.clone(), face_ii: patch }).unwrap()
+    }
+
+    #[test]
+    fn the_force_found_is_the_one_at_which_the_friction_just_holds() {
+        let pads = pads();
+        for moment in [[0.0, 0.0, 0.2], [0.3, 0.0, 0.2], [0.3, -0.2, 0.05]] {
+            let wrench = Wrench { force: DVec3::new(3.0, -2.0, 1.0), moment: DVec3::from_array(moment) };
+            let force = force_needed(&pads, 0.02, &wrench, 0.4, &Options::default()).unwrap();
+            let at = |force: f64| solve_pads(&pads, 0.02, force, &wrench, &Options::default());
+            // The last of these twists out before its mu_s comes up to the pads' friction.
+            let twists_out = at(force * 0.999).status == Status::TwistedOut;
+            assert!(twists_out == (moment[1] != 0.0) && (twists_out || (at(force).mu_s.unwrap() / 0.4 - 1.0).abs() < 1e-8), "{moment:?}");
+            assert!(!holds(&at(force * 0.999), 0.4) && holds(&at(force * 1.001), 0.4), "{moment:?}");
+            let multiple = load_multiple(&pads, 0.02, 50.0, &wrench, 0.4, &Options::default());
+            let grown = Wrench { force: wrench.force * multiple, moment: wrench.moment * multiple };
+            let mu = solve_pads(&pads, 0.02, 50.0, &grown, &Options::default()).mu_s.unwrap();
+            assert!(if twists_out { mu < 0.4 } else { (mu / 0.4 - 1.0).abs() < 1e-8 }, "{moment:?} {multiple}");
+        }
+    }
+
+    #[test]
+    fn a_load_that_twists_out_without_end_needs_no_force_it_could_get() {
+        let wrench = Wrench { force: DVec3::ZERO, moment: DVec3::ZERO };
+        assert_eq!(force_needed(&pads(), 0.02, &wrench, 0.4, &Options::default()), Some(0.0));
+        assert_eq!(force_needed(&pads(), 0.02, &wrench, 0.0, &Options::default()), None);
     }
 }
