@@ -157,7 +157,7 @@ impl Proposer<'_> {
         let mut patches: [Patch; 2] = [Patch::new(), Patch::new()];
         for (side, name) in ["contact on face I", "contact on face II"].into_iter().enumerate() {
             let mut scratch = Scratch::default();
-            let area = match prepared.patches[side].touch(&pad, position, &mut scratch) {
+            let area = match prepared.patches[side.min(prepared.patches.len() - 1)].touch(&pad, position, &mut scratch) {
                 Touch::Empty => 0.0,
                 Touch::Whole => {
                     patches[side] = vec![Polygon { outer: outline_of_pad.clone(), holes: Vec::new() }];

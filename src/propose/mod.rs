@@ -35,7 +35,11 @@ use sweep::{Motion, Sweep, sweeps};
 use tree::{Topology, Tree};
 
 /// Positions per work item: large enough to share what an angle determines, small enough to spread over the threads.
-const ITEM: usize = 4096;
+/// Fixed, because contacts are shared within an item: results must not depend on the chunk size.
+const ITEM: usize = 2048;
+/// Corners of contact polygons that a chunk may hold, about (16 bytes each): where pads cover finely tessellated outlines,
+/// chunks have fewer candidates.
+const MOST_CORNERS: usize = 4_000_000;
 
 /// Counts of a run so far.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -73,6 +77,8 @@ pub struct Proposer<'a> {
     symmetric: bool,
     tally: Tally,
     next: Cursor,
+    /// Corners per candidate in the last chunk.
+    corners: f64,
     tree: Option<(usize, Arc<Tree>)>,
 }
 
@@ -97,7 +103,8 @@ struct Item {
 /// What the items of one site share.
 struct Prepared<'a> {
     site: &'a Site,
-    patches: [PatchIndex; 2],
+    /// Faces of side I and II; one entry where both are the same in the site's plane, as in every prism.
+    patches: Vec<PatchIndex>,
     /// Against the part; the second set with exchanged jaws, for grippers where that matters.
     sweeps: Vec<Vec<Sweep>>,
     /// Against ground and keep-out boxes.
@@ -144,6 +151,7 @@ impl<'a> Proposer<'a> {
             symmetric: gripper.is_symmetric(),
             tally,
             next: Cursor::default(),
+            corners: 400.0,
             tree: None,
         })
     }
@@ -213,19 +221,22 @@ impl<'a> Proposer<'a> {
 
     fn new_tree(&self, direction: usize) -> Tree {
         let axes: DMat3 = site::axes(self.directions[direction]);
-        Tree::new(&self.shape, &self.part.mesh, axes)
+        Tree::new(&self.shape, axes)
     }
 
-    /// The next items: of one direction, and about a chunk of candidates.
+    /// The next items: of one direction, and about a chunk of candidates; none when all are done.
     fn take_items(&mut self) -> Vec<Item> {
-        let mut items = Vec::new();
+        let mut items: Vec<Item> = Vec::new();
         let mut candidates = 0;
-        let direction = self.sites.get(self.next.site).map(|site| site.direction);
-        while candidates < self.options.chunk.max(1) {
-            let Some(site) = self.sites.get(self.next.site).filter(|site| Some(site.direction) == direction) else { break };
+        let most = ((MOST_CORNERS as f64 / self.corners) as usize).min(self.options.chunk).max(1);
+        while candidates < most {
+            let Some(site) = self.sites.get(self.next.site) else { break };
             if self.next.angle == site.angles.len() || site.positions.is_empty() {
                 self.next = Cursor { site: self.next.site + 1, angle: 0, position: 0, ..self.next };
                 continue;
+            }
+            if items.first().is_some_and(|first| self.sites[first.site].direction != site.direction) {
+                break;
             }
             let end = (self.next.position + ITEM).min(site.positions.len());
             let positions = self.next.position..end;
@@ -271,6 +282,11 @@ impl Iterator for Proposer<'_> {
             }
         }
         self.tally.candidates += chunk.candidates;
+        let corners = |contact: &Contact| {
+            [&contact.face_i, &contact.face_ii].into_iter().flatten().flat_map(crate::geometry::polygon::rings).map(<[_]>::len).sum::<usize>()
+        };
+        let total: usize = chunk.grips.iter().filter(|grip| !Arc::ptr_eq(&grip.contact, &self.whole)).map(|grip| corners(&grip.contact)).sum();
+        self.corners = (total as f64 / chunk.candidates.max(1) as f64).max(1.0);
         Some(chunk)
     }
 }

@@ -191,13 +191,16 @@ fn group_sites(
 }
 
 impl Site {
-    /// The two gripped planes' faces, indexed in the site's `(x, y)` for pads that reach `reach` from their origin.
-    pub(super) fn patches(&self, part: &Part, axes_from_part: &DMat3, reach: f64) -> [PatchIndex; 2] {
-        [0, 1].map(|side| {
+    /// The two gripped planes' faces, indexed in the site's `(x, y)` for pads that reach `reach` from their origin; only
+    /// one when both are the same.
+    pub(super) fn patches(&self, part: &Part, axes_from_part: &DMat3, reach: f64) -> Vec<PatchIndex> {
+        let [side_i, side_ii] = [0, 1].map(|side| -> Patch {
             let faces = self.faces[side].iter().map(|&id| &part.faces[id as usize]);
-            let patch = project(faces, axes_from_part).iter().map(|polygon| to_site(polygon, self.origin.truncate(), self.turn)).collect();
-            PatchIndex::new(patch, self.bounds.grown(1.01 * reach), reach / 4.0)
-        })
+            project(faces, axes_from_part).iter().map(|polygon| to_site(polygon, self.origin.truncate(), self.turn)).collect()
+        });
+        let same = same_shape(&side_i, &side_ii, 1e-9 * reach);
+        let index = |patch: Patch| PatchIndex::new(patch, self.bounds.grown(1.01 * reach), reach / 4.0);
+        if same { vec![index(side_i)] } else { vec![index(side_i), index(side_ii)] }
     }
 
     /// The face of a side that holds `point` of the site's plane, or the first.
@@ -260,6 +263,21 @@ fn to_site(shape: &Polygon, origin: DVec2, turn: f64) -> Polygon {
     let turn = DVec2::from_angle(-turn);
     let ring = |ring: &Vec<DVec2>| ring.iter().map(|&point| turn.rotate(point - origin)).collect();
     Polygon { outer: ring(&shape.outer), holes: shape.holes.iter().map(ring).collect() }
+}
+
+/// Whether two patches have the same rings, whatever point each starts at.
+fn same_shape(a: &[Polygon], b: &[Polygon], tolerance: f64) -> bool {
+    let same_ring = |a: &[DVec2], b: &[DVec2]| {
+        let start = b.iter().position(|point| point.distance(a[0]) <= tolerance);
+        a.len() == b.len() && start.is_some_and(|start| (0..a.len()).all(|index| a[index].distance(b[(start + index) % b.len()]) <= tolerance))
+    };
+    let (rings_a, rings_b): (Vec<&[DVec2]>, Vec<&[DVec2]>) = (a.iter().flat_map(rings).collect(), b.iter().flat_map(rings).collect());
+    let mut free = vec![true; rings_b.len()];
+    rings_a.len() == rings_b.len()
+        && rings_a.iter().all(|ring| {
+            let found = (0..rings_b.len()).find(|&index| free[index] && same_ring(ring, rings_b[index]));
+            found.is_some_and(|index| std::mem::replace(&mut free[index], false))
+        })
 }
 
 /// Splits a patch where its pieces are farther apart than `gap`, so that no pad touches two of them.

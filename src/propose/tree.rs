@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3A};
 use rayon::prelude::*;
 
 use crate::part::Mesh;
@@ -31,10 +31,13 @@ struct Node {
 #[derive(Debug)]
 pub(super) struct Topology {
     nodes: Vec<Node>,
-    /// Corners of the triangles in tree order.
+    /// Corners of the triangles in tree order, as indices into `vertices`.
     corners: Vec<[u32; 3]>,
     /// Mesh index of the triangles in tree order.
     order: Vec<u32>,
+    /// Vertices in the part frame, in the order in which the triangles need them first: neighbours in the tree are
+    /// neighbours in memory.
+    vertices: Vec<DVec3>,
 }
 
 impl Topology {
@@ -52,8 +55,18 @@ impl Topology {
         if !order.is_empty() {
             build(&mut nodes, 0, &mut order, 0, &centroids);
         }
-        let corners = order.iter().map(|&triangle| mesh.triangles[triangle as usize]).collect();
-        Self { nodes, corners, order }
+        let mut number = vec![u32::MAX; mesh.vertices.len()];
+        let mut vertices = Vec::with_capacity(mesh.vertices.len());
+        let mut renumbered = |vertex: u32| {
+            let slot = &mut number[vertex as usize];
+            if *slot == u32::MAX {
+                *slot = vertices.len() as u32;
+                vertices.push(mesh.vertices[vertex as usize]);
+            }
+            *slot
+        };
+        let corners = order.iter().map(|&triangle| mesh.triangles[triangle as usize].map(&mut renumbered)).collect();
+        Self { nodes, corners, order, vertices }
     }
 }
 
@@ -100,33 +113,39 @@ fn build(nodes: &mut [Node], base: usize, order: &mut [u32], first: usize, centr
 #[derive(Debug)]
 pub(super) struct Tree {
     shape: Arc<Topology>,
-    /// Vertices in the turned axes.
-    vertices: Vec<DVec3>,
-    /// Smallest and largest coordinates of each node, rounded outwards.
+    axes_from_part: DMat3,
+    /// Smallest and largest coordinates of each node, grown by the rounding to 32 bits.
     boxes: Vec<[[f32; 3]; 2]>,
 }
 
 impl Tree {
     /// `axes_from_part` turns part coordinates into those of the tree.
-    pub(super) fn new(shape: &Arc<Topology>, mesh: &Mesh, axes_from_part: DMat3) -> Self {
-        let vertices: Vec<DVec3> = mesh.vertices.par_iter().map(|&vertex| axes_from_part * vertex).collect();
+    pub(super) fn new(shape: &Arc<Topology>, axes_from_part: DMat3) -> Self {
+        let points: Vec<Vec3A> = shape.vertices.par_iter().map(|&vertex| (axes_from_part * vertex).as_vec3a()).collect();
+        let reach = shape.vertices.par_iter().map(|vertex| vertex.length_squared()).reduce(|| 0.0, f64::max).sqrt();
+        // Rounding a coordinate moves it by at most 2^-24 of its size, growing the box rounds again.
+        let slack = Vec3A::splat((reach * f64::from(f32::EPSILON)) as f32);
         let leaf = |node: &Node| {
-            let corners = &shape.corners[node.first as usize..(node.first + node.count) as usize];
-            let points = corners.iter().flatten().map(|&vertex| vertices[vertex as usize]);
-            let (low, high) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| (low.min(point), high.max(point)));
-            [low.to_array().map(round_down), high.to_array().map(|x| -round_down(-x))]
+            let (mut low, mut high) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
+            for triangle in &shape.corners[node.first as usize..(node.first + node.count) as usize] {
+                for &vertex in triangle {
+                    let point = points[vertex as usize];
+                    (low, high) = (low.min(point), high.max(point));
+                }
+            }
+            [(low - slack).to_array(), (high + slack).to_array()]
         };
         let mut boxes: Vec<[[f32; 3]; 2]> = shape.nodes.par_iter().map(|node| if node.right == 0 { leaf(node) } else { [[0.0; 3]; 2] }).collect();
         for index in (0..shape.nodes.len()).rev() {
             let right = shape.nodes[index].right as usize;
             if right != 0 {
                 let ([low_a, high_a], [low_b, high_b]) = (boxes[index + 1], boxes[right]);
-                boxes[index] = std::array::from_fn(|side| {
-                    std::array::from_fn(|axis| if side == 0 { low_a[axis].min(low_b[axis]) } else { high_a[axis].max(high_b[axis]) })
-                });
+                let low = Vec3A::from_array(low_a).min(Vec3A::from_array(low_b));
+                let high = Vec3A::from_array(high_a).max(Vec3A::from_array(high_b));
+                boxes[index] = [low.to_array(), high.to_array()];
             }
         }
-        Self { shape: Arc::clone(shape), vertices, boxes }
+        Self { shape: Arc::clone(shape), axes_from_part, boxes }
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -147,21 +166,19 @@ impl Tree {
 
     /// A vertex of some triangle under the node.
     pub(super) fn witness(&self, node: u32) -> DVec3 {
-        self.vertices[self.shape.corners[self.shape.nodes[node as usize].first as usize][0] as usize]
+        self.vertex(self.shape.corners[self.shape.nodes[node as usize].first as usize][0])
     }
 
     /// Triangles under a node: mesh index and corners.
     pub(super) fn triangles(&self, node: u32) -> impl Iterator<Item = (u32, [DVec3; 3])> + '_ {
         let node = self.shape.nodes[node as usize];
         (node.first as usize..(node.first + node.count) as usize)
-            .map(|index| (self.shape.order[index], self.shape.corners[index].map(|vertex| self.vertices[vertex as usize])))
+            .map(|index| (self.shape.order[index], self.shape.corners[index].map(|vertex| self.vertex(vertex))))
     }
-}
 
-/// The largest 32-bit number that is not above `x`.
-fn round_down(x: f64) -> f32 {
-    let rounded = x as f32;
-    if f64::from(rounded) > x { rounded.next_down() } else { rounded }
+    fn vertex(&self, vertex: u32) -> DVec3 {
+        self.axes_from_part * self.shape.vertices[vertex as usize]
+    }
 }
 
 #[cfg(test)]
@@ -175,7 +192,7 @@ mod tests {
         let triangles: Vec<[u32; 3]> = (0..count).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
         let mesh = Mesh { vertices, triangles };
         let shape = Arc::new(Topology::new(&mesh));
-        let tree = Tree::new(&shape, &mesh, DMat3::from_rotation_y(0.4));
+        let tree = Tree::new(&shape, DMat3::from_rotation_y(0.4));
         let mut found = vec![false; count as usize];
         let mut stack = vec![0];
         while let Some(node) = stack.pop() {
@@ -189,13 +206,6 @@ mod tests {
             stack.extend(tree.children(node).into_iter().flatten());
         }
         assert!(found.iter().all(|&found| found));
-        assert!(Tree::new(&Arc::new(Topology::new(&Mesh::default())), &Mesh::default(), DMat3::IDENTITY).is_empty());
-    }
-
-    #[test]
-    fn rounding_goes_outwards() {
-        for x in [0.1, -0.1, 1e-60, -1e-60, 0.0, 1e300] {
-            assert!(f64::from(round_down(x)) <= x && f64::from(-round_down(-x)) >= x, "{x}");
-        }
+        assert!(Tree::new(&Arc::new(Topology::new(&Mesh::default())), DMat3::IDENTITY).is_empty());
     }
 }

@@ -37,6 +37,8 @@ pub(super) struct Buffers {
 /// Contacts of one item by their rounded coordinates: a pad moved along a straight edge keeps its contact.
 type Known = FxHashMap<Vec<i64>, Arc<Contact>>;
 
+/// Contacts with more corners than this hardly ever repeat; looking for them would cost more than it saves.
+const SHARED_CORNERS: usize = 40;
 /// Contacts with coordinates this near, as a share of the pad's size, are one contact.
 const SAME_CONTACT: f64 = 1e-10;
 
@@ -146,7 +148,7 @@ impl Proposer<'_> {
         buffers.whole.resize(positions.len(), [true; 2]);
         let (scratch, whole) = (&mut buffers.scratch, &mut buffers.whole);
         let lost = keep(&mut buffers.alive, &mut |index| {
-            (0..2).all(|side| match prepared.patches[side].touch(&pad, positions[index as usize], &mut scratch[side]) {
+            prepared.patches.iter().enumerate().all(|(side, patch)| match patch.touch(&pad, positions[index as usize], &mut scratch[side]) {
                 Touch::Empty => false,
                 Touch::Whole => true,
                 Touch::Part(area) => {
@@ -224,7 +226,7 @@ impl Proposer<'_> {
         scratch: &mut [Scratch; 2],
         known: &mut Known,
     ) -> Arc<Contact> {
-        if whole == [true; 2] {
+        if whole.iter().take(prepared.patches.len()).all(|&whole| whole) {
             return Arc::clone(&self.whole);
         }
         let mut patch = |side: usize| -> Patch {
@@ -234,7 +236,9 @@ impl Proposer<'_> {
                 Touch::Part(_) => outline(&scratch[side], angle),
             }
         };
-        let contact = Contact { face_i: patch(0), face_ii: patch(1) };
+        let face_i = patch(0);
+        let face_ii = if prepared.patches.len() == 2 { patch(1) } else { face_i.clone() };
+        let contact = Contact { face_i, face_ii };
         self.shared(if flipped { mirror(&contact) } else { contact }, known)
     }
 
@@ -245,6 +249,10 @@ impl Proposer<'_> {
 
     fn shared(&self, contact: Contact, known: &mut Known) -> Arc<Contact> {
         let step = SAME_CONTACT * self.gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
+        let rings = || [&contact.face_i, &contact.face_ii].into_iter().flatten().flat_map(polygon::rings);
+        if rings().map(<[DVec2]>::len).sum::<usize>() > SHARED_CORNERS {
+            return Arc::new(contact);
+        }
         let mut key = Vec::new();
         for patch in [&contact.face_i, &contact.face_ii] {
             for ring in patch.iter().flat_map(polygon::rings) {
