@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::{Backend, Batch, Problem, Seed, SeedSet, SeedStatus};
 use crate::error::Result;
+use crate::mechanics::slip::{self, Field};
 use crate::mechanics::{Options, Pads, Refiner, Separation, refused, solve_pads};
 use crate::model::{Contact, Score, Status};
 
@@ -46,8 +47,10 @@ pub struct Scored {
     pub worst: Option<(usize, Score)>,
     /// Answers of all loads under [`Polish::All`], else empty.
     pub all: Vec<Score>,
-    /// Loads solved exactly.
+    /// Loads for which the seven equations were solved.
     pub solved: usize,
+    /// Loads for which the slip problem alone was solved, to tell which is the worst.
+    pub compared: usize,
 }
 
 impl Backend {
@@ -118,7 +121,7 @@ fn score_one(problem: &Problem<'_>, pads: Option<&Pads>, seeds: &[Seed], options
     };
     if options.polish == Polish::All {
         let all: Vec<Score> = (0..seeds.len()).into_par_iter().with_min_len(8).map(solve).collect();
-        return Scored { worst: worst(all.iter().copied().enumerate()), solved: all.len(), all };
+        return Scored { worst: worst(all.iter().copied().enumerate()), solved: all.len(), compared: 0, all };
     }
     // Loads without bounds are solved in order. One that has no limit state is the worst, whatever the others are:
     // a load with bounds has one.
@@ -129,25 +132,47 @@ fn score_one(problem: &Problem<'_>, pads: Option<&Pads>, seeds: &[Seed], options
         solved.push((load, score));
         match usable(&score) {
             Some(mu) => largest = largest.max(mu),
-            None => return Scored { worst: Some((load, score)), all: Vec::new(), solved: solved.len() },
+            None => return Scored { worst: Some((load, score)), all: Vec::new(), solved: solved.len(), compared: 0 },
         }
     }
-    // Then the others by falling upper bound, until none can reach the largest found.
+    // Then the others by falling upper bound, until none can reach the largest found. Bounds mean congruent faces in
+    // full contact, where the slip problem alone decides `mu_s`; the seven equations are solved for the worst only.
     let mut bounded: Vec<usize> = (0..seeds.len()).filter(|&load| seeds[load].status == SeedStatus::Bounded).collect();
+    let unbounded = largest;
     largest = bounded.iter().map(|&load| seeds[load].lower).fold(largest, f64::max);
     bounded.retain(|&load| seeds[load].upper >= largest);
     bounded.sort_by(|&a, &b| seeds[b].upper.total_cmp(&seeds[a].upper).then(a.cmp(&b)));
+    largest = unbounded;
+    let mut slips: Vec<(usize, f64)> = Vec::new();
     for load in bounded {
         // Ties with the largest are solved too, so that the first of them is found.
         if seeds[load].upper < largest * (1.0 - 2.0 * TIE) {
             break;
         }
+        let mu = pads.map_or(f64::INFINITY, |pads| slip_only(pads, problem, load, seeds[load].twist));
+        largest = largest.max(mu);
+        slips.push((load, mu));
+    }
+    let compared = slips.len();
+    slips.retain(|&(_, mu)| mu >= largest * (1.0 - 2.0 * TIE));
+    slips.sort_unstable_by_key(|&(load, _)| load);
+    for (load, mu) in slips {
         let score = solve(load);
-        largest = largest.max(usable(&score).unwrap_or(f64::INFINITY));
         solved.push((load, score));
+        // The first of those that tie is the answer.
+        if usable(&score).is_some_and(|found| (found - mu).abs() <= TIE * mu && found >= largest * (1.0 - TIE)) {
+            break;
+        }
     }
     solved.sort_by_key(|(load, _)| *load);
-    Scored { solved: solved.len(), worst: worst(solved.into_iter()), all: Vec::new() }
+    Scored { solved: solved.len(), compared, worst: worst(solved.into_iter()), all: Vec::new() }
+}
+
+/// `mu_s` of congruent faces in full contact: their summed pressure is constant.
+fn slip_only(pads: &Pads, problem: &Problem<'_>, load: usize, seed: [f64; 3]) -> f64 {
+    let load = pads.load(problem.distance, problem.force, &problem.wrenches[load]);
+    let field = Field { area: &pads.areas[0], p: [2.0 / pads.moments[0][0], 0.0, 0.0] };
+    slip::solve(&[field], load.direction, Some(pads.scaled_twist(seed)), Refiner::Newton).mu * load.size
 }
 
 /// `mu_s` when the load is held.

@@ -340,7 +340,7 @@ impl Job<'_> {
             .collect();
         let scored =
             self.backend.score(&Batch { problems }, self.seeds, &self.options).with_context(|| format!("{}: grips from {}", self.name, counts.grips))?;
-        for (entry, Scored { worst, all, solved }) in entries.iter().zip(scored) {
+        for (entry, Scored { worst, all, solved, .. }) in entries.iter().zip(scored) {
             let index = counts.grips;
             counts.grips += 1;
             counts.solved += solved as u64;
