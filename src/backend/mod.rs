@@ -110,8 +110,9 @@ pub(crate) struct Limits {
 }
 
 impl Limits {
-    /// On the processor a chunk only bounds memory: 8 MiB of loads, as much of records.
-    const CPU: Self = Self { loads: 1 << 18, contacts: 1 << 14, edges: 1 << 20, basis: usize::MAX };
+    /// On the processor a chunk is one task: small enough for the second-level cache, large enough that computing a
+    /// contact's basis anew for each is lost in it.
+    const CPU: Self = Self { loads: 1 << 13, contacts: 64, edges: 1 << 14, basis: 1 << 20 };
 }
 
 /// Consecutive loads of one problem, and the places of their answers.
@@ -147,10 +148,11 @@ impl Backend {
         let mut answers = vec![not_searched(SeedStatus::NoContact); job.loads];
         match self {
             Self::Cpu => {
-                for mut plan in job.plans(Limits::CPU, &mut answers) {
+                // One small chunk per task: its records stay in the cache between the steps.
+                job.plans(Limits::CPU, &mut answers).into_par_iter().try_for_each(|mut plan| {
                     let chunk = job.build(&mut plan);
-                    job.scatter(&cpu::run(&chunk, seeds), plan)?;
-                }
+                    job.scatter(&cpu::run(&chunk, seeds), plan)
+                })?;
             }
             #[cfg(feature = "gpu")]
             Self::Gpu(gpu) => {
