@@ -15,6 +15,7 @@ pub mod load;
 pub mod mechanics;
 pub mod model;
 pub mod part;
+pub mod pick;
 pub mod plan;
 pub mod propose;
 pub mod rank;

@@ -9,6 +9,7 @@ mod export;
 mod figures;
 mod gripper;
 mod part;
+mod pick;
 mod plan;
 mod report;
 mod score;
@@ -42,6 +43,7 @@ enum Command {
     Gripper(gripper::Args),
     Figures(figures::Args),
     Export(export::Args),
+    Pick(pick::Args),
     Completions(shell::CompletionsArgs),
     Man(shell::ManArgs),
 }
@@ -60,6 +62,7 @@ pub(crate) fn main() -> ExitCode {
             Command::Gripper(args) => gripper::run(args),
             Command::Figures(args) => figures::run(args),
             Command::Export(args) => export::run(args),
+            Command::Pick(args) => pick::run(args),
             Command::Completions(args) => shell::completions(args),
             Command::Man(args) => shell::man(args),
         });

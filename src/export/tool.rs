@@ -148,7 +148,7 @@ impl Joint {
 ///
 /// # Errors
 /// When the flange is asked for and the gripper states none.
-pub(super) fn grip_from_tool(convention: Convention, origin: Origin, gripper: Option<&Gripper>) -> Result<Frame> {
+pub fn grip_from_tool(convention: Convention, origin: Origin, gripper: Option<&Gripper>) -> Result<Frame> {
     let origin = match origin {
         Origin::Pads => DVec3::ZERO,
         Origin::Behind(distance) => DVec3::X * -distance,

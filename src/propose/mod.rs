@@ -8,6 +8,7 @@
 mod environment;
 mod explain;
 mod interference;
+pub(crate) mod obstacle;
 mod options;
 mod patch;
 mod site;

@@ -95,13 +95,20 @@ pub(super) fn sweeps(gripper: &Gripper, motion: &Motion) -> Vec<Sweep> {
 
 impl Sweep {
     fn new(body: Body, jaw: &'static str, stage: Stage, path: DVec3, motion: &Motion) -> Self {
-        let [mut low, mut high] = body.bounds();
-        (low, high) = (low.min(low + path), high.max(high + path));
-        let is_box = matches!(body.shape, Shape::Box { .. }) && is_axis_parallel(body.grip_from_body.rotation);
         // Clearance on all sides but along x3, where a finger may lie on its face (the touch tolerance keeps it off).
         // Flush with a wall is no collision either: boxes are drawn in by the tolerance.
         let side = motion.clearance - motion.touch;
         let grown = DVec3::new(side, side, if jaw.is_empty() { side } else { 0.0 });
+        Self::grown(body, jaw, stage, path, grown)
+    }
+
+    /// The sweep along `path` with `grown` added on all sides (less where negative, as far as it is a box).
+    pub(super) fn grown(body: Body, jaw: &'static str, stage: Stage, path: DVec3, grown: DVec3) -> Self {
+        let [mut low, mut high] = body.bounds();
+        (low, high) = (low.min(low + path), high.max(high + path));
+        // A box moved along one of its axes sweeps a box.
+        let along_axis = path.to_array().iter().filter(|part| **part != 0.0).count() <= 1;
+        let is_box = along_axis && matches!(body.shape, Shape::Box { .. }) && is_axis_parallel(body.grip_from_body.rotation);
         let grown = if is_box { grown.max((low - high) * 0.499) } else { grown.max(DVec3::ZERO) };
         let exact = (!is_box).then(|| Convex { body: body.clone(), path, grown });
         Self { body: body.name, jaw, stage, low: low - grown, high: high + grown, exact }

@@ -1,0 +1,295 @@
+//! The run-time choice: the first grip of a ranked list that is free in a scene, and why each one before it was passed over.
+//!
+//! A [`Picker`] holds what does not change between picks (obstacles in a tree, swept gripper bodies); [`Picker::pick`] takes the part's pose.
+
+mod scene;
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::gripper::Gripper;
+use crate::model::{Frame, Grip};
+use crate::propose::obstacle::{Course, MeshObstacle, Volumes};
+use crate::results::GripSet;
+
+pub use crate::propose::obstacle::Phase;
+pub use scene::{Obstacle, Reach, Retreat, Scene, Solid};
+
+/// Grips that one thread tests after each other. What a piece remembers of earlier collisions stays within it, so that reasons do not
+/// depend on the number of threads.
+const PIECE: usize = 64;
+/// Collisions remembered within a piece: the grips of a list are often neighbours and meet the same triangle.
+const MEMORY: usize = 6;
+
+/// Why a grip was passed over.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reason {
+    /// Its approach lies outside the cone, by its angle to the axis [rad].
+    Cone(f64),
+    /// The flange (or, without one, the grip) is this far from the robot's base [m].
+    Reach(f64),
+    /// It needs jaws opened this far, less than the smallest or more than the largest distance of the pads [m].
+    Stroke(f64),
+    /// A body of the gripper meets an obstacle.
+    Collision {
+        /// Index into [`Scene::obstacles`].
+        obstacle: usize,
+        /// When.
+        phase: Phase,
+        /// `I` or `II` for a finger body, nothing for the palm.
+        jaw: &'static str,
+        /// Index into the gripper's finger or palm bodies.
+        body: usize,
+    },
+}
+
+/// The outcome of a pick.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Pick {
+    /// Index into the list of the first free grip.
+    pub chosen: Option<usize>,
+    /// Why each grip before it (or every grip) was passed over, in order.
+    pub passed: Vec<Reason>,
+}
+
+/// An obstacle ready for tests.
+enum Ready {
+    Mesh { tree: MeshObstacle, closed: bool },
+    Box { world_from_box: Frame, half: DVec3 },
+    HalfSpace { normal: DVec3, offset: f64 },
+}
+
+/// A list of grips and a scene, ready to pick.
+pub struct Picker<'a> {
+    set: &'a GripSet,
+    scene: &'a Scene,
+    gripper: Gripper,
+    obstacles: Vec<Ready>,
+    /// Swept bodies for each width that occurs, and the number of those of each grip; without them the stroke does not suffice.
+    volumes: Vec<Volumes>,
+    volumes_of: Vec<std::result::Result<u32, f64>>,
+}
+
+/// What a piece remembers of a collision: obstacle, volume, triangle.
+type Memory = Vec<(usize, usize, [DVec3; 3])>;
+
+impl<'a> Picker<'a> {
+    /// Prepares to pick from `set` in `scene`.
+    ///
+    /// # Errors
+    /// When the gripper in `set` cannot be read.
+    pub fn new(set: &'a GripSet, scene: &'a Scene) -> Result<Self> {
+        let gripper: Gripper = serde_json::from_value(set.gripper.clone())
+            .map_err(|error| Error::input("gripper in the result file", format!("cannot be read: {error}"), "write the result anew with `gripfast plan`"))?;
+        let obstacles = scene.obstacles.iter().map(ready).collect();
+        let mut picker = Self { set, scene, gripper, obstacles, volumes: Vec::new(), volumes_of: Vec::with_capacity(set.grips.len()) };
+        let mut known: HashMap<(u64, bool), std::result::Result<u32, f64>> = HashMap::new();
+        for ranked in &set.grips {
+            let (width, inside) = (ranked.grip.width, ranked.grip.inside);
+            let entry = known.entry((width.to_bits(), inside)).or_insert_with(|| {
+                let course = picker.course(width, inside)?;
+                picker.volumes.push(Volumes::new(&picker.gripper, &course));
+                Ok(picker.volumes.len() as u32 - 1)
+            });
+            picker.volumes_of.push(*entry);
+        }
+        Ok(picker)
+    }
+
+    /// The gripper's motion for a grip of this width, or the distance of the pads that its stroke does not reach.
+    fn course(&self, width: f64, inside: bool) -> std::result::Result<Course, f64> {
+        let [least, most] = self.gripper.stroke;
+        let gap = if inside { width - 2.0 * self.gripper.outer_pad.unwrap_or(0.0) } else { width };
+        // Touching the end of the stroke is allowed, beyond rounding it is not.
+        let slack = 1e-9;
+        if !(least - slack..=most + slack).contains(&gap) {
+            return Err(gap);
+        }
+        let room = if inside { gap - least } else { most - gap };
+        let opening = self.scene.opening.unwrap_or(f64::INFINITY).min(room / 2.0).max(0.0);
+        let retreat = match self.scene.retreat {
+            Retreat::Back(distance) => DVec3::NEG_X * distance,
+            // Depends on each grip's pose: tested apart.
+            Retreat::Along(_) => DVec3::ZERO,
+        };
+        let opening = if inside { -opening } else { opening };
+        Ok(Course { gap, opening, approach: self.scene.approach, retreat, clearance: self.scene.clearance })
+    }
+
+    /// The first free grip with the part at `world_from_part`.
+    ///
+    /// The answer, reasons included, is the same for any number of threads.
+    pub fn pick(&self, world_from_part: &Frame) -> Pick {
+        let mut pick = Pick::default();
+        // Small groups first: most often one of the first grips is free, and a group is tested whole.
+        let mut size = PIECE;
+        while pick.chosen.is_none() && pick.passed.len() < self.set.grips.len() {
+            let start = pick.passed.len();
+            let end = (start + size).min(self.set.grips.len());
+            let piece = |first: usize| self.piece(first..(first + PIECE).min(end), world_from_part);
+            // One piece is not worth waking the threads.
+            let pieces: Vec<(Vec<Reason>, bool)> =
+                if end - start <= PIECE { vec![piece(start)] } else { (start..end).into_par_iter().step_by(PIECE).map(piece).collect() };
+            for (reasons, free) in pieces {
+                pick.passed.extend(reasons);
+                if free {
+                    pick.chosen = Some(pick.passed.len());
+                    break;
+                }
+            }
+            size = (size * 4).min(1 << 14);
+        }
+        pick
+    }
+
+    /// Why the grip of this index is not free with the part at `world_from_part`; `None` when it is, or when there is no such grip.
+    ///
+    /// Of several collisions any may be named; [`Self::pick`] may name another one than this.
+    pub fn check(&self, index: usize, world_from_part: &Frame) -> Option<Reason> {
+        if index >= self.set.grips.len() {
+            return None;
+        }
+        self.reason(index, world_from_part, &mut Memory::new(), &mut Vec::new())
+    }
+
+    /// Reasons of a run of grips up to the first free one, and whether there is one.
+    fn piece(&self, grips: std::ops::Range<usize>, world_from_part: &Frame) -> (Vec<Reason>, bool) {
+        let mut reasons = Vec::with_capacity(grips.len());
+        let (mut memory, mut near) = (Memory::new(), Vec::new());
+        for index in grips {
+            match self.reason(index, world_from_part, &mut memory, &mut near) {
+                Some(reason) => reasons.push(reason),
+                None => return (reasons, true),
+            }
+        }
+        (reasons, false)
+    }
+
+    /// Why a grip is not free, cheapest questions first.
+    fn reason(&self, index: usize, world_from_part: &Frame, memory: &mut Memory, near: &mut Vec<u32>) -> Option<Reason> {
+        let world_from_grip = world_from_part.compose(&self.set.grips[index].grip.part_from_grip);
+        let approach = world_from_grip.rotation.x_axis;
+        if let Some((axis, half_angle)) = self.scene.cone {
+            let angle = axis.dot(approach).clamp(-1.0, 1.0).acos();
+            if angle > half_angle + 1e-9 {
+                return Some(Reason::Cone(angle));
+            }
+        }
+        if let Some(reach) = &self.scene.reach {
+            let flange = self.gripper.grip_from_flange.map_or(DVec3::ZERO, |flange| flange.origin);
+            let distance = world_from_grip.point(flange).distance(reach.base);
+            if !(reach.least..=reach.most).contains(&distance) {
+                return Some(Reason::Reach(distance));
+            }
+        }
+        let volumes = match self.volumes_of[index] {
+            Ok(volumes) => &self.volumes[volumes as usize],
+            Err(gap) => return Some(Reason::Stroke(gap)),
+        };
+        if let Some((obstacle, volume)) = self.collision(volumes, &world_from_grip, memory, near) {
+            return Some(explain(obstacle, volumes, volume));
+        }
+        let Retreat::Along(way) = self.scene.retreat else { return None };
+        let grip = &self.set.grips[index].grip;
+        let course = self.course(grip.width, grip.inside).ok()?;
+        let retreat = world_from_grip.rotation.transpose() * way;
+        let volumes = Volumes::new(&self.gripper, &Course { approach: 0.0, opening: 0.0, retreat, ..course });
+        self.collision(&volumes, &world_from_grip, &mut Memory::new(), near).map(|(obstacle, volume)| explain(obstacle, &volumes, volume))
+    }
+
+    /// An obstacle and the first volume that meets it.
+    fn collision(&self, volumes: &Volumes, world_from_grip: &Frame, memory: &mut Memory, near: &mut Vec<u32>) -> Option<(usize, usize)> {
+        for (obstacle, ready) in self.obstacles.iter().enumerate() {
+            let volume = match ready {
+                Ready::HalfSpace { normal, offset } => volumes.below(world_from_grip, *normal, *offset),
+                Ready::Box { world_from_box, half } => volumes.meets_box(world_from_grip, world_from_box, *half),
+                Ready::Mesh { .. } => None,
+            };
+            if let Some(volume) = volume {
+                return Some((obstacle, volume));
+            }
+        }
+        let known = memory.iter().position(|(_, volume, corners)| volumes.meets(*volume, world_from_grip, *corners));
+        if let Some(place) = known {
+            let (obstacle, volume, _) = memory[place];
+            // What met last meets next.
+            memory[..=place].rotate_right(1);
+            return Some((obstacle, volume));
+        }
+        for (obstacle, ready) in self.obstacles.iter().enumerate() {
+            let Ready::Mesh { tree, .. } = ready else { continue };
+            if let Some((volume, corners)) = tree.first_met(volumes, world_from_grip, near) {
+                memory.truncate(MEMORY - 1);
+                memory.insert(0, (obstacle, volume, corners));
+                return Some((obstacle, volume));
+            }
+        }
+        self.obstacles.iter().enumerate().find_map(|(obstacle, ready)| match ready {
+            Ready::Mesh { tree, closed: true } => tree.contains(volumes, world_from_grip).map(|volume| (obstacle, volume)),
+            _ => None,
+        })
+    }
+
+    /// A reason in words.
+    pub fn describe(&self, reason: &Reason) -> String {
+        match *reason {
+            Reason::Cone(angle) => format!("approach {:.1} deg off the cone's axis", angle.to_degrees()),
+            Reason::Reach(distance) => format!("out of reach: {:.1} mm from the base", distance * 1e3),
+            Reason::Stroke(gap) => format!("outside the stroke: pads {:.2} mm apart", gap * 1e3),
+            Reason::Collision { obstacle, phase, jaw, body } => {
+                let bodies = if jaw.is_empty() { &self.gripper.palm } else { &self.gripper.fingers };
+                let body = bodies.get(body).map_or("gripper", |body| body.name.as_str());
+                let jaw = if jaw.is_empty() { String::new() } else { format!(" of jaw {jaw}") };
+                let phase = match phase {
+                    Phase::Grip => "in the grip",
+                    Phase::Approach => "on the approach",
+                    Phase::Retreat => "on the retreat",
+                };
+                format!("{body}{jaw} meets '{}' {phase}", self.scene.obstacles[obstacle].name)
+            }
+        }
+    }
+
+    /// A reason in one or two words, for counting.
+    pub fn category(&self, reason: &Reason) -> String {
+        match *reason {
+            Reason::Cone(_) => "approach cone".into(),
+            Reason::Reach(_) => "reach".into(),
+            Reason::Stroke(_) => "stroke".into(),
+            Reason::Collision { obstacle, .. } => format!("collision with '{}'", self.scene.obstacles[obstacle].name),
+        }
+    }
+
+    /// Distance of the pads before closing on a grip [m].
+    pub fn opened(&self, grip: &Grip) -> f64 {
+        self.course(grip.width, grip.inside).map_or_else(|gap| gap, |course| course.gap + 2.0 * course.opening)
+    }
+
+    /// The gripper of the list.
+    pub fn gripper(&self) -> &Gripper {
+        &self.gripper
+    }
+}
+
+fn explain(obstacle: usize, volumes: &Volumes, volume: usize) -> Reason {
+    let (phase, jaw, body) = volumes.name(volume);
+    Reason::Collision { obstacle, phase, jaw, body }
+}
+
+fn ready(obstacle: &Obstacle) -> Ready {
+    let pose = obstacle.world_from_obstacle;
+    match &obstacle.solid {
+        Solid::Mesh { mesh, closed } => {
+            let placed = crate::part::Mesh { vertices: mesh.vertices.iter().map(|vertex| pose.point(*vertex)).collect(), triangles: mesh.triangles.clone() };
+            Ready::Mesh { tree: MeshObstacle::new(&placed), closed: *closed }
+        }
+        Solid::Box { half } => Ready::Box { world_from_box: pose, half: *half },
+        Solid::HalfSpace => {
+            let normal = pose.rotation.z_axis;
+            Ready::HalfSpace { normal, offset: normal.dot(pose.origin) }
+        }
+    }
+}
