@@ -165,7 +165,7 @@ pub(crate) struct MeshObstacle {
 
 impl MeshObstacle {
     pub(crate) fn new(mesh: &Mesh) -> Self {
-        Self { tree: Tree::new(&Arc::new(Topology::new(mesh)), mesh, DMat3::IDENTITY) }
+        Self { tree: Tree::new(&Arc::new(Topology::new(mesh)), DMat3::IDENTITY) }
     }
 
     /// The first volume that meets the surface, with a triangle that it meets. `near` is room for the search.
