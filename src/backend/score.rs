@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::{Backend, Batch, Problem, Seed, SeedSet, SeedStatus};
 use crate::error::Result;
 use crate::mechanics::slip::{self, Field};
-use crate::mechanics::{Options, Pads, Refiner, Separation, refused, solve_pads};
+use crate::mechanics::{Options, Pads, Refiner, Search, Separation, refused, solve_pads};
 use crate::model::{Contact, Score, Status};
 
 /// Values of `mu_s` that differ by less than this share count as equal, and the first load is taken as the worst:
@@ -111,17 +111,23 @@ fn solve_block(problems: &[Problem<'_>], seeds: &[Seed], options: &ScoreOptions)
 }
 
 fn score_one(problem: &Problem<'_>, pads: Option<&Pads>, seeds: &[Seed], options: &ScoreOptions) -> Scored {
-    let solve = |load: usize| {
+    let full = |load: usize, search: Search| {
         let seed = matches!(seeds[load].status, SeedStatus::Bounded | SeedStatus::Unbounded).then_some(seeds[load].twist);
-        let options = Options { separation: options.separation, refiner: options.refiner, seed };
+        let options = Options { separation: options.separation, refiner: options.refiner, seed, search };
         match pads {
             Some(pads) => solve_pads(pads, problem.distance, problem.force, &problem.wrenches[load], &options),
             None => refused(Status::NoContact, 0),
         }
     };
+    // Further solutions are looked for where a load seems to have none, and for the worst one in the end.
+    let solve = |load: usize| {
+        let score = full(load, Search::Off);
+        if usable(&score).is_some() { score } else { full(load, Search::WhereNeeded) }
+    };
+    let settle = |worst: Option<(usize, Score)>| worst.map(|(load, score)| (load, if usable(&score).is_some() { full(load, Search::WhereNeeded) } else { score }));
     if options.polish == Polish::All {
         let all: Vec<Score> = (0..seeds.len()).into_par_iter().with_min_len(8).map(solve).collect();
-        return Scored { worst: worst(all.iter().copied().enumerate()), solved: all.len(), compared: 0, all };
+        return Scored { worst: settle(worst(all.iter().copied().enumerate())), solved: all.len(), compared: 0, all };
     }
     // Loads without bounds are solved in order. One that has no limit state is the worst, whatever the others are:
     // a load with bounds has one.
@@ -165,7 +171,7 @@ fn score_one(problem: &Problem<'_>, pads: Option<&Pads>, seeds: &[Seed], options
         }
     }
     solved.sort_by_key(|(load, _)| *load);
-    Scored { solved: solved.len(), compared, worst: worst(solved.into_iter()), all: Vec::new() }
+    Scored { solved: solved.len(), compared, worst: settle(worst(solved.into_iter())), all: Vec::new() }
 }
 
 /// `mu_s` of congruent faces in full contact: their summed pressure is constant.

@@ -15,6 +15,7 @@ mod report;
 mod score;
 mod shell;
 mod solve;
+mod why;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -36,6 +37,7 @@ enum Command {
     Plan(Box<plan::Args>),
     Part(part::Args),
     Solve(solve::Args),
+    Why(why::Args),
     Score(score::Args),
     Devices(devices::Args),
     Bench(bench::Args),
@@ -55,6 +57,7 @@ pub(crate) fn main() -> ExitCode {
             Command::Part(args) => part::run(args),
             Command::Plan(args) => plan::run(*args),
             Command::Solve(args) => solve::run(args),
+            Command::Why(args) => why::run(args),
             Command::Score(args) => score::run(args),
             Command::Devices(args) => devices::run(args),
             Command::Bench(args) => bench::run(args),

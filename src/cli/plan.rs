@@ -19,6 +19,7 @@ use gripfast::plan::{Assessor, Collector, Settings};
 use gripfast::propose::{ProposeOptions, Proposer};
 use gripfast::rank::{self, Weights};
 
+use gripfast::report;
 use gripfast::results::{self, GripSet, PartSummary, Provenance, RankedGrip, Summary};
 use gripfast::units::Quantity;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -26,6 +27,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::backend::BackendArgs;
 use super::candidates::CandidateArgs;
 use super::solve::{RefinerArg, SeparationArg};
+use super::why;
 
 /// Finds and ranks the grips on a part.
 #[derive(Debug, ClapArgs)]
@@ -109,6 +111,9 @@ pub(crate) struct Args {
     /// The result as JSON on standard output instead of the table.
     #[arg(long, help_heading = "Output")]
     json: bool,
+    /// Explains one pose instead of planning: position and approach angle in the plane of a face pair, and its number.
+    #[arg(long, value_name = "X,Y,ANGLE,SITE", allow_hyphen_values = true, help_heading = "Output")]
+    why: Option<String>,
     /// No progress bar and no notes.
     #[arg(long, short, help_heading = "Output")]
     quiet: bool,
@@ -168,6 +173,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     note(&format!("backend {}", selection.reason));
 
     let mut proposer = Proposer::new(&part, &gripper, &propose)?;
+    if let Some(text) = &args.why {
+        let (position, angle, site) = why::pose(text)?;
+        let explanation = proposer.explain(site, position, angle, false)?;
+        why::print(&mut std::io::stdout().lock(), &explanation)?;
+        return Ok(if explanation.rejection.is_none() { ExitCode::SUCCESS } else { ExitCode::from(1) });
+    }
     let stop = stop_on_interrupt();
     let bar = progress(proposer.candidates(), args.quiet);
     let assessor = Assessor { loads: &cases, mass, settings: &settings, backend: &selection.backend, seeds: &seeds };
@@ -225,7 +236,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         set.write(path)?;
     }
     if let Some(path) = &args.report {
-        let _ = (&set, path); // REPORT
+        report::write(&set, Some(&part.mesh), path)?;
     }
     let mut out = std::io::stdout().lock();
     if args.json {
@@ -399,7 +410,7 @@ fn print(out: &mut impl Write, set: &GripSet, args: &Args, gripper: &Gripper, fo
     writeln!(out, "\n{table}")?;
     writeln!(
         out,
-        "\nmu_s: smallest friction coefficient that holds the worst load. Slip centre from the grip's middle in the pad plane.\nPosition and approach in the part frame."
+        "\nmu_s: smallest friction coefficient that holds the worst load. Slip centre from the grip's middle in the pad plane.\nPosition of the grip's middle in the part frame."
     )?;
     Ok(())
 }
@@ -413,7 +424,6 @@ fn row(grip: &RankedGrip, set: &GripSet) -> Vec<String> {
         _ => "-".into(),
     };
     let o = grip.grip.part_from_grip.origin * 1e3;
-    let approach = grip.grip.part_from_grip.rotation.x_axis;
     let mark = if worst.status == Status::Ambiguous { "?" } else { "" };
     vec![
         grip.rank.to_string(),
@@ -428,7 +438,6 @@ fn row(grip: &RankedGrip, set: &GripSet) -> Vec<String> {
         option(grip.score, 3),
         format!("{:.2}", grip.grip.width * 1e3),
         tuple(&o.to_array()),
-        tuple(&approach.to_array()),
     ]
 }
 

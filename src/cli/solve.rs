@@ -112,7 +112,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !(args.safety.is_finite() && args.safety > 0.0) {
         anyhow::bail!("--safety {}: give a positive number", args.safety);
     }
-    let options = Options { separation: args.separation.into(), refiner: args.refiner.into(), seed: None };
+    let options = Options { separation: args.separation.into(), refiner: args.refiner.into(), ..Options::default() };
     let mut out = std::io::stdout().lock();
     let cases = case::read(&args.case)?;
     let mut any = false;

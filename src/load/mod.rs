@@ -180,7 +180,7 @@ impl LoadSet {
             let weight = *direction * (mass * STANDARD_GRAVITY);
             // Against gravity first: there the inertial force adds to the whole weight, which no other direction does.
             for along in std::iter::once(-*direction).chain(spread.iter().copied()) {
-                let name = format!("gravity {}, accelerated {:.4} m/s2 along {}", name(*direction), acceleration.magnitude, name(along));
+                let name = format!("gravity {}, accelerated {}", name(*direction), name(along));
                 cases.push(force_case(name, weight - along * (mass * acceleration.magnitude)));
             }
         }

@@ -2,14 +2,15 @@
 
 use crate::model::{Score, Status, Wrench};
 
-use super::{Options, Pads, solve_pads};
+use super::{Options, Pads, Search, solve_pads};
 
 /// The gripping force [N] needed to hold `wrench` with the pad friction `friction`: at it `mu_s` equals `friction`, or just
 /// below it the contact twists out. `None` when no force up to `1e9` times the load's size holds it (or `friction` is not positive).
 ///
 /// `mu_s` times the force hardly changes while the contact stays whole, so the force is found by proportion in a few
 /// steps. Where that does not settle (separation, several limit states) it is the smallest force from which on every
-/// larger one tried holds, by search from above and bisection to 1e-9.
+/// larger one tried holds, by search from above and bisection to 1e-9. Only limit states on the branch from `d = 0` count
+/// ([`Search::Off`]), which errs towards more force.
 pub fn force_needed(pads: &Pads, distance: f64, wrench: &Wrench, friction: f64, options: &Options) -> Option<f64> {
     if friction.is_nan() || friction <= 0.0 {
         return None;
@@ -18,7 +19,8 @@ pub fn force_needed(pads: &Pads, distance: f64, wrench: &Wrench, friction: f64, 
     if size == 0.0 {
         return Some(0.0);
     }
-    let solve = |force: f64| solve_pads(pads, distance, force, wrench, options);
+    let options = Options { search: Search::Off, ..*options };
+    let solve = |force: f64| solve_pads(pads, distance, force, wrench, &options);
     by_proportion(1e3 * size, friction, solve).or_else(|| from_above(size, friction, solve))
 }
 

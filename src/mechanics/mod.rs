@@ -34,6 +34,17 @@ pub enum Separation {
     Discard,
 }
 
+/// Whether to look for further solutions where several are possible.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Search {
+    /// Where the coupling is strong ([`COUPLING_SEARCH`]) or the branch from `d = 0` does not reach the load.
+    #[default]
+    WhereNeeded,
+    /// Never: only the branch from `d = 0` counts, and a load that it does not reach is refused. For comparing many
+    /// loads or forces before the answer that matters is solved in full.
+    Off,
+}
+
 /// Options of [`solve`].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Options {
@@ -43,6 +54,8 @@ pub struct Options {
     pub refiner: Refiner,
     /// A twist `(u1, u2, omega)` about the grip origin to start from (SI, any length), e.g. the best seed.
     pub seed: Option<[f64; 3]>,
+    /// Whether to look for further solutions.
+    pub search: Search,
 }
 
 /// Strength of the coupling, `mu d / sqrt(A)`, above which other solutions are looked for. Below it none was ever seen
@@ -102,7 +115,8 @@ pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, optio
     let branch = solver.branch(seed);
     let strong = |state: &State| state.mu_over_size * load.size * 2.0 * load.half_distance > COUPLING_SEARCH;
     let (state, unique) = match branch {
-        Some(state) if !strong(&state) => (state, true),
+        Some(state) if options.search == Search::Off || !strong(&state) => (state, true),
+        None if options.search == Search::Off => return refused(Status::TwistedOut, solver.evaluations),
         Some(state) => {
             let others = solver.search(seed);
             (state, others.iter().all(|other| equilibrium::same(other, &state)))

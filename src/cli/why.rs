@@ -1,0 +1,104 @@
+//! `gripfast why`: why one pose is a grip, or is not.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args as ClapArgs;
+use gripfast::error::{Error, Result};
+use gripfast::gripper::Gripper;
+use gripfast::part::{Part, ReadOptions, Unit};
+use gripfast::propose::{Explanation, ProposeOptions, Proposer};
+use gripfast::results::GripSet;
+use gripfast::units::Quantity;
+
+/// Explains one grip of a result file: every test with body and place, and what its score is made of.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "EXAMPLES:\n  gripfast why grips.json 962\n  gripfast why grips.json 962 --part bracket.stl\n\n\
+For a pose that is not in the list use `gripfast plan .. --why X,Y,ANGLE,SITE`.")]
+pub(crate) struct Args {
+    /// Result file of `gripfast plan`.
+    grips: PathBuf,
+    /// Number (id) of the grip.
+    id: u64,
+    /// Part file [default: the one named in the result file].
+    #[arg(long)]
+    part: Option<PathBuf>,
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let set = GripSet::read(&args.grips)?;
+    let file = args.grips.display().to_string();
+    let Some(ranked) = set.grips.iter().find(|ranked| ranked.grip.id == args.id) else {
+        return Err(Error::input(&file, format!("holds no grip {}", args.id), "see the ids in `gripfast plan`'s table, or explain a pose with `gripfast plan --why`").into());
+    };
+    let gripper: Gripper = serde_json::from_value(set.gripper.clone()).map_err(|error| Error::input(&file, format!("gripper: {error}"), "make the file again"))?;
+    let path = args.part.unwrap_or_else(|| PathBuf::from(&set.part.file));
+    let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == set.part.unit_m);
+    let part = Part::read(&path, &ReadOptions { unit })?;
+    let proposer = Proposer::new(&part, &gripper, &options(&set))?;
+    let explanation = proposer.explain_pose(ranked.grip.face_i, ranked.grip.face_ii, &ranked.grip.part_from_grip)?;
+    let mut out = std::io::stdout().lock();
+    print(&mut out, &explanation)?;
+    let worst = &ranked.worst;
+    writeln!(out, "rank {} of {}: score {}", ranked.rank, set.summary.ranked, ranked.score.map_or("-".into(), |score| format!("{score:.4}")))?;
+    writeln!(out, "worst load: {}", set.loads.get(worst.load as usize).map_or("?", |load| load.name.as_str()))?;
+    let [f, m] = [worst.wrench.force.to_array(), worst.wrench.moment.to_array()];
+    writeln!(out, "  in the grip frame: F ({:.4}, {:.4}, {:.4}) N, M ({:.5}, {:.5}, {:.5}) N m", f[0], f[1], f[2], m[0], m[1], m[2])?;
+    if let (Some(mu), Some(bounds)) = (worst.mu_s, worst.bounds) {
+        writeln!(out, "  mu_s {mu:.9}, certified between {:.9} and {:.9} for its pressure, residual {:.1e}", bounds.lower, bounds.upper, worst.residual)?;
+    }
+    writeln!(
+        out,
+        "  contact left {:.1} %, twist-out margin {:.3}, alpha {:.2} deg, Delta_d {:.3} mm",
+        ranked.contact_share * 100.0,
+        ranked.twist_margin,
+        ranked.alpha.to_degrees(),
+        ranked.delta_d * 1e3
+    )?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What was proposed in the run, as far as it decides about one pose.
+fn options(set: &GripSet) -> ProposeOptions {
+    let number = |name: &str| set.provenance.settings.get(name).and_then(serde_json::Value::as_f64);
+    let flag = |name: &str| set.provenance.settings.get(name).and_then(serde_json::Value::as_bool).unwrap_or(false);
+    let defaults = ProposeOptions::default();
+    ProposeOptions {
+        spacing: number("spacing_m"),
+        angle_step: number("angle_step_rad").unwrap_or(defaults.angle_step),
+        min_contact: number("min_contact_share").unwrap_or(defaults.min_contact),
+        max_offset: number("max_offset_m"),
+        opening: number("opening_m").unwrap_or(defaults.opening),
+        clearance: number("clearance_m").unwrap_or(defaults.clearance),
+        inside: flag("inside"),
+        ..defaults
+    }
+}
+
+/// The pose of `plan --why X,Y,ANGLE,SITE`, e.g. `3mm,-2mm,30deg,0`.
+pub(crate) fn pose(text: &str) -> Result<(glam::DVec2, f64, usize)> {
+    let flag = "--why";
+    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    let [x, y, angle, site] = parts[..] else {
+        return Err(Error::input(flag, format!("'{text}' is not four values"), "give X,Y,ANGLE,SITE, e.g. 3mm,-2mm,30deg,0 (position and angle in the plane of the face pair)"));
+    };
+    let site = site.parse().map_err(|_| Error::input(flag, format!("'{site}' is no site number"), "count sites (face pairs) from 0"))?;
+    let length = |text: &str| Quantity::Length.parse(flag, text);
+    Ok((glam::DVec2::new(length(x)?, length(y)?), Quantity::Angle.parse(flag, angle)?, site))
+}
+
+/// Every test of an explanation, one a line.
+pub(crate) fn print(out: &mut impl Write, explanation: &Explanation) -> anyhow::Result<()> {
+    let o = explanation.part_from_grip.origin * 1e3;
+    writeln!(out, "pose at ({:.3}, {:.3}, {:.3}) mm on face pair {}, width {:.3} mm", o.x, o.y, o.z, explanation.site, explanation.width * 1e3)?;
+    for check in &explanation.checks {
+        writeln!(out, "  {} {:28} {}", if check.passed { "ok  " } else { "FAIL" }, check.name, check.detail)?;
+    }
+    match (&explanation.rejection, explanation.place) {
+        (Some(reason), Some(at)) => writeln!(out, "rejected: {} at ({:.3}, {:.3}, {:.3}) mm", reason.name().replace('_', " "), at.x * 1e3, at.y * 1e3, at.z * 1e3)?,
+        (Some(reason), None) => writeln!(out, "rejected: {}", reason.name().replace('_', " "))?,
+        (None, _) => writeln!(out, "free of interference")?,
+    }
+    Ok(())
+}
