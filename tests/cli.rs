@@ -71,8 +71,10 @@ fn the_answer_depends_neither_on_threads_nor_on_seeds() {
 #[test]
 fn every_real_part_ends_with_a_list_or_a_clear_reason() {
     let Some(folder) = support::reference("parts") else { return };
-    let mut parts: Vec<PathBuf> = ["parts", "gen"].iter().flat_map(|sub| std::fs::read_dir(folder.join(sub)).unwrap()).map(|entry| entry.unwrap().path()).collect();
-    let mesh = |path: &PathBuf| path.extension().is_some_and(|suffix| ["stl", "obj", "3mf", "step"].contains(&suffix.to_string_lossy().to_lowercase().as_str()));
+    let mut parts: Vec<PathBuf> =
+        ["parts", "gen"].iter().flat_map(|sub| std::fs::read_dir(folder.join(sub)).unwrap()).map(|entry| entry.unwrap().path()).collect();
+    let mesh =
+        |path: &PathBuf| path.extension().is_some_and(|suffix| ["stl", "obj", "3mf", "step"].contains(&suffix.to_string_lossy().to_lowercase().as_str()));
     parts.retain(mesh);
     parts.sort();
     assert!(parts.len() > 20);

@@ -124,7 +124,8 @@ fn score_one(problem: &Problem<'_>, pads: Option<&Pads>, seeds: &[Seed], options
         let score = full(load, Search::Off);
         if usable(&score).is_some() { score } else { full(load, Search::WhereNeeded) }
     };
-    let settle = |worst: Option<(usize, Score)>| worst.map(|(load, score)| (load, if usable(&score).is_some() { full(load, Search::WhereNeeded) } else { score }));
+    let settle =
+        |worst: Option<(usize, Score)>| worst.map(|(load, score)| (load, if usable(&score).is_some() { full(load, Search::WhereNeeded) } else { score }));
     if options.polish == Polish::All {
         let all: Vec<Score> = (0..seeds.len()).into_par_iter().with_min_len(8).map(solve).collect();
         return Scored { worst: settle(worst(all.iter().copied().enumerate())), solved: all.len(), compared: 0, all };

@@ -30,9 +30,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let set = GripSet::read(&args.grips)?;
     let file = args.grips.display().to_string();
     let Some(ranked) = set.grips.iter().find(|ranked| ranked.grip.id == args.id) else {
-        return Err(Error::input(&file, format!("holds no grip {}", args.id), "see the ids in `gripfast plan`'s table, or explain a pose with `gripfast plan --why`").into());
+        return Err(Error::input(
+            &file,
+            format!("holds no grip {}", args.id),
+            "see the ids in `gripfast plan`'s table, or explain a pose with `gripfast plan --why`",
+        )
+        .into());
     };
-    let gripper: Gripper = serde_json::from_value(set.gripper.clone()).map_err(|error| Error::input(&file, format!("gripper: {error}"), "make the file again"))?;
+    let gripper: Gripper =
+        serde_json::from_value(set.gripper.clone()).map_err(|error| Error::input(&file, format!("gripper: {error}"), "make the file again"))?;
     let path = args.part.unwrap_or_else(|| PathBuf::from(&set.part.file));
     let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == set.part.unit_m);
     let part = Part::read(&path, &ReadOptions { unit })?;
@@ -81,7 +87,11 @@ pub(crate) fn pose(text: &str) -> Result<(glam::DVec2, f64, usize)> {
     let flag = "--why";
     let parts: Vec<&str> = text.split(',').map(str::trim).collect();
     let [x, y, angle, site] = parts[..] else {
-        return Err(Error::input(flag, format!("'{text}' is not four values"), "give X,Y,ANGLE,SITE, e.g. 3mm,-2mm,30deg,0 (position and angle in the plane of the face pair)"));
+        return Err(Error::input(
+            flag,
+            format!("'{text}' is not four values"),
+            "give X,Y,ANGLE,SITE, e.g. 3mm,-2mm,30deg,0 (position and angle in the plane of the face pair)",
+        ));
     };
     let site = site.parse().map_err(|_| Error::input(flag, format!("'{site}' is no site number"), "count sites (face pairs) from 0"))?;
     let length = |text: &str| Quantity::Length.parse(flag, text);
@@ -96,7 +106,9 @@ pub(crate) fn print(out: &mut impl Write, explanation: &Explanation) -> anyhow::
         writeln!(out, "  {} {:28} {}", if check.passed { "ok  " } else { "FAIL" }, check.name, check.detail)?;
     }
     match (&explanation.rejection, explanation.place) {
-        (Some(reason), Some(at)) => writeln!(out, "rejected: {} at ({:.3}, {:.3}, {:.3}) mm", reason.name().replace('_', " "), at.x * 1e3, at.y * 1e3, at.z * 1e3)?,
+        (Some(reason), Some(at)) => {
+            writeln!(out, "rejected: {} at ({:.3}, {:.3}, {:.3}) mm", reason.name().replace('_', " "), at.x * 1e3, at.y * 1e3, at.z * 1e3)?
+        }
         (Some(reason), None) => writeln!(out, "rejected: {}", reason.name().replace('_', " "))?,
         (None, _) => writeln!(out, "free of interference")?,
     }
