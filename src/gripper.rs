@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-use crate::model::{Frame, Ring};
+use crate::model::{Frame, Grip, Ring};
 
 pub use catalogue::find;
 pub use check::check;
@@ -139,6 +139,17 @@ impl Gripper {
             Frame { rotation: half_turn(), origin: DVec3::new(0.0, 0.0, -width / 2.0) }
         };
         self.fingers.iter().map(|body| body.moved(&map)).collect()
+    }
+
+    /// Distance of the pads in a grip [m]: the faces' own, or less by the fingers where these spread into a slot.
+    pub fn jaw_gap(&self, grip: &Grip) -> f64 {
+        if grip.inside { grip.width - 2.0 * self.outer_pad.unwrap_or(0.0) } else { grip.width }
+    }
+
+    /// Distance of the pads before they close on a grip [m], each jaw having `opening` to go or as much as the stroke leaves.
+    pub fn opened_gap(&self, grip: &Grip, opening: f64) -> f64 {
+        let (gap, [least, most]) = (self.jaw_gap(grip), self.stroke);
+        if grip.inside { (gap - 2.0 * opening).max(least).min(gap) } else { (gap + 2.0 * opening).min(most).max(gap) }
     }
 
     /// Whether exchanging the jaws (half a turn about the approach axis) changes nothing but the names: the pad is

@@ -16,13 +16,16 @@ use crate::propose::obstacle::{Course, MeshObstacle, Volumes};
 use crate::results::GripSet;
 
 pub use crate::propose::obstacle::Phase;
-pub use scene::{Obstacle, Reach, Retreat, Scene, Solid};
+pub use scene::{Obstacle, Opening, Reach, Retreat, Scene, Solid};
 
 /// Grips that one thread tests after each other. What a piece remembers of earlier collisions stays within it, so that reasons do not
 /// depend on the number of threads.
 const PIECE: usize = 64;
 /// Collisions remembered within a piece: the grips of a list are often neighbours and meet the same triangle.
 const MEMORY: usize = 6;
+
+/// Way of each jaw for lists that do not say how they were planned [m].
+const PLANNED_OPENING: f64 = 5e-3;
 
 /// Why a grip was passed over.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,9 +91,8 @@ impl<'a> Picker<'a> {
         let mut picker = Self { set, scene, gripper, obstacles, volumes: Vec::new(), volumes_of: Vec::with_capacity(set.grips.len()) };
         let mut known: HashMap<(u64, bool), std::result::Result<u32, f64>> = HashMap::new();
         for ranked in &set.grips {
-            let (width, inside) = (ranked.grip.width, ranked.grip.inside);
-            let entry = known.entry((width.to_bits(), inside)).or_insert_with(|| {
-                let course = picker.course(width, inside)?;
+            let entry = known.entry((ranked.grip.width.to_bits(), ranked.grip.inside)).or_insert_with(|| {
+                let course = picker.course(&ranked.grip)?;
                 picker.volumes.push(Volumes::new(&picker.gripper, &course));
                 Ok(picker.volumes.len() as u32 - 1)
             });
@@ -99,24 +101,21 @@ impl<'a> Picker<'a> {
         Ok(picker)
     }
 
-    /// The gripper's motion for a grip of this width, or the distance of the pads that its stroke does not reach.
-    fn course(&self, width: f64, inside: bool) -> std::result::Result<Course, f64> {
+    /// The gripper's motion for a grip, or the distance of the pads that its stroke does not reach.
+    fn course(&self, grip: &Grip) -> std::result::Result<Course, f64> {
         let [least, most] = self.gripper.stroke;
-        let gap = if inside { width - 2.0 * self.gripper.outer_pad.unwrap_or(0.0) } else { width };
+        let gap = self.gripper.jaw_gap(grip);
         // Touching the end of the stroke is allowed, beyond rounding it is not.
         let slack = 1e-9;
         if !(least - slack..=most + slack).contains(&gap) {
             return Err(gap);
         }
-        let room = if inside { gap - least } else { most - gap };
-        let opening = self.scene.opening.unwrap_or(f64::INFINITY).min(room / 2.0).max(0.0);
         let retreat = match self.scene.retreat {
             Retreat::Back(distance) => DVec3::NEG_X * distance,
             // Depends on each grip's pose: tested apart.
             Retreat::Along(_) => DVec3::ZERO,
         };
-        let opening = if inside { -opening } else { opening };
-        Ok(Course { gap, opening, approach: self.scene.approach, retreat, clearance: self.scene.clearance })
+        Ok(Course { gap, opening: (self.opened(grip) - gap) / 2.0, approach: self.scene.approach, retreat, clearance: self.scene.clearance })
     }
 
     /// The first free grip with the part at `world_from_part`.
@@ -194,7 +193,7 @@ impl<'a> Picker<'a> {
         }
         let Retreat::Along(way) = self.scene.retreat else { return None };
         let grip = &self.set.grips[index].grip;
-        let course = self.course(grip.width, grip.inside).ok()?;
+        let course = self.course(grip).ok()?;
         let retreat = world_from_grip.rotation.transpose() * way;
         let volumes = Volumes::new(&self.gripper, &Course { approach: 0.0, opening: 0.0, retreat, ..course });
         self.collision(&volumes, &world_from_grip, &mut Memory::new(), near).map(|(obstacle, volume)| explain(obstacle, &volumes, volume))
@@ -265,7 +264,13 @@ impl<'a> Picker<'a> {
 
     /// Distance of the pads before closing on a grip [m].
     pub fn opened(&self, grip: &Grip) -> f64 {
-        self.course(grip.width, grip.inside).map_or_else(|gap| gap, |course| course.gap + 2.0 * course.opening)
+        let opening = match self.scene.opening {
+            Opening::Full => f64::INFINITY,
+            Opening::Jaw(way) => way,
+            // As the interference of the list was checked.
+            Opening::Planned => self.set.provenance.settings.get("opening_m").and_then(serde_json::Value::as_f64).unwrap_or(PLANNED_OPENING),
+        };
+        self.gripper.opened_gap(grip, opening)
     }
 
     /// The gripper of the list.

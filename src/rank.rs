@@ -146,7 +146,7 @@ fn order(grips: &mut [(f64, RankedGrip)]) -> Vec<usize> {
     runs
 }
 
-/// What a symmetry of the part, or exchanging the jaws, leaves of a grip: width, the centre of mass in the grip frame up to the
+/// What a symmetry of the part, or exchanging the jaws, leaves of a grip: width (negative from inside), the centre of mass in the grip frame up to the
 /// signs of `x2` and `x3`, area and second moment of both contacts in either order.
 fn geometry(grip: &RankedGrip, centre_of_mass: DVec3) -> [f64; 8] {
     let centre = grip.grip.part_from_grip.point_inverse(centre_of_mass);
@@ -154,7 +154,8 @@ fn geometry(grip: &RankedGrip, centre_of_mass: DVec3) -> [f64; 8] {
     if (one[0], one[1]) < (two[0], two[1]) {
         std::mem::swap(&mut one, &mut two);
     }
-    [grip.grip.width, centre.x, centre.y.abs(), centre.z.abs(), one[0], one[1], two[0], two[1]]
+    let width = if grip.grip.inside { -grip.grip.width } else { grip.grip.width };
+    [width, centre.x, centre.y.abs(), centre.z.abs(), one[0], one[1], two[0], two[1]]
 }
 
 /// Root of the area and radius of gyration about the grip axis [m].

@@ -10,7 +10,7 @@ use std::path::Path;
 use assert_cmd::Command;
 use glam::{DMat3, DVec3};
 use gripfast::model::Frame;
-use gripfast::pick::{Reach, Retreat, Scene, Solid};
+use gripfast::pick::{Opening, Reach, Retreat, Scene, Solid};
 use gripfast::results::GripSet;
 
 const SCENE: &str = r#"
@@ -75,7 +75,7 @@ fn every_field_of_a_scene_is_read() {
     let folder = folder(SCENE);
     let scene = Scene::read(&folder.path().join("scene.toml")).unwrap();
     assert!((scene.world_from_part.point(DVec3::X) - DVec3::new(0.4, 1.0, 0.02)).length() < 1e-15);
-    assert_eq!((scene.opening, scene.clearance, scene.approach), (None, 0.001, 0.08));
+    assert_eq!((scene.opening, scene.clearance, scene.approach), (Opening::Full, 0.001, 0.08));
     assert_eq!(scene.retreat, Retreat::Along(DVec3::new(0.0, 0.0, 0.05)));
     assert_eq!(scene.cone, Some((DVec3::NEG_Z, std::f64::consts::FRAC_PI_4)));
     assert_eq!(scene.reach, Some(Reach { base: DVec3::X, least: 0.1, most: 0.85 }));

@@ -207,7 +207,7 @@ fn places(gripper: &Gripper, width: f64, scene: &Scene) -> Vec<(Phase, &'static 
     let shifted = |frame: &Frame, way: DVec3| Frame { rotation: frame.rotation, origin: frame.origin + way };
     for step in 0..=STEPS {
         let share = f64::from(step) / f64::from(STEPS);
-        let opening = scene.opening.unwrap();
+        let opening = 0.005;
         for (phase, extra, way) in
             [(Phase::Grip, opening * share, 0.0), (Phase::Approach, opening, scene.approach * share), (Phase::Retreat, 0.0, scene.approach * share)]
         {

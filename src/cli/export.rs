@@ -38,7 +38,7 @@ pub(crate) struct Args {
     /// Write only the best N (glb: 10 when not given).
     #[arg(long, value_name = "N")]
     top: Option<usize>,
-    /// Distance of the pads before closing; the gripper's largest when not given.
+    /// Distance of the pads before closing; as planned when not given.
     #[arg(long, value_name = "LENGTH")]
     opening: Option<String>,
     /// A joint of the gripper as NAME:SCALE:OFFSET, position = SCALE x distance of the pads in metres + OFFSET

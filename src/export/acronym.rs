@@ -27,7 +27,7 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
     if let Some(gripper) = &view.gripper {
         let mut group = file.create_group("gripper");
         group.create_dataset("type").with_strings(&[gripper.name.as_str()]).map_err(std::io::Error::other)?.with_shape(&[]);
-        group.create_dataset("configuration").with_f64_data(&column(&|grip| view.opening(grip)));
+        group.create_dataset("configuration").with_f64_data(&column(&|grip| view.opened(grip)));
         file.add_group(group.finish());
     }
 

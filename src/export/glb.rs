@@ -101,7 +101,7 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write, part: Option<&Mesh
             children.extend(pad.map(|pad| scene.node(json!({"name": format!("{id}/{name}/pad"), "mesh": pad}))));
             // Jaw II is jaw I turned by half a turn about the approach axis x1.
             let rotation = if side > 0.0 { [0.0, 0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0, 0.0] };
-            let mut jaw = json!({"name": format!("{id}/{name}"), "translation": [0.0, 0.0, side * grip.grip.width / 2.0], "rotation": rotation});
+            let mut jaw = json!({"name": format!("{id}/{name}"), "translation": [0.0, 0.0, side * view.gap(grip) / 2.0], "rotation": rotation});
             if !children.is_empty() {
                 jaw["children"] = json!(children);
             }

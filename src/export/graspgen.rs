@@ -42,7 +42,7 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
         grasps: Grasps {
             transforms: grips.iter().map(|grip| matrix(&view.pose(grip))).collect(),
             object_in_gripper: grips.iter().map(|grip| view.holds(grip)).collect(),
-            width: grips.iter().map(|grip| grip.grip.width).collect(),
+            width: grips.iter().map(|grip| view.gap(grip)).collect(),
             min_friction: grips.iter().map(|grip| grip.worst.mu_s).collect(),
             id: grips.iter().map(|grip| grip.grip.id).collect(),
         },

@@ -27,7 +27,7 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
         let pose = view.pose(grip);
         let score = grip.worst.mu_s.unwrap_or(NOT_HELD);
         scores.push(score);
-        rows.extend([score, grip.grip.width, height, depth]);
+        rows.extend([score, view.gap(grip), height, depth]);
         // Row by row, as NumPy's reshape(3, 3) reads them.
         rows.extend(pose.rotation.transpose().to_cols_array());
         rows.extend(pose.origin.to_array());

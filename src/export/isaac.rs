@@ -25,7 +25,7 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
         writeln!(writer, "    confidence: {}", number(quality(grip)))?;
         writeln!(writer, "    position: [{x}, {y}, {z}]")?;
         writeln!(writer, "    orientation: {{w: {qw}, xyz: [{qx}, {qy}, {qz}]}}")?;
-        for (name, width) in [("cspace_position", grip.grip.width), ("pregrasp_cspace_position", view.opening(grip))] {
+        for (name, width) in [("cspace_position", view.gap(grip)), ("pregrasp_cspace_position", view.opened(grip))] {
             writeln!(writer, "    {name}:")?;
             for joint in &view.options.joints {
                 writeln!(writer, "      {}: {}", string(&joint.name), number(joint.position(width)))?;

@@ -114,7 +114,7 @@ pub struct Options {
     pub origin: Origin,
     /// Writes only this many, best first.
     pub top: Option<usize>,
-    /// Distance of the opened pads [m]; the gripper's largest when absent.
+    /// Distance of the opened pads [m]; as planned, or as far as the stroke allows, when absent.
     pub opening: Option<f64>,
     /// Joints of the gripper as functions of the pads' distance.
     pub joints: Vec<Joint>,
@@ -174,10 +174,25 @@ impl<'a> View<'a> {
         grip.grip.part_from_grip.compose(&self.grip_from_tool)
     }
 
-    /// Distance of the opened pads [m], never less than the grip's own.
-    fn opening(&self, grip: &RankedGrip) -> f64 {
-        let stroke = || self.gripper.as_ref().map(|gripper| gripper.stroke[1]);
-        self.options.opening.or_else(stroke).unwrap_or(grip.grip.width).max(grip.grip.width)
+    /// Distance of the pads in the grip [m].
+    fn gap(&self, grip: &RankedGrip) -> f64 {
+        self.gripper.as_ref().map_or(grip.grip.width, |gripper| gripper.jaw_gap(&grip.grip))
+    }
+
+    /// Distance of the pads before closing [m]: as asked for, as planned, or as far as the stroke allows.
+    fn opened(&self, grip: &RankedGrip) -> f64 {
+        let gap = self.gap(grip);
+        match (self.options.opening, &self.gripper) {
+            (Some(opened), _) if grip.grip.inside => opened.min(gap),
+            (Some(opened), _) => opened.max(gap),
+            (None, Some(gripper)) => gripper.opened_gap(&grip.grip, self.setting("opening_m").unwrap_or(f64::INFINITY)),
+            (None, None) => gap,
+        }
+    }
+
+    /// A number among the settings of the run.
+    fn setting(&self, name: &str) -> Option<f64> {
+        self.set.provenance.settings.get(name).and_then(serde_json::Value::as_f64).filter(|value| value.is_finite())
     }
 
     /// Whether the pads' friction holds the worst load; without a known friction, whether any would.

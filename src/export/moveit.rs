@@ -13,7 +13,7 @@ const LEAST_SHARE: f64 = 0.5;
 
 pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result<()> {
     let frame = string(&view.options.part_frame);
-    let force = view.set.provenance.settings.get("force").and_then(serde_json::Value::as_f64).filter(|force| force.is_finite()).unwrap_or(0.0);
+    let force = view.setting("force_n").unwrap_or(0.0);
     let header = format!("{{stamp: {{sec: 0, nanosec: 0}}, frame_id: {frame}}}");
     let names = view.options.joints.iter().map(|joint| string(&joint.name)).collect::<Vec<_>>().join(", ");
     let posture = |width: f64, effort: Option<f64>| {
@@ -40,8 +40,8 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
         let [qx, qy, qz, qw] = positive(DQuat::from_mat3(&pose.rotation)).to_array().map(number);
         let approach = grip.grip.part_from_grip.rotation.x_axis;
         writeln!(writer, "- id: {}", string(&grip.grip.id.to_string()))?;
-        writeln!(writer, "  pre_grasp_posture:\n{}", posture(view.opening(grip), None))?;
-        writeln!(writer, "  grasp_posture:\n{}", posture(grip.grip.width, (force > 0.0).then_some(force)))?;
+        writeln!(writer, "  pre_grasp_posture:\n{}", posture(view.opened(grip), None))?;
+        writeln!(writer, "  grasp_posture:\n{}", posture(view.gap(grip), (force > 0.0).then_some(force)))?;
         writeln!(writer, "  grasp_pose:\n    header: {header}\n    pose:\n      position: {{x: {x}, y: {y}, z: {z}}}")?;
         writeln!(writer, "      orientation: {{x: {qx}, y: {qy}, z: {qz}, w: {qw}}}")?;
         writeln!(writer, "  grasp_quality: {}", number(quality(grip)))?;

@@ -69,6 +69,9 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
         integer("load", &|grip| u64::from(grip.worst.load)),
         text("load_name", &|grip| view.set.loads.get(grip.worst.load as usize).map(|load| load.name.clone()).unwrap_or_default()),
         number("width_m", &|grip| Some(grip.grip.width)),
+        text("side", &|grip| if grip.grip.inside { "inside".into() } else { "outside".into() }),
+        number("jaw_gap_m", &|grip| Some(view.gap(grip))),
+        number("opened_gap_m", &|grip| Some(view.opened(grip))),
     ];
     columns.extend(vector(["x_m", "y_m", "z_m"], &|grip| view.pose(grip).origin));
     columns.extend(["qx", "qy", "qz", "qw"].into_iter().enumerate().map(|(index, name)| number(name, &|grip| Some(quaternion(grip)[index]))));

@@ -17,8 +17,8 @@ pub struct Scene {
     pub world_from_part: Frame,
     /// What stands around.
     pub obstacles: Vec<Obstacle>,
-    /// Way of each jaw from contact to the opening for the approach [m]; as far as the stroke allows when absent.
-    pub opening: Option<f64>,
+    /// How far the jaws open for the approach.
+    pub opening: Opening,
     /// Length of the straight approach [m].
     pub approach: f64,
     /// The way back with closed jaws.
@@ -61,6 +61,17 @@ pub enum Solid {
     HalfSpace,
 }
 
+/// How far the jaws open for the approach, within the stroke.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Opening {
+    /// As the list was planned.
+    Planned,
+    /// As far as the stroke allows.
+    Full,
+    /// Each jaw this far from contact [m].
+    Jaw(f64),
+}
+
 /// The way back.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Retreat {
@@ -82,12 +93,12 @@ pub struct Reach {
 }
 
 impl Default for Scene {
-    /// Nothing around, jaws opened by 5 mm each, 100 mm of approach and retreat.
+    /// Nothing around, jaws opened as planned, 100 mm of approach and retreat.
     fn default() -> Self {
         Self {
             world_from_part: Frame::IDENTITY,
             obstacles: Vec::new(),
-            opening: Some(crate::propose::ProposeOptions::default().opening),
+            opening: Opening::Planned,
             approach: crate::propose::ProposeOptions::default().approach,
             retreat: Retreat::Back(crate::propose::ProposeOptions::default().approach),
             cone: None,
@@ -185,8 +196,8 @@ impl Scene {
         };
         let opening = match gripper.opening.as_deref() {
             None => standard.opening,
-            Some("full") => None,
-            Some(text) => Some(positive(&field("gripper.opening"), Quantity::Length, text)?),
+            Some("full") => Opening::Full,
+            Some(text) => Opening::Jaw(positive(&field("gripper.opening"), Quantity::Length, text)?),
         };
         let approach = distance("gripper.approach", &gripper.approach, standard.approach)?;
         let back = distance("gripper.retreat", &gripper.retreat, approach)?;

@@ -95,7 +95,7 @@ pub(crate) fn grip_set(count: u64) -> GripSet {
             gripfast: "0.0.0".into(),
             command: vec!["gripfast".into(), "plan".into(), "a \"quoted\"\nname: #1.stl".into()],
             backend: "cpu".into(),
-            settings: BTreeMap::from([("force".to_owned(), serde_json::json!(80.0))]),
+            settings: BTreeMap::from([("force_n".to_owned(), serde_json::json!(80.0)), ("opening_m".to_owned(), serde_json::json!(0.005))]),
         },
         part: PartSummary {
             file: "box.stl".into(),
