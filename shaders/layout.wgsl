@@ -8,10 +8,13 @@ override ON_LINE: f32;
 override SERIES_LIMIT: f32;
 override CONTACT_MARGIN: f32;
 override COUPLING_MARGIN: f32;
+override COUPLED_SHARE: f32;
+override LEAST_VARIATION: f32;
 override TILT_LIMIT: f32;
 override DEGENERATE: f32;
 override BOUNDED: u32;
 override UNBOUNDED: u32;
+override COUPLED: u32;
 // Dispatches are two-dimensional: a workgroup's number is x + GRID y.
 override GRID: u32;
 
@@ -34,6 +37,11 @@ struct ContactHeader {
     centroid_ii: vec2<f32>,
     compliance: vec3<f32>,
     resolved: u32,
+    variation_first: vec4<f32>,
+    variation_second: vec4<f32>,
+    variation_slope: vec2<f32>,
+    softness: f32,
+    spread: f32,
 }
 
 struct LoadRecord {

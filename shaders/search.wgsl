@@ -20,6 +20,7 @@ struct Planes {
     at_i: f32,
     at_ii: f32,
     slope: vec2<f32>,
+    full: bool,
 }
 
 fn component(header: ContactHeader, face: u32, index: u32, twist: u32) -> f32 {
@@ -47,7 +48,7 @@ fn planes(header: ContactHeader, load: LoadRecord) -> Planes {
     let mean_i = n_i / header.area_i;
     let mean_ii = n_ii / header.area_ii;
     if header.faces == 1u {
-        return Planes(mean_i, mean_ii, vec2(0.0));
+        return Planes(mean_i, mean_ii, vec2(0.0), true);
     }
     let ci = header.centroid_i;
     let cii = header.centroid_ii;
@@ -55,11 +56,12 @@ fn planes(header: ContactHeader, load: LoadRecord) -> Planes {
     let right = vec2(-load.m2, load.m1) - n_i * ci + n_ii * cii;
     let full = vec2(k.x * right.x + k.y * right.y, k.y * right.x + k.z * right.y);
     var share = free_share(header, mean_i, mean_ii, full);
-    if share < 1.0 {
+    let full_contact = share >= 1.0;
+    if !full_contact {
         share = TILT_LIMIT * share;
     }
     let slope = share * full;
-    return Planes(mean_i - slope.x * ci.x - slope.y * ci.y, mean_ii + slope.x * cii.x + slope.y * cii.y, slope);
+    return Planes(mean_i - slope.x * ci.x - slope.y * ci.y, mean_ii + slope.x * cii.x + slope.y * cii.y, slope, full_contact);
 }
 
 fn support_component(header: ContactHeader, p: Planes, twist: u32, m: u32) -> f32 {
@@ -119,6 +121,42 @@ fn full_contact(header: ContactHeader, load: LoadRecord, mu: f32, g0: vec2<f32>,
     return true;
 }
 
+fn coupled_share(header: ContactHeader, load: LoadRecord, p: Planes, upper: f32) -> f32 {
+    let mu = load.scale * upper;
+    if load.distance < 0.0 || header.resolved == 0u || !p.full || mu * mu * load.distance * load.distance > 0.5 * (header.area_i + header.area_ii) {
+        return -1.0;
+    }
+    let q = header.variation_first;
+    let r = header.variation_second;
+    let z1 = p.at_i;
+    let z2 = p.at_ii;
+    let z3 = p.slope.x;
+    let z4 = p.slope.y;
+    let square = q.x * z1 * z1 + q.y * z2 * z2 + q.w * z3 * z3 + header.variation_slope.y * z4 * z4;
+    let mixed = z1 * (q.z * z2 + r.x * z3 + r.y * z4) + z2 * (r.z * z3 + r.w * z4) + header.variation_slope.x * z3 * z4;
+    let variation = sqrt(max(square + 2.0 * mixed, 0.0)) + LEAST_VARIATION;
+    var steepest = 0.0;
+    for (var i = header.edges_i; i < header.edges_end; i++) {
+        let on_i = i < header.edges_ii;
+        let along = p.slope.x * edges[i].x + p.slope.y * edges[i].y;
+        let offset = edges[i].xy - select(header.centroid_ii, header.centroid_i, on_i);
+        let pressure = select(p.at_ii - along, p.at_i + along, on_i);
+        let least = CONTACT_MARGIN * select(abs(p.at_ii), abs(p.at_i), on_i);
+        if pressure <= least {
+            return -1.0;
+        }
+        steepest = max(steepest, (offset.x * offset.x + offset.y * offset.y) / (pressure * pressure));
+    }
+    let reach = 0.5 * header.softness * load.distance * mu;
+    let c = 1.0 - reach * header.spread;
+    let b = reach * variation * sqrt(steepest);
+    if c <= 0.0 || c * c <= 4.0 * b {
+        return -1.0;
+    }
+    let share = 2.0 * b / (c + sqrt(c * c - 4.0 * b));
+    return select(-1.0, share, share <= COUPLED_SHARE);
+}
+
 fn twist_of(entry: u32) -> vec3<f32> {
     return sign_of(entry) * twists[entry & ~NEGATED].xyz;
 }
@@ -129,7 +167,7 @@ fn mix_component(header: ContactHeader, triangle: vec3<u32>, share: vec3<f32>, i
         + sign_of(triangle.z) * share.z * component(header, 0u, index, triangle.z & ~NEGATED);
 }
 
-fn finish(header: ContactHeader, load: LoadRecord, p: Planes, best_twist: u32, lower: f32) -> SeedRecord {
+fn finish(header: ContactHeader, load: LoadRecord, p: Planes, best_twist: u32, value: f32) -> SeedRecord {
     let w = load.wrench;
     var best = best_twist;
     if dot(w, twist_of(best)) < 0.0 {
@@ -174,6 +212,15 @@ fn finish(header: ContactHeader, load: LoadRecord, p: Planes, best_twist: u32, l
         let g2 = vec2(mix_component(header, triangle, share, 6u), mix_component(header, triangle, share, 7u));
         if full_contact(header, load, load.scale * upper, g0, g1, g2) {
             status = BOUNDED;
+        }
+    }
+    var lower = value;
+    if header.faces == 2u && upper < LARGEST {
+        let coupled = coupled_share(header, load, p, upper);
+        if coupled >= 0.0 {
+            status = COUPLED;
+            lower = lower / (1.0 + coupled);
+            upper = upper / (1.0 - coupled);
         }
     }
     return SeedRecord(twist, lower, upper, status, best & ~NEGATED, 0u);

@@ -30,6 +30,13 @@ pub const CONTACT_MARGIN: f32 = 0.05;
 /// no coupling: the found root then is the one on the branch that starts without coupling.
 pub const COUPLING_MARGIN: f32 = 0.25;
 
+/// Largest share of the dissipation that the friction coupling may change where different faces get bounds.
+pub const COUPLED_SHARE: f32 = 0.25;
+
+/// Least value of the integral of the faces' difference in pressure, in gripping forces: above the rounding of
+/// [`ContactHeader::variation`].
+pub const LEAST_VARIATION: f32 = 4e-3;
+
 /// Share by which a tilt that would lift a pad is shortened beyond the point of first separation (seeds only).
 pub const TILT_LIMIT: f32 = 0.98;
 
@@ -46,6 +53,8 @@ pub const UNWRITTEN: u32 = 0;
 pub const BOUNDED: u32 = 1;
 /// [`SeedRecord::status`]: a twist to start from; the bounds hold only for the pressure without friction coupling.
 pub const UNBOUNDED: u32 = 2;
+/// [`SeedRecord::status`]: different faces; twist and bounds that allow for the friction coupling.
+pub const COUPLED: u32 = 3;
 
 /// [`LoadRecord::distance`] of a load whose numbers leave the range in which bounds are computed.
 pub const OUT_OF_RANGE: f32 = -1.0;
@@ -88,6 +97,17 @@ pub struct ContactHeader {
     pub compliance: [f32; 3],
     /// 1: f32 resolves the polygons well enough for bounds; 0: a sliver, seeds only.
     pub resolved: u32,
+    /// Quadratic form of `(at_i, at_ii, slope)` above the square of the integral of the faces' difference in pressure:
+    /// 11, 22, 12, 33 ...
+    pub variation_first: [f32; 4],
+    /// ... 13, 14, 23, 24 ...
+    pub variation_second: [f32; 4],
+    /// ... 34, 44.
+    pub variation_slope: [f32; 2],
+    /// Largest eigenvalue of `compliance`.
+    pub softness: f32,
+    /// Bound on the change of that integral per change of slope.
+    pub spread: f32,
 }
 
 /// A directed edge from `(ax, ay)` to `(bx, by)`, material on its left.
@@ -135,7 +155,7 @@ pub struct SeedRecord {
     pub lower: f32,
     /// Bound from the supports of the triangles at the best twist, for the unit wrench.
     pub upper: f32,
-    /// [`UNWRITTEN`], [`BOUNDED`] or [`UNBOUNDED`].
+    /// [`UNWRITTEN`], [`BOUNDED`], [`UNBOUNDED`] or [`COUPLED`].
     pub status: u32,
     /// Index of the best twist.
     pub best: u32,

@@ -6,7 +6,8 @@
 //! of three gradients, and the sum of its coefficients' magnitudes bounds `mu_s`, because `D` is a norm.
 //!
 //! Where the bounds hold: congruent faces in full contact, whose summed pressure is constant, so that neither
-//! `M1, M2, F3` nor the distance of the faces matters. Elsewhere the seeds come from the pressure without friction
+//! `M1, M2, F3` nor the distance of the faces matters; and different faces in full contact whose friction coupling is
+//! weak, the bounds being widened by all that it can do. Elsewhere the seeds come from the pressure without friction
 //! coupling, and there are no bounds.
 
 mod choice;
@@ -64,8 +65,10 @@ pub struct Batch<'a> {
 /// What kind of seed a load got.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum SeedStatus {
-    /// A twist and bounds on `mu_s`.
+    /// Congruent faces in full contact: a twist and bounds on `mu_s`, which depends on the in-plane load alone.
     Bounded,
+    /// Different faces in full contact: a twist, and bounds on `mu_s` that allow for all that the friction coupling can do.
+    Coupled,
     /// A twist; no bounds.
     Unbounded,
     /// No force in the pad plane and no moment about the closing axis.

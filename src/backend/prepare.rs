@@ -1,17 +1,19 @@
 //! From contacts and wrenches in SI to the scaled 32-bit records of the kernels, and back. Everything that decides
 //! whether a load can be searched at all happens here in f64, once for every backend.
 
-use glam::DVec2;
+use glam::{DMat2, DVec2};
 
-use super::layout::{BOUNDED, ContactHeader, EdgeRecord, GROUP, GroupRecord, LoadRecord, OUT_OF_RANGE, SeedRecord, UNBOUNDED};
+use super::layout::{BOUNDED, COUPLED, ContactHeader, EdgeRecord, GROUP, GroupRecord, LoadRecord, OUT_OF_RANGE, SeedRecord, UNBOUNDED};
 use super::{F32_TOLERANCE, Problem, Seed, SeedStatus};
 use crate::contact::Loops;
 use crate::error::{Error, Result};
+use crate::geometry::overlay;
 use crate::geometry::polygon::{Moments, rings_moments};
 use crate::model::{Contact, Wrench};
 
-/// Vertices of two faces this close together, in radii of gyration, count as the same (congruent faces).
-const CONGRUENT: f64 = 1e-9;
+/// Faces count as congruent when their vertices agree to this over `perimeter / area`, in radii of gyration: the answer
+/// then changes by less than a tenth of the tolerance of the bounds. Parts come with single-precision coordinates.
+const CONGRUENT: f64 = 2e-6;
 
 /// Bounds need `radius * perimeter / area` below this (a square has 3): f32 rounds vertices by 6e-8 of the radius, so
 /// the integrals of a sliver are uncertain by that times this number.
@@ -45,6 +47,32 @@ fn congruent(a: &[(DVec2, DVec2)], b: &[(DVec2, DVec2)], tolerance: f64) -> bool
     a.len() == b.len() && a.iter().zip(b).all(|(edge, other)| same(edge, other) || b.iter().any(|any| same(edge, any)))
 }
 
+/// The quadratic form of [`ContactHeader::variation_first`]: by Schwarz's inequality the integral of the magnitude of
+/// `p_I` on face I less `p_II` on face II is at most the root of the joint area times the integral of the square.
+fn variation(contact: &Contact, loops: [&Loops; 2], scaled: &impl Fn(DVec2) -> DVec2) -> ([f32; 4], [f32; 4], [f32; 2]) {
+    let overlap = Loops::mapped(&overlay::intersect(&contact.face_i, &contact.face_ii), scaled);
+    let [i, ii] = loops.map(|loops| {
+        let rings: Vec<Vec<DVec2>> = loops.rings().map(|ring| ring.iter().map(|&point| scaled(point)).collect()).collect();
+        about_origin(&rings_moments(&rings.iter().map(Vec::as_slice).collect::<Vec<_>>()))
+    });
+    let both = about_origin(&rings_moments(&overlap.rings().collect::<Vec<_>>()));
+    // Nothing is lost by a joint area that is too large.
+    let joint = i.0 + ii.0 - both.0;
+    let second = i.2 + ii.2 + both.2 * 2.0;
+    let number = |x: f64| (x * joint) as f32;
+    (
+        [i.0, ii.0, -both.0, second.x_axis.x].map(number),
+        [i.1.x + both.1.x, i.1.y + both.1.y, -ii.1.x - both.1.x, -ii.1.y - both.1.y].map(number),
+        [second.y_axis.x, second.y_axis.y].map(number),
+    )
+}
+
+/// Area, first and second moments about the origin.
+fn about_origin(moments: &Moments) -> (f64, DVec2, DMat2) {
+    let c = moments.centroid;
+    (moments.area, c * moments.area, moments.second + DMat2::from_cols(c * c.x, c * c.y) * moments.area)
+}
+
 impl Prepared {
     /// `None` when a face has no area.
     ///
@@ -74,7 +102,7 @@ impl Prepared {
         if !unit.is_normal() {
             return Ok(None);
         }
-        let same = congruent(&edges_i, &edges_ii, CONGRUENT * unit);
+        let same = congruent(&edges_i, &edges_ii, CONGRUENT * on_i.area / length_i);
         let scaled = |p: DVec2| (p - origin) / unit;
         let records = |edges: &[(DVec2, DVec2)]| -> Vec<EdgeRecord> {
             let record = |&(a, b): &(DVec2, DVec2)| [scaled(a).as_vec2().to_array(), scaled(b).as_vec2().to_array()];
@@ -88,6 +116,11 @@ impl Prepared {
         let radius = edges_i.iter().chain(&edges_ii).map(|edge| scaled(edge.0).length()).fold(0.0, f64::max);
         let stiffness = (on_i.second + on_ii.second) * unit.powi(-4);
         let compliance = stiffness.inverse();
+        let (variation_first, variation_second, variation_slope) = if same { Default::default() } else { variation(contact, [&loops_i, &loops_ii], &scaled) };
+        let (mean, half) = ((compliance.x_axis.x + compliance.y_axis.y) / 2.0, (compliance.x_axis.x - compliance.y_axis.y) / 2.0);
+        let softness = mean + half.hypot(compliance.y_axis.x);
+        let reach = |edges: &[(DVec2, DVec2)], centre: DVec2| edges.iter().map(|edge| edge.0.distance(centre) / unit).fold(0.0, f64::max);
+        let spread = (on_i.area * reach(&edges_i, on_i.centroid) + on_ii.area * reach(&edges_ii, on_ii.centroid)) / (unit * unit);
         let resolved = |face: &Moments, length: f64| radius * unit * length / face.area <= RESOLVED;
         let header = ContactHeader {
             edges_i: 0,
@@ -102,6 +135,11 @@ impl Prepared {
             centroid_ii: scaled(on_ii.centroid).as_vec2().to_array(),
             compliance: [compliance.x_axis.x as f32, compliance.y_axis.x as f32, compliance.y_axis.y as f32],
             resolved: u32::from(resolved(&on_i, length_i) && resolved(&on_ii, length_ii)),
+            variation_first,
+            variation_second,
+            variation_slope,
+            softness: softness as f32,
+            spread: spread as f32,
         };
         Ok(Some(Self { header, edges, origin, unit }))
     }
@@ -138,20 +176,21 @@ impl Prepared {
     /// # Errors
     /// [`Error::Backend`] when the kernel did not write the record.
     pub(crate) fn answer(&self, record: &SeedRecord, scale: f64) -> Result<Seed> {
-        let bounded = match record.status {
-            BOUNDED => true,
-            UNBOUNDED => false,
+        let status = match record.status {
+            BOUNDED => SeedStatus::Bounded,
+            COUPLED => SeedStatus::Coupled,
+            UNBOUNDED => SeedStatus::Unbounded,
             other => return Err(Error::Backend(format!("a load came back with status {other}: the kernel did not write it"))),
         };
         let [u1, u2, omega] = record.twist.map(f64::from);
         let omega = omega / self.unit;
         let twist = [u1 + omega * self.origin.y, u2 - omega * self.origin.x, omega];
-        if !bounded {
-            return Ok(Seed { status: SeedStatus::Unbounded, twist, lower: 0.0, upper: f64::INFINITY });
+        if status == SeedStatus::Unbounded {
+            return Ok(Seed { status, twist, lower: 0.0, upper: f64::INFINITY });
         }
         let lower = scale * f64::from(record.lower) * (1.0 - F32_TOLERANCE);
         let upper = scale * f64::from(record.upper) * (1.0 + F32_TOLERANCE);
-        Ok(Seed { status: SeedStatus::Bounded, twist, lower, upper })
+        Ok(Seed { status, twist, lower, upper })
     }
 }
 

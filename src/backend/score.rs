@@ -112,7 +112,7 @@ fn solve_block(problems: &[Problem<'_>], seeds: &[Seed], options: &ScoreOptions)
 
 fn score_one(problem: &Problem<'_>, pads: Option<&Pads>, seeds: &[Seed], options: &ScoreOptions) -> Scored {
     let full = |load: usize, search: Search| {
-        let seed = matches!(seeds[load].status, SeedStatus::Bounded | SeedStatus::Unbounded).then_some(seeds[load].twist);
+        let seed = matches!(seeds[load].status, SeedStatus::Bounded | SeedStatus::Coupled | SeedStatus::Unbounded).then_some(seeds[load].twist);
         let options = Options { separation: options.separation, refiner: options.refiner, seed, search };
         match pads {
             Some(pads) => solve_pads(pads, problem.distance, problem.force, &problem.wrenches[load], &options),
@@ -134,7 +134,12 @@ fn score_one(problem: &Problem<'_>, pads: Option<&Pads>, seeds: &[Seed], options
     // a load with bounds has one.
     let mut solved: Vec<(usize, Score)> = Vec::new();
     let mut largest: f64 = 0.0;
-    for load in (0..seeds.len()).filter(|&load| seeds[load].status != SeedStatus::Bounded) {
+    let mut bounded: Vec<usize> = Vec::with_capacity(seeds.len());
+    for load in 0..seeds.len() {
+        if matches!(seeds[load].status, SeedStatus::Bounded | SeedStatus::Coupled) {
+            bounded.push(load);
+            continue;
+        }
         let score = solve(load);
         solved.push((load, score));
         match usable(&score) {
@@ -142,23 +147,26 @@ fn score_one(problem: &Problem<'_>, pads: Option<&Pads>, seeds: &[Seed], options
             None => return Scored { worst: Some((load, score)), all: Vec::new(), solved: solved.len(), compared: 0 },
         }
     }
-    // Then the others by falling upper bound, until none can reach the largest found. Bounds mean congruent faces in
-    // full contact, where the slip problem alone decides `mu_s`; the seven equations are solved for the worst only.
-    let mut bounded: Vec<usize> = (0..seeds.len()).filter(|&load| seeds[load].status == SeedStatus::Bounded).collect();
-    let unbounded = largest;
-    largest = bounded.iter().map(|&load| seeds[load].lower).fold(largest, f64::max);
-    bounded.retain(|&load| seeds[load].upper >= largest);
+    // Then the others by falling upper bound, until none can reach the largest found. For congruent faces the slip
+    // problem alone decides `mu_s`: the seven equations are solved for the worst of them only.
+    let floor = bounded.iter().map(|&load| seeds[load].lower).fold(largest, f64::max);
+    bounded.retain(|&load| seeds[load].upper >= floor);
     bounded.sort_by(|&a, &b| seeds[b].upper.total_cmp(&seeds[a].upper).then(a.cmp(&b)));
-    largest = unbounded;
     let mut slips: Vec<(usize, f64)> = Vec::new();
     for load in bounded {
         // Ties with the largest are solved too, so that the first of them is found.
         if seeds[load].upper < largest * (1.0 - 2.0 * TIE) {
             break;
         }
-        let mu = pads.map_or(f64::INFINITY, |pads| slip_only(pads, problem, load, seeds[load].twist));
-        largest = largest.max(mu);
-        slips.push((load, mu));
+        if let (SeedStatus::Bounded, Some(pads)) = (seeds[load].status, pads) {
+            let mu = slip_only(pads, problem, load, seeds[load].twist);
+            largest = largest.max(mu);
+            slips.push((load, mu));
+        } else {
+            let score = solve(load);
+            largest = largest.max(usable(&score).unwrap_or(f64::INFINITY));
+            solved.push((load, score));
+        }
     }
     let compared = slips.len();
     slips.retain(|&(_, mu)| mu >= largest * (1.0 - 2.0 * TIE));

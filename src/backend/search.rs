@@ -1,7 +1,10 @@
 //! The search for the best twist of one load, in f32: the twin of `shaders/search.wgsl`, same functions in the same
 //! order.
 
-use super::layout::{BASIS, BOUNDED, CONTACT_MARGIN, COUPLING_MARGIN, ContactHeader, DEGENERATE, EdgeRecord, LoadRecord, SeedRecord, TILT_LIMIT, UNBOUNDED};
+use super::layout::{
+    BASIS, BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader, DEGENERATE, EdgeRecord, LEAST_VARIATION, LoadRecord, SeedRecord,
+    TILT_LIMIT, UNBOUNDED,
+};
 use super::seeds::{NEGATED, RING};
 
 /// One contact as the search sees it.
@@ -22,6 +25,8 @@ pub(crate) struct Planes {
     pub(crate) at_i: f32,
     pub(crate) at_ii: f32,
     pub(crate) slope: [f32; 2],
+    /// Whether both pads stay in full contact under it.
+    pub(crate) full: bool,
 }
 
 impl Field<'_> {
@@ -49,16 +54,17 @@ impl Field<'_> {
         let (n_i, n_ii) = (1.0 + 0.5 * load.f3, 1.0 - 0.5 * load.f3);
         let (mean_i, mean_ii) = (n_i / header.area_i, n_ii / header.area_ii);
         if header.faces == 1 {
-            return Planes { at_i: mean_i, at_ii: mean_ii, slope: [0.0, 0.0] };
+            return Planes { at_i: mean_i, at_ii: mean_ii, slope: [0.0, 0.0], full: true };
         }
         let [ci, cii, k] = [[header.centroid_i[0], header.centroid_i[1], 0.0], [header.centroid_ii[0], header.centroid_ii[1], 0.0], header.compliance];
         let right1 = -load.m2 - n_i * ci[0] + n_ii * cii[0];
         let right2 = load.m1 - n_i * ci[1] + n_ii * cii[1];
         let full = [k[0] * right1 + k[1] * right2, k[1] * right1 + k[2] * right2];
         let share = self.free_share(mean_i, mean_ii, full);
-        let share = if share < 1.0 { TILT_LIMIT * share } else { share };
+        let full_contact = share >= 1.0;
+        let share = if full_contact { share } else { TILT_LIMIT * share };
         let slope = [share * full[0], share * full[1]];
-        Planes { at_i: mean_i - slope[0] * ci[0] - slope[1] * ci[1], at_ii: mean_ii + slope[0] * cii[0] + slope[1] * cii[1], slope }
+        Planes { at_i: mean_i - slope[0] * ci[0] - slope[1] * ci[1], at_ii: mean_ii + slope[0] * cii[0] + slope[1] * cii[1], slope, full: full_contact }
     }
 
     /// Gradient of the dissipation at twist `entry` (a ring entry) under `planes`.
@@ -118,8 +124,51 @@ impl Field<'_> {
         true
     }
 
-    /// Bounds and interpolated twist from the triangles round the best twist `best`, whose value is `lower`.
-    pub(crate) fn finish(&self, load: &LoadRecord, planes: Planes, best: u32, lower: f32) -> SeedRecord {
+    /// For different faces: the largest share by which the friction coupling can change the dissipation at any twist,
+    /// or a negative number where that is not known to be small. `upper` bounds `mu_s` without coupling.
+    ///
+    /// Friction moves the slope by at most `softness d/2 mu V`, where `V`, the integral of the difference of the two
+    /// pressures over both areas, bounds the difference of the two friction forces over `mu`. `V` is at most its value
+    /// without coupling plus `spread` times the change of slope, and `mu` at most `upper` over 1 less the share. The
+    /// three together are a quadratic equation for the share; its smaller root cannot be left on the way from no
+    /// coupling to all of it.
+    pub(crate) fn coupled_share(&self, load: &LoadRecord, planes: Planes, upper: f32) -> f32 {
+        let header = self.header;
+        let mu = load.scale * upper;
+        if load.distance < 0.0 || header.resolved == 0 || !planes.full || mu * mu * load.distance * load.distance > 0.5 * (header.area_i + header.area_ii) {
+            return -1.0;
+        }
+        let ([q11, q22, q12, q33], [q13, q14, q23, q24]) = (header.variation_first, header.variation_second);
+        let [q34, q44] = header.variation_slope;
+        let (z1, z2, [z3, z4]) = (planes.at_i, planes.at_ii, planes.slope);
+        let square = q11 * z1 * z1 + q22 * z2 * z2 + q33 * z3 * z3 + q44 * z4 * z4;
+        let mixed = z1 * (q12 * z2 + q13 * z3 + q14 * z4) + z2 * (q23 * z3 + q24 * z4) + q34 * z3 * z4;
+        let variation = (square + 2.0 * mixed).max(0.0).sqrt() + LEAST_VARIATION;
+        // Largest relative change of pressure at a vertex per change of slope.
+        let mut steepest = 0.0_f32;
+        for (index, edge) in self.edges[header.edges_i as usize..header.edges_end as usize].iter().enumerate() {
+            let on_i = index < (header.edges_ii - header.edges_i) as usize;
+            let along = planes.slope[0] * edge[0] + planes.slope[1] * edge[1];
+            let (centroid, pressure) = if on_i { (header.centroid_i, planes.at_i + along) } else { (header.centroid_ii, planes.at_ii - along) };
+            let (x, y) = (edge[0] - centroid[0], edge[1] - centroid[1]);
+            let least = CONTACT_MARGIN * if on_i { planes.at_i.abs() } else { planes.at_ii.abs() };
+            if pressure <= least {
+                return -1.0;
+            }
+            steepest = steepest.max((x * x + y * y) / (pressure * pressure));
+        }
+        let reach = 0.5 * header.softness * load.distance * mu;
+        let c = 1.0 - reach * header.spread;
+        let b = reach * variation * steepest.sqrt();
+        if c <= 0.0 || c * c <= 4.0 * b {
+            return -1.0;
+        }
+        let share = 2.0 * b / (c + (c * c - 4.0 * b).sqrt());
+        if share <= COUPLED_SHARE { share } else { -1.0 }
+    }
+
+    /// Bounds and interpolated twist from the triangles round the best twist `best`, whose value is `value`.
+    pub(crate) fn finish(&self, load: &LoadRecord, planes: Planes, best: u32, value: f32) -> SeedRecord {
         let w = load.wrench;
         let twist_of = |entry: u32| {
             let v = self.twists[(entry & !NEGATED) as usize];
@@ -170,6 +219,15 @@ impl Field<'_> {
             let (g0, g1, g2) = ([mix(0), mix(1)], [mix(3), mix(4)], [mix(6), mix(7)]);
             if self.full_contact(load, load.scale * upper, g0, g1, g2) {
                 status = BOUNDED;
+            }
+        }
+        let mut lower = value;
+        if self.header.faces == 2 && upper < f32::MAX {
+            let share = self.coupled_share(load, planes, upper);
+            if share >= 0.0 {
+                status = COUPLED;
+                lower /= 1.0 + share;
+                upper /= 1.0 - share;
             }
         }
         SeedRecord { twist, lower, upper, status, best: best & !NEGATED, padding: 0 }

@@ -164,9 +164,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !args.quiet {
         let seconds = started.elapsed().as_secs_f64();
         eprintln!(
-            "{} grips, {} loads, {} solved exactly, {} held; {seconds:.2} s, {:.0} grips/s",
+            "{} grips, {} loads, {} slip problems and {} equilibria solved, {} held; {seconds:.2} s, {:.0} grips/s",
             counts.grips,
             counts.loads,
+            counts.compared,
             counts.solved,
             counts.held,
             counts.grips as f64 / seconds
@@ -180,6 +181,7 @@ struct Counts {
     grips: u64,
     loads: u64,
     solved: u64,
+    compared: u64,
     held: u64,
 }
 
@@ -281,7 +283,7 @@ impl Job<'_> {
                 }
             }
             Source::Result(set) => {
-                let force = self.force.or_else(|| set.provenance.settings.get("force").and_then(Value::as_f64));
+                let force = self.force.or_else(|| set.provenance.settings.get("force_n").and_then(Value::as_f64));
                 let force = force.ok_or_else(|| Error::input(self.name, "states no gripping force", "give --force"))?;
                 let own: Vec<Wrench> = set.loads.iter().map(|load| load.wrench).collect();
                 let loads = if self.given { self.common } else { &own };
@@ -340,10 +342,11 @@ impl Job<'_> {
             .collect();
         let scored =
             self.backend.score(&Batch { problems }, self.seeds, &self.options).with_context(|| format!("{}: grips from {}", self.name, counts.grips))?;
-        for (entry, Scored { worst, all, solved, .. }) in entries.iter().zip(scored) {
+        for (entry, Scored { worst, all, solved, compared }) in entries.iter().zip(scored) {
             let index = counts.grips;
             counts.grips += 1;
             counts.solved += solved as u64;
+            counts.compared += compared as u64;
             counts.loads += match &entry.wrenches {
                 Wrenches::Own(own) => own.len() as u64,
                 Wrenches::Common => self.common.len() as u64,

@@ -13,7 +13,7 @@ pub(crate) const SEARCH: &str = include_str!("../../../shaders/search.wgsl");
 pub(crate) const GRID: u32 = 32_768;
 
 /// The constants that the shaders leave open, from [`layout`].
-pub(crate) fn constants() -> [(&'static str, f64); 12] {
+pub(crate) fn constants() -> [(&'static str, f64); 15] {
     [
         ("GROUP", layout::GROUP as f64),
         ("BASIS_GROUP", layout::BASIS_GROUP as f64),
@@ -22,10 +22,13 @@ pub(crate) fn constants() -> [(&'static str, f64); 12] {
         ("SERIES_LIMIT", f64::from(layout::SERIES_LIMIT)),
         ("CONTACT_MARGIN", f64::from(layout::CONTACT_MARGIN)),
         ("COUPLING_MARGIN", f64::from(layout::COUPLING_MARGIN)),
+        ("COUPLED_SHARE", f64::from(layout::COUPLED_SHARE)),
+        ("LEAST_VARIATION", f64::from(layout::LEAST_VARIATION)),
         ("TILT_LIMIT", f64::from(layout::TILT_LIMIT)),
         ("DEGENERATE", f64::from(layout::DEGENERATE)),
         ("BOUNDED", f64::from(layout::BOUNDED)),
         ("UNBOUNDED", f64::from(layout::UNBOUNDED)),
+        ("COUPLED", f64::from(layout::COUPLED)),
         ("GRID", f64::from(GRID)),
     ]
 }
@@ -134,7 +137,7 @@ mod tests {
     fn records_have_the_same_offsets_in_rust_and_in_the_shaders() {
         for text in [FAN, SEARCH] {
             let module = module(text);
-            assert_same_layout!(&module, ContactHeader: edges_i, edges_ii, edges_end, basis, faces, radius, area_i, area_ii, centroid_i, centroid_ii, compliance, resolved);
+            assert_same_layout!(&module, ContactHeader: edges_i, edges_ii, edges_end, basis, faces, radius, area_i, area_ii, centroid_i, centroid_ii, compliance, resolved, variation_first, variation_second, variation_slope, softness, spread);
             assert_same_layout!(&module, LoadRecord: wrench, scale, f3, m1, m2, distance);
             assert_same_layout!(&module, GroupRecord: contact, first, count, padding);
             assert_same_layout!(&module, SeedRecord: twist, lower, upper, status, best, padding);
