@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{Backend, Batch, Problem, Seed, SeedSet, SeedStatus};
+use super::{Backend, Batch, F32_TOLERANCE, Problem, Seed, SeedSet, SeedStatus};
 use crate::error::Result;
 use crate::mechanics::slip::{self, Field};
 use crate::mechanics::{Options, Pads, Refiner, Search, Separation, refused, solve_pads};
@@ -153,9 +153,11 @@ fn score_one(problem: &Problem<'_>, pads: Option<&Pads>, seeds: &[Seed], options
     bounded.retain(|&load| seeds[load].upper >= floor);
     bounded.sort_by(|&a, &b| seeds[b].upper.total_cmp(&seeds[a].upper).then(a.cmp(&b)));
     let mut slips: Vec<(usize, f64)> = Vec::new();
+    // Ties with the largest are solved too, so that the first of them is found.
+    let exact = pads.is_some_and(exactly_congruent);
+    let margin = if exact { 2.0 * TIE } else { F32_TOLERANCE };
     for load in bounded {
-        // Ties with the largest are solved too, so that the first of them is found.
-        if seeds[load].upper < largest * (1.0 - 2.0 * TIE) {
+        if seeds[load].upper < largest * (1.0 - margin) {
             break;
         }
         if let (SeedStatus::Bounded, Some(pads)) = (seeds[load].status, pads) {
@@ -169,18 +171,24 @@ fn score_one(problem: &Problem<'_>, pads: Option<&Pads>, seeds: &[Seed], options
         }
     }
     let compared = slips.len();
-    slips.retain(|&(_, mu)| mu >= largest * (1.0 - 2.0 * TIE));
+    slips.retain(|&(_, mu)| mu >= largest * (1.0 - margin));
     slips.sort_unstable_by_key(|&(load, _)| load);
     for (load, mu) in slips {
         let score = solve(load);
         solved.push((load, score));
         // The first of those that tie is the answer.
-        if usable(&score).is_some_and(|found| (found - mu).abs() <= TIE * mu && found >= largest * (1.0 - TIE)) {
+        if exact && usable(&score).is_some_and(|found| (found - mu).abs() <= TIE * mu && found >= largest * (1.0 - TIE)) {
             break;
         }
     }
     solved.sort_by_key(|(load, _)| *load);
     Scored { solved: solved.len(), compared, worst: settle(worst(solved.into_iter())), all: Vec::new() }
+}
+
+/// Whether faces that count as congruent are so to rounding, not only to the single precision of the part's file.
+fn exactly_congruent(pads: &Pads) -> bool {
+    let [i, ii] = pads.moments;
+    i.iter().zip(ii).all(|(a, b)| (a - b).abs() <= 1e-12 * i[0].max(i[3] + i[5]))
 }
 
 /// `mu_s` of congruent faces in full contact: their summed pressure is constant.
