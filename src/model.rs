@@ -223,3 +223,10 @@ pub(crate) mod null_is_infinite {
         Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
     }
 }
+
+impl Grip {
+    /// Height of face I over face II along `x3`, the `d` of the mechanics [m]: the width, negative for an inside grip.
+    pub fn distance(&self) -> f64 {
+        if self.inside { -self.width } else { self.width }
+    }
+}

@@ -155,6 +155,11 @@ fn contact_area(part: &Part, faces: &[u32], site: &SiteInfo, pad: &[DVec2]) -> f
     patch_area(&intersect_convex(pad, &polygons))
 }
 
+/// Angle between the faces of a site.
+fn tilt(part: &Part, site: &SiteInfo) -> f64 {
+    part.faces[site.faces_i[0] as usize].normal.cross(part.faces[site.faces_ii[0] as usize].normal).length()
+}
+
 /// Compares at least `wanted` candidates; returns how many were accepted, and how many free of interference.
 fn compare(seed: u64, wanted: u64) -> (u64, u64, u64) {
     let mut random = Random(seed);
@@ -180,6 +185,9 @@ fn compare(seed: u64, wanted: u64) -> (u64, u64, u64) {
         let pad_area = Bounds2::of(&gripper.pad).size().element_product();
         let mut pose = 0;
         for site in &sites {
+            // 2e-5 of the part's diagonal, and what the faces' tilt takes, which the pads' rubber takes up.
+            assert!(site.touch > 1e-6 && site.touch < 5e-6 || tilt(&part, site) > 1e-6, "{}", site.touch);
+            assert!(site.touch < 5e-6 + tilt(&part, site) * 0.15, "{}", site.touch);
             let corners: Vec<[DVec3; 3]> = (0..part.mesh.triangles.len() as u32).map(|index| part.mesh.corners(index)).collect();
             for &angle in &site.angles {
                 for &position in &site.positions {
@@ -195,8 +203,7 @@ fn compare(seed: u64, wanted: u64) -> (u64, u64, u64) {
                                 .iter()
                                 .any(|[low, high]| local.iter().any(|triangle| clip_leaves(*low, *high, *triangle)))
                         };
-                        // The tolerance of the library: 2e-5 of the part's diagonal (some 0.1 m).
-                        let (clearly_blocked, clearly_free) = (meets(5e-6), !meets(-1e-9));
+                        let (clearly_blocked, clearly_free) = (meets(1.001 * site.touch), !meets(-1e-9));
                         let grip = grips.get(&id);
                         if clearly_blocked {
                             blocked += 1;

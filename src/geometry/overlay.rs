@@ -36,45 +36,66 @@ pub fn intersect_convex(pad: &[DVec2], patch: &[Polygon]) -> Patch {
 }
 
 /// The region that the rings enclose an odd number of times, as proper polygons: repairs arbitrary input (any sense,
-/// self-crossing, nested). Rings with non-finite points or fewer than three points count as nothing.
+/// self-crossing, nested). Rings with non-finite points or fewer than three points count as nothing, and so does input
+/// whose size is beyond the range of numbers.
 pub fn even_odd(input: &[Ring]) -> Patch {
-    let contours: Vec<Contour> = input.iter().filter_map(|ring| contour(ring)).collect();
-    if contours.is_empty() {
-        return Patch::new();
-    }
-    collect(contours.simplify_shape_as::<i64>(FillRule::EvenOdd), SLIVER_INPUT)
+    let rings: Vec<&[DVec2]> = input.iter().map(Vec::as_slice).filter(|ring| usable(ring)).collect();
+    let Some(grid) = Grid::of(&rings) else { return Patch::new() };
+    grid.collect(grid.contours(&rings).simplify_shape_as::<i64>(FillRule::EvenOdd), SLIVER_INPUT)
 }
 
 fn overlay(a: &[Polygon], b: &[Polygon], rule: OverlayRule) -> Patch {
-    let (a, b) = (contours(a), contours(b));
-    if a.is_empty() && b.is_empty() {
-        return Patch::new();
+    let flat = |patch| -> Vec<&[DVec2]> { <[Polygon]>::iter(patch).flat_map(rings).filter(|ring| usable(ring)).collect() };
+    let (a, b) = (flat(a), flat(b));
+    let Some(grid) = Grid::of(&[a.as_slice(), b.as_slice()].concat()) else { return Patch::new() };
+    grid.collect(grid.contours(&a).overlay_as::<i64>(&grid.contours(&b), rule, FillRule::EvenOdd), SLIVER)
+}
+
+fn usable(ring: &[DVec2]) -> bool {
+    ring.len() >= 3 && ring.iter().all(|point| point.is_finite())
+}
+
+/// Maps the input to the unit square and back: the library refuses coordinates that its grid cannot hold.
+struct Grid {
+    centre: DVec2,
+    /// A power of two, so that scaling does not round.
+    scale: f64,
+}
+
+impl Grid {
+    /// `None` when there is nothing to work on, or its size is zero or beyond the range of numbers.
+    fn of(rings: &[&[DVec2]]) -> Option<Self> {
+        let bounds = crate::geometry::Bounds2::of(rings.iter().copied().flatten());
+        let size = bounds.size().max_element();
+        let scale = size.log2().ceil().exp2();
+        let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
+        (size > 0.0 && scale.is_normal() && (1.0 / scale).is_normal() && reach < f64::MAX / 4.0).then(|| Self { centre: bounds.centre(), scale })
     }
-    collect(a.overlay_as::<i64>(&b, rule, FillRule::EvenOdd), SLIVER)
-}
 
-fn contours(patch: &[Polygon]) -> Vec<Contour> {
-    patch.iter().flat_map(rings).filter_map(contour).collect()
-}
-
-fn contour(ring: &[DVec2]) -> Option<Contour> {
-    (ring.len() >= 3 && ring.iter().all(|point| point.is_finite())).then(|| ring.iter().map(|point| point.to_array()).collect())
-}
-
-fn collect(shapes: Vec<Vec<Contour>>, sliver: f64) -> Patch {
-    let solid = |ring: &Ring| {
-        let size = crate::geometry::Bounds2::of(ring).size().max_element();
-        ring.len() >= 3 && ring_area(ring).abs() > sliver * size * size
-    };
-    let mut patch = Patch::with_capacity(shapes.len());
-    for shape in shapes {
-        let mut loops = shape.into_iter().map(|contour| contour.into_iter().map(DVec2::from_array).collect::<Ring>());
-        let Some(outer) = loops.next().filter(solid) else { continue };
-        let mut polygon = Polygon { outer, holes: loops.filter(solid).collect() };
-        crate::geometry::polygon::normalise(&mut polygon);
-        patch.push(polygon);
+    fn contours(&self, rings: &[&[DVec2]]) -> Vec<Contour> {
+        rings.iter().map(|ring| ring.iter().map(|&point| ((point - self.centre) / self.scale).to_array()).collect()).collect()
     }
-    patch
+
+    fn collect(&self, shapes: Vec<Vec<Contour>>, sliver: f64) -> Patch {
+        let solid = |ring: &Ring| {
+            let size = crate::geometry::Bounds2::of(ring).size().max_element();
+            ring.len() >= 3 && ring_area(ring).abs() > sliver * size * size
+        };
+        let mut patch = Patch::with_capacity(shapes.len());
+        for shape in shapes {
+            let mut loops = shape.into_iter().map(|contour| contour.into_iter().map(DVec2::from_array).collect::<Ring>());
+            let Some(outer) = loops.next().filter(solid) else { continue };
+            let mut polygon = Polygon { outer, holes: loops.filter(solid).collect() };
+            crate::geometry::polygon::normalise(&mut polygon);
+            for ring in std::iter::once(&mut polygon.outer).chain(&mut polygon.holes) {
+                for point in ring.iter_mut() {
+                    *point = *point * self.scale + self.centre;
+                }
+            }
+            patch.push(polygon);
+        }
+        patch
+    }
 }
 
 #[cfg(test)]
@@ -135,6 +156,24 @@ mod tests {
             let proper = patch_area(&intersect_convex(&pad, &[Polygon { outer: ring.clone(), holes: Vec::new() }]));
             prop_assert!((clipped - proper).abs() < 1e-6 * size, "{clipped} {proper}");
             prop_assert!((clipped - scan_area(&ring, &pad)).abs() < 2e-5, "{clipped} {}", scan_area(&ring, &pad));
+        }
+    }
+
+    proptest! {
+        /// Collinear, repeated, tiny, huge and non-finite points: an answer, never a panic.
+        #[test]
+        fn degenerate_rings_do_no_harm(points in proptest::collection::vec((0..4_i32, 0..3_i32), 0..12), scale in -300.0..300.0f64, odd in 0..6_usize) {
+            let mut ring: Ring = points.iter().map(|&(x, y)| DVec2::new(f64::from(x), f64::from(y)) * 10_f64.powf(scale)).collect();
+            if let Some(point) = ring.get_mut(odd) {
+                point.x = [f64::NAN, f64::INFINITY, 0.0, -0.0, f64::MAX, f64::MIN_POSITIVE][odd];
+            }
+            let polygon = [Polygon { outer: ring.clone(), holes: vec![ring.clone()] }];
+            for patch in [even_odd(&[ring.clone(), ring.clone()]), intersect(&polygon, &polygon), union(&polygon, &polygon)] {
+                for polygon in &patch {
+                    let area = ring_area(&polygon.outer);
+                    prop_assert!(polygon.outer.len() >= 3 && (area.is_nan() || area >= 0.0), "{area}");
+                }
+            }
         }
     }
 

@@ -24,6 +24,9 @@ pub struct SiteInfo {
     pub width: f64,
     /// Gripped from outside or from inside.
     pub kind: PairKind,
+    /// How deep finger bodies may lie in the gripped planes without counting as interference [m]: what the planes' tilt
+    /// and roughness take, which the pads take up.
+    pub touch: f64,
     /// Site frame in the part frame: `z` is the closing axis, positions lie in `(x, y)`, angles count from `x`.
     pub part_from_site: Frame,
     /// Grip origins in the site's `(x, y)` [m].
@@ -71,6 +74,7 @@ impl Proposer<'_> {
             faces_ii: site.faces[1].clone(),
             width: site.width,
             kind: site.kind,
+            touch: site.rise,
             part_from_site: site.part_from_site,
             positions: site.positions.clone(),
             angles: site.angles.clone(),

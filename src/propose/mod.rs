@@ -188,6 +188,7 @@ impl<'a> Proposer<'a> {
             width: site.width,
             opening: self.options.opening.min(room / 2.0).max(0.0),
             touch: site.rise,
+            flush: site.flush,
             clearance: self.options.clearance,
             approach,
             flipped,

@@ -588,6 +588,32 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig::with_cases(3000))]
+        /// Edges, corners and pads all on one lattice: every kind of coincidence there is.
+        #[test]
+        fn coincident_edges_and_corners(boxes in proptest::collection::vec((-6..6_i32, -6..6_i32, 1..6_i32, 1..6_i32), 1..6), pad in (1..5_i32, 1..5_i32), place in (-8..8_i32, -8..8_i32), eighth in 0..8_i32) {
+            let corner = |x: i32, y: i32| DVec2::new(f64::from(x), f64::from(y)) / 4.0;
+            let rings: Vec<Ring> = boxes.iter().map(|&(x, y, w, h)| vec![corner(x, y), corner(x + w, y), corner(x + w, y + h), corner(x, y + h)]).collect();
+            let mended = overlay::even_odd(&rings);
+            let face = index(mended.clone());
+            let pad = TurnedPad::new(&rectangle(corner(pad.0, pad.1)), f64::from(eighth) * std::f64::consts::FRAC_PI_4);
+            let place = corner(place.0, place.1) / 2.0;
+            let (area, patch) = touch(&face, &pad, place);
+            let ring: Ring = pad.ring.iter().map(|&point| point + place).collect();
+            let clipped: f64 = mended.iter().flat_map(rings_of).map(|r| ring_area(&crate::geometry::clip_ring_convex(r, &ring))).sum();
+            prop_assert!((area - clipped).abs() < 1e-7, "{} {}", area, clipped);
+            prop_assert!((area - patch_area(&patch)).abs() < 1e-7, "{} {:?}", area, patch);
+            for polygon in &patch {
+                prop_assert!(ring_area(&polygon.outer) > 0.0 && polygon.holes.iter().all(|hole| ring_area(hole) < 0.0));
+            }
+        }
+    }
+
+    fn rings_of(polygon: &Polygon) -> impl Iterator<Item = &[DVec2]> {
+        rings(polygon)
+    }
+
+    proptest! {
         #![proptest_config(ProptestConfig::with_cases(1000))]
         #[test]
         fn clipping_agrees_with_the_library(outer in star(3..30, 1.0, 2.0), hole in star(3..12, 0.1, 0.9), angle in 0.0..6.3f64, x in -2.0..2.0f64, y in -2.0..2.0f64, w in 0.05..2.0f64) {

@@ -44,6 +44,8 @@ pub(super) struct Site {
     pub(super) faces: [Vec<u32>; 2],
     /// How far the faces rise above the pads' planes [m]: their tilt and roughness.
     pub(super) rise: f64,
+    /// Roughness of a plane [m].
+    pub(super) flush: f64,
     /// Area in which the two planes' faces overlap [m^2].
     pub(super) overlap: f64,
     /// Grip origins, in the site's `(x, y)` [m].
@@ -181,6 +183,7 @@ fn group_sites(
             turn,
             faces: sides.clone(),
             rise,
+            flush: SAME_PLANE * size,
             overlap: polygon::patch_area(&local),
             bounds: Bounds2::of(&positions),
             positions,

@@ -50,8 +50,10 @@ pub(super) struct Motion {
     pub(super) width: f64,
     /// Way of each jaw from the approach opening to contact [m].
     pub(super) opening: f64,
-    /// Bodies may come this near to, or touch, the planes that they lie on [m].
+    /// Fingers may lie this deep in the planes that they grip [m].
     pub(super) touch: f64,
+    /// Bodies may lie this deep in any other surface [m]: being flush with one is no collision.
+    pub(super) flush: f64,
     /// Distance kept elsewhere [m].
     pub(super) clearance: f64,
     /// Length of the approach [m].
@@ -96,8 +98,7 @@ pub(super) fn sweeps(gripper: &Gripper, motion: &Motion) -> Vec<Sweep> {
 impl Sweep {
     fn new(body: Body, jaw: &'static str, stage: Stage, path: DVec3, motion: &Motion) -> Self {
         // Clearance on all sides but along x3, where a finger may lie on its face (the touch tolerance keeps it off).
-        // Flush with a wall is no collision either: boxes are drawn in by the tolerance.
-        let side = motion.clearance - motion.touch;
+        let side = motion.clearance - motion.flush;
         let grown = DVec3::new(side, side, if jaw.is_empty() { side } else { 0.0 });
         Self::grown(body, jaw, stage, path, grown)
     }
@@ -240,7 +241,7 @@ mod tests {
     }
 
     fn motion() -> Motion {
-        Motion { kind: PairKind::External, width: 0.02, opening: 0.005, touch: 1e-6, clearance: 0.0, approach: 1.0, flipped: false }
+        Motion { kind: PairKind::External, width: 0.02, opening: 0.005, touch: 1e-6, flush: 1e-6, clearance: 0.0, approach: 1.0, flipped: false }
     }
 
     #[test]
@@ -265,7 +266,7 @@ mod tests {
             for shape in [Shape::Box { half: DVec3::new(0.01, 0.005, 0.008) }, Shape::Cylinder { radius: 0.006, half_height: 0.01 }] {
                 let body = Body { name: "b".into(), shape: shape.clone(), grip_from_body: frame };
                 let path = DVec3::new(0.0, 0.0, 0.004);
-                let sweep = Sweep::new(body, "I", Stage::Grip, path, &Motion { touch: 0.0, ..motion() });
+                let sweep = Sweep::new(body, "I", Stage::Grip, path, &Motion { touch: 0.0, flush: 0.0, ..motion() });
                 prop_assert!(!sweep.is_box());
                 let triangle = [centre, centre + u, centre + v];
                 let inside = |point: DVec3, step: f64| {
