@@ -193,7 +193,9 @@ fn a_part_beyond_the_stroke_says_so() {
 fn bad_options_are_refused() {
     let part = cuboid(0.06, 0.04, 0.03);
     let gripper = generic();
-    let changes: [&dyn Fn(&mut ProposeOptions); 9] = [
+    let changes: [&dyn Fn(&mut ProposeOptions); 11] = [
+        &|options| options.spacing = Some(1e-7),
+        &|options| options.faces = Some(vec![0, 6]),
         &|options| options.spacing = Some(0.0),
         &|options| options.spacing = Some(f64::NAN),
         &|options| options.angle_step = 0.0,
@@ -289,6 +291,9 @@ fn explanations_agree_with_the_run() {
         let explanation = proposer.explain_pose(grip.face_ii, grip.face_i, &flipped).unwrap();
         assert!(explanation.rejection.is_none() && (explanation.part_from_grip.rotation - flipped.rotation).to_cols_array().iter().all(|x| x.abs() < 1e-12));
     }
+    let beside = proposer.explain(0, DVec2::splat(1.0), 0.3, false).unwrap();
+    assert!(beside.rejection.is_some());
+    assert!(!beside.checks.iter().filter(|check| check.name.starts_with("contact")).any(|check| check.passed));
     assert!(proposer.explain(99, DVec2::ZERO, 0.0, false).is_err());
     assert!(proposer.explain(0, DVec2::NAN, 0.0, false).is_err());
     assert!(proposer.explain_pose(0, 0, &gripfast::model::Frame::IDENTITY).is_err());

@@ -116,7 +116,7 @@ impl<'a> Proposer<'a> {
     /// Finds the sites of `part` for `gripper`.
     ///
     /// # Errors
-    /// When an option is out of its range, the gripper has no pad with area, or inside grips are asked of a gripper
+    /// When an option is out of its range or names a face that is not there, the grid is too fine, the gripper has no pad with area, or inside grips are asked of a gripper
     /// without outer pads.
     pub fn new(part: &'a Part, gripper: &'a Gripper, options: &ProposeOptions) -> Result<Self> {
         options.validate()?;
@@ -138,7 +138,14 @@ impl<'a> Proposer<'a> {
             choose(part.internal_pairs(0.0, f64::INFINITY), reach, options, &mut pairs, &mut tally);
         }
         tally.pairs = pairs.len() as u64;
-        let (sites, directions) = site::sites(part, gripper, options, &pairs);
+        if let Some(&unknown) = options.faces.iter().flatten().find(|&&face| face as usize >= part.faces.len()) {
+            return Err(Error::input(
+                "faces",
+                format!("there is no planar face {unknown}"),
+                format!("the part has {} of them, counted from 0", part.faces.len()),
+            ));
+        }
+        let (sites, directions) = site::sites(part, gripper, options, &pairs)?;
         let pad = vec![Polygon { outer: gripper.pad.clone(), holes: Vec::new() }];
         Ok(Self {
             part,

@@ -5,60 +5,24 @@
 //! follows the boundary in and out of the pad (Weiler and Atherton 1977, for a convex window), which gives proper
 //! polygons with holes; where the geometry is too nearly degenerate for that, the boolean operation of the library.
 
+mod pad;
+mod walk;
+
 use glam::DVec2;
 
-use crate::geometry::polygon::{self, Bounds2, ring_area, rings};
-use crate::geometry::{contains, overlay};
-use crate::model::{Patch, Polygon, Ring};
+pub(super) use pad::TurnedPad;
+use pad::{FLUSH, Piece, clip_edge};
+use walk::loops;
+pub(super) use walk::outline;
 
-/// Boundary within this share of the pad's size inside the pad's outline counts as flush with it: above all rounding of
-/// the arithmetic, below anything that could be felt (0.02 nm on 20 mm).
-const FLUSH: f64 = 1e-9;
+use crate::geometry::overlay;
+use crate::geometry::polygon::{self, Bounds2, ring_area, rings};
+use crate::model::{Patch, Ring};
+
 /// Pieces with less area than this share of their bounding square are rounding (as in [`overlay`]).
 const SLIVER: f64 = 1e-6;
 /// Cells of the grid per axis, at most.
 const MOST_CELLS: usize = 400;
-
-/// A pad outline turned to an approach angle, about the grip origin.
-#[derive(Debug, Clone)]
-pub(super) struct TurnedPad {
-    /// The outline, counter-clockwise.
-    ring: Ring,
-    /// The outline drawn in by the flush tolerance: the clip window.
-    window: Ring,
-    /// Unit outward normals and distances of the window's sides; side `k` runs from corner `k` to `k + 1`.
-    sides: Vec<(DVec2, f64)>,
-    bounds: Bounds2,
-    area: f64,
-}
-
-impl TurnedPad {
-    /// The convex counter-clockwise outline `pad` turned by `angle`.
-    pub(super) fn new(pad: &[DVec2], angle: f64) -> Self {
-        let turn = DVec2::from_angle(angle);
-        let ring: Ring = pad.iter().map(|&point| turn.rotate(point)).collect();
-        let bounds = Bounds2::of(&ring);
-        let scale = bounds.size().max_element();
-        let sides: Vec<(DVec2, f64)> = ring
-            .iter()
-            .zip(ring.iter().cycle().skip(1))
-            .map(|(&a, &b)| {
-                let normal = -(b - a).perp().normalize();
-                (normal, normal.dot(a) - FLUSH * scale)
-            })
-            .collect();
-        let corner = |k: usize| {
-            let ((m, g), (n, h)) = (sides[(k + sides.len() - 1) % sides.len()], sides[k]);
-            DVec2::new(g * n.y - h * m.y, h * m.x - g * n.x) / m.perp_dot(n)
-        };
-        let window = (0..sides.len()).map(corner).collect();
-        Self { area: ring_area(&ring), window, sides, bounds, ring }
-    }
-
-    pub(super) fn area(&self) -> f64 {
-        self.area
-    }
-}
 
 /// How a pad meets a face.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,17 +49,6 @@ pub(super) struct Scratch {
     ends: Vec<usize>,
     /// Outline from the library, where the walk gave up.
     fallback: Option<Patch>,
-}
-
-/// The part of one boundary edge inside the window.
-#[derive(Debug, Clone, Copy)]
-struct Piece {
-    edge: u32,
-    start: DVec2,
-    end: DVec2,
-    /// Window side crossed on the way in; `None` when the edge starts inside.
-    entry: Option<usize>,
-    exit: Option<usize>,
 }
 
 /// A crossing of the window's outline, by position along it.
@@ -144,10 +97,18 @@ impl Grid {
         (((y - self.origin.y) / self.cell).max(0.0) as usize).min(self.ny - 1)
     }
 
-    /// Whether coordinates beyond the grid stay out of its border cells.
+    fn bounds(&self) -> Bounds2 {
+        Bounds2 { min: self.origin, max: self.origin + self.cell * DVec2::new(self.nx as f64, self.ny as f64) }
+    }
+
+    /// Whether anything within `bounds` may lie in the grid.
     fn covers(&self, bounds: Bounds2) -> bool {
-        let max = self.origin + self.cell * DVec2::new(self.nx as f64, self.ny as f64);
-        bounds.min.cmplt(max).all() && bounds.max.cmpgt(self.origin).all()
+        bounds.min.cmplt(self.bounds().max).all() && bounds.max.cmpgt(self.origin).all()
+    }
+
+    /// Whether all of `bounds` lies in the grid.
+    fn holds(&self, bounds: Bounds2) -> bool {
+        bounds.min.cmpge(self.origin).all() && bounds.max.cmple(self.bounds().max).all()
     }
 }
 
@@ -263,6 +224,9 @@ impl PatchIndex {
     /// How the pad, its origin at `place`, meets the patch. After [`Touch::Part`] the outline lies in `scratch`.
     pub(super) fn touch(&self, pad: &TurnedPad, place: DVec2, scratch: &mut Scratch) -> Touch {
         let bounds = Bounds2 { min: pad.bounds.min + place, max: pad.bounds.max + place };
+        if !self.grid.holds(bounds) {
+            return self.touch_outside(pad, place, scratch);
+        }
         let [x0, x1, y0, y1] = self.cells(bounds);
         if self.edges_in(x0, x1, y0, y1) == 0 {
             return if self.inside[y0 * self.grid.nx + x0] { Touch::Whole } else { Touch::Empty };
@@ -275,18 +239,34 @@ impl PatchIndex {
         }
         scratch.fallback = None;
         if !self.walk(pad, place, scratch) {
-            let ring: Ring = pad.window.iter().map(|&point| point + place).collect();
-            let mut patch = overlay::intersect_convex(&ring, &self.polygons);
-            for polygon in &mut patch {
-                *polygon = polygon::transform(polygon, &glam::DAffine2::from_translation(-place));
-            }
-            scratch.fallback = Some(patch);
+            scratch.fallback = Some(self.clipped_by_library(&pad.window, place));
         }
         let area = match &scratch.fallback {
             Some(patch) => polygon::patch_area(patch),
             None => loops(scratch).map(ring_area).sum(),
         };
         if area <= SLIVER * pad.area { Touch::Empty } else { Touch::Part(area) }
+    }
+
+    /// The answer for a pad that reaches out of the region: a user's question, not one of a dense set.
+    fn touch_outside(&self, pad: &TurnedPad, place: DVec2, scratch: &mut Scratch) -> Touch {
+        let patch = self.clipped_by_library(&pad.ring, place);
+        let area = polygon::patch_area(&patch);
+        scratch.fallback = Some(patch);
+        if area >= (1.0 - FLUSH) * pad.area {
+            Touch::Whole
+        } else if area > SLIVER * pad.area {
+            Touch::Part(area)
+        } else {
+            Touch::Empty
+        }
+    }
+
+    /// Intersection with `window` put at `place`, relative to `place`.
+    fn clipped_by_library(&self, window: &[DVec2], place: DVec2) -> Patch {
+        let ring: Ring = window.iter().map(|&point| point + place).collect();
+        let back = glam::DAffine2::from_translation(-place);
+        overlay::intersect_convex(&ring, &self.polygons).iter().map(|polygon| polygon::transform(polygon, &back)).collect()
     }
 
     /// Edges near the pad, each clipped to the window (Cyrus and Beck 1978), relative to `place`.
@@ -319,197 +299,6 @@ impl PatchIndex {
             }
         }
     }
-
-    /// Joins the pieces along the window's outline to closed loops; `false` when the crossings do not alternate or two
-    /// of them coincide, where rounding could have mixed them up.
-    fn walk(&self, pad: &TurnedPad, place: DVec2, scratch: &mut Scratch) -> bool {
-        scratch.points.clear();
-        scratch.ends.clear();
-        scratch.events.clear();
-        let along = |side: usize, point: DVec2| {
-            let (a, b) = (pad.window[side], pad.window[(side + 1) % pad.window.len()]);
-            (point - a).dot(b - a) / (b - a).length_squared()
-        };
-        for (index, piece) in scratch.pieces.iter().enumerate() {
-            for (side, point, entry) in [(piece.entry, piece.start, true), (piece.exit, piece.end, false)] {
-                if let Some(side) = side {
-                    scratch.events.push(Event { side, along: along(side, point), piece: index as u32, entry });
-                }
-            }
-        }
-        scratch.events.sort_by(|a, b| a.side.cmp(&b.side).then(a.along.total_cmp(&b.along)));
-        let count = scratch.events.len();
-        for index in 0..count {
-            let (event, following) = (scratch.events[index], scratch.events[(index + 1) % count]);
-            let tied = count > 1 && event.side == following.side && (event.along - following.along).abs() < 1e-12;
-            if event.entry == following.entry || tied {
-                return false;
-            }
-        }
-        scratch.visited.clear();
-        scratch.visited.resize(scratch.pieces.len(), false);
-        // Loops that cross the outline.
-        for first in 0..count {
-            let event = scratch.events[first];
-            if !event.entry || scratch.visited[event.piece as usize] {
-                continue;
-            }
-            let mut piece = event.piece;
-            loop {
-                if !self.follow(piece, scratch) {
-                    return false;
-                }
-                // `follow` ended on a piece with an exit: go on along the outline to the next entry.
-                let Some(exit) = scratch
-                    .events
-                    .iter()
-                    .position(|event| !event.entry && scratch.pieces[event.piece as usize].end == scratch.points[scratch.points.len() - 1])
-                else {
-                    return false;
-                };
-                let (from, to) = (scratch.events[exit], scratch.events[(exit + 1) % count]);
-                let sides = pad.window.len();
-                let mut steps = (to.side + sides - from.side) % sides;
-                if steps == 0 && to.along < from.along {
-                    steps = sides;
-                }
-                for step in 1..=steps {
-                    scratch.points.push(pad.window[(from.side + step) % sides]);
-                }
-                piece = to.piece;
-                if piece == event.piece {
-                    break;
-                }
-                if scratch.visited[piece as usize] {
-                    return false;
-                }
-            }
-            scratch.ends.push(scratch.points.len());
-        }
-        // Loops wholly inside the window.
-        let crossed = count > 0;
-        let mut has_inner = false;
-        for index in 0..scratch.pieces.len() as u32 {
-            if scratch.visited[index as usize] {
-                continue;
-            }
-            if scratch.pieces[index as usize].entry.is_some() || !self.follow_closed(index, scratch) {
-                return false;
-            }
-            scratch.ends.push(scratch.points.len());
-            has_inner = true;
-        }
-        // Without a crossing, the outline itself bounds the contact when its corner lies on the face.
-        if !crossed && has_inner && self.contains(pad.window[0] + place) {
-            scratch.points.extend_from_slice(&pad.window);
-            scratch.ends.push(scratch.points.len());
-        }
-        true
-    }
-
-    /// Appends the chain of pieces that starts at `piece` up to its exit point.
-    fn follow(&self, mut piece: u32, scratch: &mut Scratch) -> bool {
-        loop {
-            let current = scratch.pieces[piece as usize];
-            if std::mem::replace(&mut scratch.visited[piece as usize], true) {
-                return false;
-            }
-            scratch.points.push(current.start);
-            if current.exit.is_some() {
-                scratch.points.push(current.end);
-                return true;
-            }
-            let Some(next) = self.next_piece(current.edge, scratch) else { return false };
-            piece = next;
-        }
-    }
-
-    /// Appends the closed chain of whole edges through `first`.
-    fn follow_closed(&self, first: u32, scratch: &mut Scratch) -> bool {
-        let mut piece = first;
-        loop {
-            let current = scratch.pieces[piece as usize];
-            if current.entry.is_some() || current.exit.is_some() || std::mem::replace(&mut scratch.visited[piece as usize], true) {
-                return false;
-            }
-            scratch.points.push(current.start);
-            match self.next_piece(current.edge, scratch) {
-                Some(next) if next == first => return true,
-                Some(next) => piece = next,
-                None => return false,
-            }
-        }
-    }
-
-    /// The piece of the edge after `edge`, when it starts inside the window.
-    fn next_piece(&self, edge: u32, scratch: &Scratch) -> Option<u32> {
-        let next = self.next[edge as usize] as usize;
-        let piece = (scratch.seen[next] == scratch.epoch).then(|| scratch.piece_of_edge[next])?;
-        (piece != u32::MAX && scratch.pieces[piece as usize].entry.is_none()).then_some(piece)
-    }
-}
-
-/// The outline of the last [`Touch::Part`] as proper polygons, relative to the pad's origin and turned by `-angle`,
-/// that is in the grip frame.
-pub(super) fn outline(scratch: &Scratch, angle: f64) -> Patch {
-    let turn = DVec2::from_angle(-angle);
-    let turned = |ring: &[DVec2]| -> Ring { ring.iter().map(|&point| turn.rotate(point)).collect() };
-    if let Some(patch) = &scratch.fallback {
-        return patch.iter().map(|polygon| Polygon { outer: turned(&polygon.outer), holes: polygon.holes.iter().map(|hole| turned(hole)).collect() }).collect();
-    }
-    let solid = |ring: &&[DVec2]| {
-        let size = Bounds2::of(*ring).size().max_element();
-        ring_area(ring).abs() > SLIVER * size * size
-    };
-    let (outer, holes): (Vec<&[DVec2]>, Vec<&[DVec2]>) = loops(scratch).filter(solid).partition(|ring| ring_area(ring) > 0.0);
-    let mut patch: Patch = outer.iter().map(|ring| Polygon { outer: ring.to_vec(), holes: Vec::new() }).collect();
-    for hole in holes {
-        // The smallest outer loop around it: islands may lie in holes.
-        let around = (0..patch.len()).filter(|&index| contains(&Polygon { outer: outer[index].to_vec(), holes: Vec::new() }, hole[0]));
-        if let Some(index) = around.min_by(|&a, &b| ring_area(outer[a]).total_cmp(&ring_area(outer[b]))) {
-            patch[index].holes.push(hole.to_vec());
-        }
-    }
-    for polygon in &mut patch {
-        polygon.outer = turned(&polygon.outer);
-        for hole in &mut polygon.holes {
-            *hole = turned(hole);
-        }
-    }
-    patch
-}
-
-fn loops(scratch: &Scratch) -> impl Iterator<Item = &[DVec2]> {
-    let starts = std::iter::once(0).chain(scratch.ends.iter().copied());
-    starts.zip(&scratch.ends).map(|(start, &end)| &scratch.points[start..end])
-}
-
-fn clip_edge(edge: u32, a: DVec2, b: DVec2, sides: &[(DVec2, f64)]) -> Option<Piece> {
-    let (mut low, mut high, mut entry, mut exit) = (0.0, 1.0, None, None);
-    for (side, &(normal, height)) in sides.iter().enumerate() {
-        let (value_a, value_b) = (normal.dot(a) - height, normal.dot(b) - height);
-        match (value_a > 0.0, value_b > 0.0) {
-            (true, true) => return None,
-            (false, false) => {}
-            (true, false) => {
-                let t = value_a / (value_a - value_b);
-                if t >= low {
-                    (low, entry) = (t, Some(side));
-                }
-            }
-            (false, true) => {
-                let t = value_a / (value_a - value_b);
-                if t <= high {
-                    (high, exit) = (t, Some(side));
-                }
-            }
-        }
-        if low >= high {
-            return None;
-        }
-    }
-    let at = |t: f64| a + (b - a) * t;
-    Some(Piece { edge, start: if entry.is_some() { at(low) } else { a }, end: if exit.is_some() { at(high) } else { b }, entry, exit })
 }
 
 /// Sorts `(bucket, value)` pairs into `count` buckets: offsets and values.
@@ -536,6 +325,7 @@ mod tests {
     use super::*;
     use crate::geometry::{intersect_convex, patch_area};
     use crate::gripper::rectangle;
+    use crate::model::Polygon;
     use proptest::prelude::*;
 
     fn index(polygons: Patch) -> PatchIndex {
@@ -578,6 +368,18 @@ mod tests {
         // half over the hole: one polygon with a notch
         let (_, notch) = touch(&index(vec![face.polygons[0].clone()]), &pad, DVec2::new(0.5, 0.0));
         assert_eq!((notch.len(), notch[0].holes.len()), (1, 0));
+    }
+
+    #[test]
+    fn a_pad_out_of_the_region_is_answered_too() {
+        let face =
+            PatchIndex::new(vec![Polygon { outer: rectangle(DVec2::splat(9.0)), holes: Vec::new() }], Bounds2 { min: DVec2::ZERO, max: DVec2::ONE }, 0.1);
+        let pad = TurnedPad::new(&rectangle(DVec2::ONE), 0.0);
+        let mut scratch = Scratch::default();
+        assert_eq!(face.touch(&pad, DVec2::splat(3.0), &mut scratch), Touch::Whole);
+        assert_eq!(face.touch(&pad, DVec2::splat(30.0), &mut scratch), Touch::Empty);
+        let Touch::Part(area) = face.touch(&pad, DVec2::new(-4.5, 0.0), &mut scratch) else { panic!("half of the pad") };
+        assert!((area - 0.5).abs() < 1e-12 && (patch_area(&outline(&scratch, 1.0)) - 0.5).abs() < 1e-12);
     }
 
     fn star(count: std::ops::Range<usize>, low: f64, high: f64) -> impl Strategy<Value = Ring> {

@@ -1,0 +1,194 @@
+//! Where pads are put at a site, and from which directions they come.
+
+use glam::DVec2;
+
+use super::PatchIndex;
+use crate::geometry::contains;
+use crate::geometry::polygon::{self, rings};
+use crate::model::Polygon;
+use crate::propose::ProposeOptions;
+
+/// Corners of the overlap that turn by less are points of a tessellated curve, not places of their own.
+const CORNER: f64 = 20.0 * std::f64::consts::PI / 180.0;
+/// At most this many corners of one site become positions.
+const MOST_CORNERS: usize = 200;
+/// At most this many edge directions of one site become approach angles (four each).
+const MOST_EDGE_DIRECTIONS: usize = 4;
+
+/// Directions of the boundary modulo a right angle, in `(-45, 45]` degrees, with the length that runs along each,
+/// longest first.
+fn edge_directions(patch: &[Polygon]) -> Vec<(f64, f64)> {
+    let right_angle = std::f64::consts::FRAC_PI_2;
+    let mut found: Vec<(f64, f64)> = Vec::new();
+    for ring in patch.iter().flat_map(rings) {
+        for (&a, &b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
+            let length = a.distance(b);
+            // Rounding must not move an edge at 45 degrees to the other end of the interval.
+            let mut angle = (b - a).to_angle().rem_euclid(right_angle);
+            if angle > right_angle / 2.0 + 1e-6 {
+                angle -= right_angle;
+            }
+            found.push((angle, length));
+        }
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut merged: Vec<(f64, f64)> = Vec::new();
+    for (angle, length) in found {
+        match merged.last_mut() {
+            Some((known, sum)) if angle - *known < 1e-3 => {
+                *known = (*known * *sum + angle * length) / (*sum + length).max(f64::MIN_POSITIVE);
+                *sum += length;
+            }
+            _ => merged.push((angle, length)),
+        }
+    }
+    // Equal lengths must not be told apart by rounding: compared in steps of a millionth of the longest.
+    let longest = merged.iter().map(|direction| direction.1).fold(0.0, f64::max);
+    let step = |length: f64| (length / longest.max(f64::MIN_POSITIVE) * 1e6).round();
+    merged.sort_by(|a, b| step(b.1).total_cmp(&step(a.1)).then(a.0.abs().total_cmp(&b.0.abs())));
+    merged
+}
+
+/// Angle of the site's `x` in the axes of the direction: along the boundary's main direction, when it has one.
+pub(super) fn main_direction(overlap: &[Polygon]) -> f64 {
+    let perimeter: f64 = edge_directions(overlap).iter().map(|direction| direction.1).sum();
+    match edge_directions(overlap).first() {
+        Some(&(angle, length)) if length > 0.15 * perimeter => angle,
+        _ => 0.0,
+    }
+}
+
+/// Approach angles: uniform, and along the site's edges, which the uniform ones may miss.
+pub(super) fn angles(overlap: &[Polygon], options: &ProposeOptions, pad: f64) -> Vec<f64> {
+    let turn = std::f64::consts::TAU;
+    let count = (turn / options.angle_step).round().max(1.0) as usize;
+    let mut angles: Vec<f64> = (0..count).map(|index| turn * index as f64 / count as f64).collect();
+    if options.edge_angles {
+        let long = edge_directions(overlap).into_iter().filter(|direction| direction.1 > pad / 2.0);
+        for (direction, _) in long.take(MOST_EDGE_DIRECTIONS) {
+            for quarter in 0..4 {
+                let angle = (direction + f64::from(quarter) * turn / 4.0).rem_euclid(turn);
+                let near = |known: &f64| {
+                    let apart = (angle - known).rem_euclid(turn);
+                    apart.min(turn - apart) < 2e-3
+                };
+                if !angles.iter().any(near) {
+                    angles.push(angle);
+                }
+            }
+        }
+    }
+    angles
+}
+
+/// A grid over the overlap, its corners and centroids, and the point nearest the centre of mass.
+pub(super) fn positions(overlap: &[Polygon], spacing: f64, reach: f64, centre_of_mass: DVec2) -> Vec<DVec2> {
+    let bounds = polygon::bounds(overlap);
+    let index = PatchIndex::new(overlap.to_vec(), bounds.grown(1.01 * reach), reach / 2.0);
+    // The site's origin is the middle of the bounds; rounding must not cost the outermost row.
+    let half = (bounds.size() / 2.0 / spacing + 1e-6).floor();
+    let mut positions = Vec::new();
+    let mut y = -half.y;
+    while y <= half.y {
+        let mut x = -half.x;
+        while x <= half.x {
+            let point = bounds.centre() + spacing * DVec2::new(x, y);
+            if !index.is_far(point, reach / 2.0) {
+                positions.push(point);
+            }
+            x += 1.0;
+        }
+        y += 1.0;
+    }
+    let mut extra: Vec<DVec2> = Vec::new();
+    extra.push(nearest(overlap, centre_of_mass));
+    extra.push(polygon::patch_moments(overlap).centroid);
+    if overlap.len() > 1 {
+        extra.extend(overlap.iter().map(|polygon| polygon::moments(polygon).centroid));
+    }
+    let mut corners = Vec::new();
+    for ring in overlap.iter().flat_map(rings) {
+        for index in 0..ring.len() {
+            let [a, b, c] = [0, 1, 2].map(|step| ring[(index + step) % ring.len()]);
+            if (b - a).angle_to(c - b).abs() > CORNER {
+                corners.push(b);
+            }
+        }
+    }
+    if corners.len() <= MOST_CORNERS {
+        extra.extend(corners);
+    }
+    let near = 1e-4 * spacing;
+    let on_grid = |point: DVec2| {
+        let steps = (point - bounds.centre()) / spacing;
+        (steps - steps.round()).length() * spacing < near && steps.abs().cmple(half + 1e-3).all()
+    };
+    for point in extra {
+        let useful = point.is_finite() && !index.is_far(point, reach / 2.0);
+        if useful && !on_grid(point) && !positions.iter().rev().take(2 * MOST_CORNERS + 8).any(|known| known.distance(point) < near) {
+            positions.push(point);
+        }
+    }
+    positions
+}
+
+/// The point of the patch nearest to `point`.
+fn nearest(patch: &[Polygon], point: DVec2) -> DVec2 {
+    if patch.iter().any(|polygon| contains(polygon, point)) {
+        return point;
+    }
+    let mut best = (f64::INFINITY, point);
+    for ring in patch.iter().flat_map(rings) {
+        for (&a, &b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
+            let t = ((point - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+            let foot = a + (b - a) * t;
+            if foot.distance(point) < best.0 {
+                best = (foot.distance(point), foot);
+            }
+        }
+    }
+    best.1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gripper::rectangle;
+
+    fn shape(ring: Vec<DVec2>) -> Polygon {
+        Polygon { outer: ring, holes: Vec::new() }
+    }
+
+    #[test]
+    fn positions_cover_a_rectangle_and_its_special_points() {
+        let face = [shape(rectangle(DVec2::new(0.1, 0.04)))];
+        let found = positions(&face, 0.01, 0.01, DVec2::new(0.2, 0.003));
+        // 11 x 5 grid points, corners among them; the point nearest the centre of mass is not
+        assert_eq!(found.len(), 56, "{found:?}");
+        assert!(found.iter().any(|point| point.distance(DVec2::new(0.05, 0.003)) < 1e-12));
+    }
+
+    #[test]
+    fn positions_leave_out_what_no_pad_reaches() {
+        let corners = [(-1., -1.), (1., -1.), (1., -0.9), (-0.9, -0.9), (-0.9, 1.), (-1., 1.)];
+        let l_shape = [shape(corners.iter().map(|&(x, y)| DVec2::new(x, y)).collect())];
+        let found = positions(&l_shape, 0.05, 0.1, DVec2::ZERO);
+        assert!(found.len() > 200 && found.len() < 900, "{}", found.len());
+        assert!(!found.iter().any(|point| point.min_element() > -0.5));
+    }
+
+    #[test]
+    fn the_main_direction_is_that_of_the_edges() {
+        for degrees in [-44.0_f64, -10.0, 0.0, 10.0, 44.0] {
+            let angle = degrees.to_radians();
+            let turned: Vec<DVec2> = rectangle(DVec2::new(3.0, 1.0)).iter().map(|&point| DVec2::from_angle(angle).rotate(point)).collect();
+            assert!((main_direction(&[shape(turned)]) - angle).abs() < 1e-9, "{degrees}");
+        }
+        let circle: Vec<DVec2> = (0..64).map(|k| DVec2::from_angle(f64::from(k) * std::f64::consts::TAU / 64.0)).collect();
+        assert_eq!(main_direction(&[shape(circle)]), 0.0);
+        let square = [shape(rectangle(DVec2::ONE).iter().map(|&point| DVec2::from_angle(0.2).rotate(point)).collect())];
+        let options = ProposeOptions { angle_step: std::f64::consts::FRAC_PI_2, ..ProposeOptions::default() };
+        let found = angles(&square, &options, 0.5);
+        assert_eq!(found.len(), 8, "{found:?}");
+    }
+}
