@@ -31,71 +31,31 @@ pub(super) struct Shell {
     pub high: DVec3,
 }
 
+/// What is known of a shell before its sense is.
 struct Draft {
     low: DVec3,
     high: DVec3,
-    area: f64,
-    reversed_area: f64,
     triangles: usize,
     /// Half-edges without a neighbour.
     loose: usize,
 }
 
 /// Labels the shells, makes their windings agree and turns them outward (hollows: out of the material, inward).
-/// Returns the shell of every triangle and the shells.
-/// Where anything was reversed `edges` must be found again.
+/// Returns the shell of every triangle and the shells. Where anything was reversed `edges` must be found again.
 pub(super) fn orient(mesh: &mut Mesh, edges: &Edges, apex: DVec3, health: &mut Health) -> (Vec<u32>, Vec<Shell>) {
-    let count = mesh.triangles.len();
-    let mut shell_of = vec![NONE; count];
-    let mut reversed = vec![false; count];
-    let mut drafts: Vec<Draft> = Vec::new();
-    let mut stack = Vec::new();
-    for seed in 0..count as u32 {
-        if shell_of[seed as usize] != NONE {
-            continue;
+    let (shell_of, reversed, count) = label(mesh, edges, health);
+    reverse_minority(mesh, &shell_of, &reversed, count, health);
+    let mut drafts: Vec<Draft> = (0..count).map(|_| Draft { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, triangles: 0, loose: 0 }).collect();
+    for (triangle, &shell) in shell_of.iter().enumerate() {
+        let draft = &mut drafts[shell as usize];
+        draft.triangles += 1;
+        for corner in mesh.corners(triangle as u32) {
+            draft.low = draft.low.min(corner);
+            draft.high = draft.high.max(corner);
         }
-        let shell = drafts.len() as u32;
-        let first = mesh.vertices[mesh.triangles[seed as usize][0] as usize];
-        let mut draft = Draft { low: first, high: first, area: 0.0, reversed_area: 0.0, triangles: 0, loose: 0 };
-        shell_of[seed as usize] = shell;
-        stack.push(seed);
-        while let Some(triangle) = stack.pop() {
-            let corners = mesh.corners(triangle);
-            let area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
-            let turned = reversed[triangle as usize];
-            draft.area += area;
-            draft.triangles += 1;
-            draft.reversed_area += if turned { area } else { 0.0 };
-            for (corner, half) in corners.into_iter().zip(triangle * 3..) {
-                draft.low = draft.low.min(corner);
-                draft.high = draft.high.max(corner);
-                let twin = edges.twin[half as usize];
-                if twin == NONE {
-                    continue;
-                }
-                let other = (twin / 3) as usize;
-                let wanted = turned ^ (ends(&mesh.triangles, half).0 == ends(&mesh.triangles, twin).0);
-                if shell_of[other] == NONE {
-                    shell_of[other] = shell;
-                    reversed[other] = wanted;
-                    stack.push(other as u32);
-                } else if reversed[other] != wanted && half < twin {
-                    health.one_sided_edges += 1;
-                }
-            }
-        }
-        drafts.push(draft);
     }
     for &half in edges.open.iter().chain(&edges.unpaired) {
         drafts[shell_of[(half / 3) as usize] as usize].loose += 1;
-    }
-    // The winding of most of a shell's area is taken for the file's; the rest of it is reversed.
-    for (index, triangle) in mesh.triangles.iter_mut().enumerate() {
-        let draft = &drafts[shell_of[index] as usize];
-        if reversed[index] ^ (draft.reversed_area > draft.area / 2.0) {
-            triangle.swap(1, 2);
-            health.windings_reversed += 1;
-        }
     }
     let members = Members::new(&shell_of, drafts.len());
     let mut shells: Vec<Shell> = (0..drafts.len())
@@ -126,6 +86,68 @@ pub(super) fn orient(mesh: &mut Mesh, edges: &Edges, apex: DVec3, health: &mut H
     }
     health.shells = shells.len();
     (shell_of, shells)
+}
+
+/// Walks over the neighbours: the shell of each triangle, whether its winding disagrees with that of its shell's first
+/// triangle (empty when none does), and the number of shells.
+fn label(mesh: &Mesh, edges: &Edges, health: &mut Health) -> (Vec<u32>, Vec<bool>, usize) {
+    let count = mesh.triangles.len();
+    let disagree = |half: u32, twin: u32| ends(&mesh.triangles, half).0 == ends(&mesh.triangles, twin).0;
+    let consistent = (0..3 * count as u32).all(|half| {
+        let twin = edges.twin[half as usize];
+        twin == NONE || twin < half || !disagree(half, twin)
+    });
+    let mut shell_of = vec![NONE; count];
+    let mut reversed = vec![false; if consistent { 0 } else { count }];
+    let mut shells = 0;
+    let mut stack = Vec::new();
+    for seed in 0..count as u32 {
+        if shell_of[seed as usize] != NONE {
+            continue;
+        }
+        shell_of[seed as usize] = shells;
+        stack.push(seed);
+        while let Some(triangle) = stack.pop() {
+            for half in triangle * 3..triangle * 3 + 3 {
+                let twin = edges.twin[half as usize];
+                if twin == NONE {
+                    continue;
+                }
+                let other = (twin / 3) as usize;
+                let wanted = !consistent && (reversed[triangle as usize] ^ disagree(half, twin));
+                if shell_of[other] == NONE {
+                    shell_of[other] = shells;
+                    if wanted {
+                        reversed[other] = true;
+                    }
+                    stack.push(other as u32);
+                } else if !consistent && reversed[other] != wanted && half < twin {
+                    health.one_sided_edges += 1;
+                }
+            }
+        }
+        shells += 1;
+    }
+    (shell_of, reversed, shells as usize)
+}
+
+/// Makes the windings of each shell agree: that of most of its area is taken for the file's.
+fn reverse_minority(mesh: &mut Mesh, shell_of: &[u32], reversed: &[bool], shells: usize, health: &mut Health) {
+    if reversed.is_empty() {
+        return;
+    }
+    let mut balance = vec![0.0; shells]; // area that keeps its winding minus area that does not
+    for (triangle, &shell) in shell_of.iter().enumerate() {
+        let [a, b, c] = mesh.corners(triangle as u32);
+        let area = (b - a).cross(c - a).length();
+        balance[shell as usize] += if reversed[triangle] { -area } else { area };
+    }
+    for (index, triangle) in mesh.triangles.iter_mut().enumerate() {
+        if reversed[index] ^ (balance[shell_of[index] as usize] < 0.0) {
+            triangle.swap(1, 2);
+            health.windings_reversed += 1;
+        }
+    }
 }
 
 /// Volume whose sign tells the sense of a shell. An open one has no volume of its own: about the middle of its box the

@@ -1,11 +1,12 @@
 //! Antiparallel face pairs.
 
 use glam::{DVec2, DVec3};
-use rustc_hash::FxHashMap;
+use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 
 use super::{FacePair, Mesh, PairKind, PlanarFace};
-use crate::geometry::overlay::intersect;
-use crate::geometry::polygon::{self, patch_moments};
+use crate::geometry::polygon::{self, Moments, patch_moments, rings_moments};
+use crate::geometry::{clip_ring_convex, intersect, is_convex};
 use crate::model::{Polygon, Ring};
 
 /// Angle between one face and the reverse of the other up to which they count as antiparallel: 0.5 degrees, what the
@@ -20,26 +21,33 @@ pub(super) fn area_floor(mesh: &Mesh) -> f64 {
 
 /// Pairs of the given kind with widths in `min_width..=max_width` and an overlap above `floor`, by falling overlap.
 pub(super) fn pairs(faces: &[PlanarFace], kind: PairKind, min_width: f64, max_width: f64, floor: f64) -> Vec<FacePair> {
-    let index = NormalIndex::new(faces);
+    let boxes: Vec<Aabb> = faces.iter().map(bounding_box).collect();
+    let Some(whole) = boxes.iter().copied().reduce(|sum, next| sum.merged(&next)) else { return Vec::new() };
+    let (min_width, max_width) = (min_width.max(0.0), max_width.min(2.0 * whole.half_extents().length()));
+    if min_width > max_width {
+        return Vec::new();
+    }
+    let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
+    let convex: Vec<bool> = faces.iter().map(|face| matches!(face.polygons.as_slice(), [only] if only.holes.is_empty() && is_convex(&only.outer))).collect();
+    let sign = if kind == PairKind::External { 1.0 } else { -1.0 };
+    let antiparallel = ANTIPARALLEL.cos();
     let mut found = Vec::new();
     for face in faces.iter().filter(|face| face.reachable) {
-        for other in index.near(-face.normal) {
+        // Where a partner must lie: the face moved against its normal by the widths asked for, and the tilt allowed for.
+        let own = &boxes[face.id as usize];
+        let slack = ANTIPARALLEL * (2.0 * own.half_extents().length() + max_width) + max_width * 1e-9;
+        let (near, far) = (-sign * min_width * face.normal, -sign * max_width * face.normal);
+        let reach = Aabb::new(own.mins + near.min(far) - slack, own.maxs + near.max(far) + slack);
+        for other in tree.intersect_aabb(&reach) {
             let other = &faces[other as usize];
-            if other.id <= face.id || !other.reachable || face.normal.dot(-other.normal) < ANTIPARALLEL.cos() {
+            if other.id <= face.id || !other.reachable || -face.normal.dot(other.normal) < antiparallel {
                 continue;
             }
-            // Cheap bound first: the width at the centroids, off by the tilt over the faces' size.
             let axis = (face.normal - other.normal).normalize();
-            let slack = ANTIPARALLEL * (face.centroid - other.centroid).length();
-            let sign = if kind == PairKind::External { 1.0 } else { -1.0 };
-            let width = sign * axis.dot(face.centroid - other.centroid);
-            if width < min_width - slack || width > max_width + slack {
-                continue;
-            }
-            if let Some((width, overlap_area)) = overlap(face, other, axis)
+            if let Some((width, overlap_area)) = overlap(face, other, axis, &convex)
                 && overlap_area > floor
-                && (min_width..=max_width).contains(&(sign * width))
                 && sign * width > 0.0
+                && (min_width..=max_width).contains(&(sign * width))
             {
                 found.push(FacePair { face_i: face.id, face_ii: other.id, width: sign * width, overlap_area, kind });
             }
@@ -49,8 +57,13 @@ pub(super) fn pairs(faces: &[PlanarFace], kind: PairKind, min_width: f64, max_wi
     found
 }
 
+fn bounding_box(face: &PlanarFace) -> Aabb {
+    let points = face.polygons.iter().flat_map(|polygon| &polygon.outer).map(|point| face.part_from_face.point(point.extend(0.0)));
+    points.fold(Aabb::new_invalid(), |sum, point| Aabb::new(sum.mins.min(point), sum.maxs.max(point)))
+}
+
 /// Signed distance of the faces along `axis` at the middle of their overlap (positive: material between), and its area.
-fn overlap(face: &PlanarFace, other: &PlanarFace, axis: DVec3) -> Option<(f64, f64)> {
+fn overlap(face: &PlanarFace, other: &PlanarFace, axis: DVec3, convex: &[bool]) -> Option<(f64, f64)> {
     let frame = face.part_from_face;
     let place = |point: &DVec2| frame.point_inverse(other.part_from_face.point(point.extend(0.0))).truncate();
     let ring = |ring: &Ring| ring.iter().map(place).collect::<Ring>();
@@ -61,38 +74,25 @@ fn overlap(face: &PlanarFace, other: &PlanarFace, axis: DVec3) -> Option<(f64, f
     if !own_box.meets(their_box) {
         return None;
     }
-    let common = patch_moments(&intersect(&face.polygons, &theirs));
+    // Clipping against a convex face is exact for integrals and far cheaper than the general case.
+    let clipped = |rings: &[Polygon], window: &Ring| {
+        let rings: Vec<Ring> = rings.iter().flat_map(polygon::rings).map(|ring| clip_ring_convex(ring, window)).collect();
+        rings_moments(&rings.iter().map(Vec::as_slice).collect::<Vec<_>>())
+    };
+    let common = if convex[face.id as usize] {
+        let moments = clipped(&theirs, &face.polygons[0].outer);
+        Moments { area: -moments.area, ..moments } // their rings are reversed
+    } else if convex[other.id as usize] {
+        let mut window = theirs[0].outer.clone();
+        window.reverse();
+        clipped(&face.polygons, &window)
+    } else {
+        patch_moments(&intersect(&face.polygons, &theirs))
+    };
     if common.area <= 0.0 {
         return None;
     }
     let middle = frame.point(common.centroid.extend(0.0));
     let on_plane = |plane: &PlanarFace| (plane.offset - plane.normal.dot(middle)) / plane.normal.dot(axis);
     Some((on_plane(face) - on_plane(other), common.area))
-}
-
-/// Faces by direction: cells of the cube around the unit sphere, wide enough that near directions share a cell or are neighbours.
-struct NormalIndex {
-    cells: FxHashMap<[i32; 3], Vec<u32>>,
-}
-
-impl NormalIndex {
-    const CELL: f64 = 2.0 * ANTIPARALLEL;
-
-    fn new(faces: &[PlanarFace]) -> Self {
-        let mut cells: FxHashMap<[i32; 3], Vec<u32>> = FxHashMap::default();
-        for face in faces {
-            cells.entry(Self::cell(face.normal)).or_default().push(face.id);
-        }
-        Self { cells }
-    }
-
-    fn cell(direction: DVec3) -> [i32; 3] {
-        direction.to_array().map(|x| (x / Self::CELL).round() as i32)
-    }
-
-    /// Faces whose normals may be within [`ANTIPARALLEL`] of `direction`.
-    fn near(&self, direction: DVec3) -> impl Iterator<Item = u32> + '_ {
-        let [x, y, z] = Self::cell(direction);
-        (0..27).filter_map(move |n| self.cells.get(&[x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1])).flatten().copied()
-    }
 }

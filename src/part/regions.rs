@@ -5,7 +5,7 @@
 //! The angle is widened for a narrow triangle by what the uncertainty of its corners can tilt it: refining a plane in
 //! 32-bit floats leaves slivers whose normals point anywhere. The plane is refitted each time the region has doubled.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use nalgebra::Matrix3;
 
 use super::Mesh;
@@ -45,16 +45,21 @@ struct Sums {
     area: f64,
     vector: DVec3,
     first: DVec3,
-    second: DMat3,
+    /// Second moments xx, yy, zz and yz, zx, xy.
+    squares: DVec3,
+    products: DVec3,
+}
+
+fn cyclic(v: DVec3) -> DVec3 {
+    DVec3::new(v.y * v.z, v.z * v.x, v.x * v.y)
 }
 
 impl Sums {
     fn new(reference: DVec3) -> Self {
-        Self { reference, area: 0.0, vector: DVec3::ZERO, first: DVec3::ZERO, second: DMat3::ZERO }
+        Self { reference, area: 0.0, vector: DVec3::ZERO, first: DVec3::ZERO, squares: DVec3::ZERO, products: DVec3::ZERO }
     }
 
-    fn add(&mut self, corners: [DVec3; 3], twice_normal: DVec3) {
-        let area = twice_normal.length() / 2.0;
+    fn add(&mut self, corners: [DVec3; 3], twice_normal: DVec3, area: f64) {
         self.area += area;
         self.vector += twice_normal / 2.0;
         let [a, b, c] = corners.map(|corner| corner - self.reference);
@@ -62,9 +67,8 @@ impl Sums {
         self.first += area / 3.0 * sum;
         // int x x^T over a triangle = A/12 (aa^T + bb^T + cc^T + ss^T), s the sum of the corners.
         let weight = area / 12.0;
-        for v in [a, b, c, sum] {
-            self.second += DMat3::from_cols(v * v.x, v * v.y, v * v.z) * weight;
-        }
+        self.squares += weight * (a * a + b * b + c * c + sum * sum);
+        self.products += weight * (cyclic(a) + cyclic(b) + cyclic(c) + cyclic(sum));
     }
 
     fn centre(&self) -> DVec3 {
@@ -75,8 +79,10 @@ impl Sums {
     fn fit(&self, uncertainty: f64) -> Option<Plane> {
         let outward = self.vector.try_normalize()?;
         let mean = self.first / self.area;
-        let covariance = self.second * (1.0 / self.area) - DMat3::from_cols(mean * mean.x, mean * mean.y, mean * mean.z);
-        let eigen = Matrix3::from_column_slice(&covariance.to_cols_array()).symmetric_eigen();
+        let squares = self.squares / self.area - mean * mean;
+        let products = self.products / self.area - cyclic(mean);
+        let covariance = Matrix3::new(squares.x, products.z, products.y, products.z, squares.y, products.x, products.y, products.x, squares.z);
+        let eigen = covariance.symmetric_eigen();
         let mut order = [0, 1, 2];
         order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
         let axis = eigen.eigenvectors.column(order[0]);
@@ -137,7 +143,7 @@ pub(super) fn grow(part: &Repaired, flatness: Flatness) -> Regions {
         let corners = mesh.corners(seed);
         let cross = twice_normal(corners);
         let mut sums = Sums::new(corners[0]);
-        sums.add(corners, cross);
+        sums.add(corners, cross, cross.length() / 2.0);
         region_of[seed as usize] = number;
         order.push(seed);
         let Some(mut plane) = sums.fit(uncertainty) else {
@@ -209,10 +215,11 @@ fn take(mesh: &Mesh, triangle: u32, plane: &Plane, distance: f64, uncertainty: f
     // Altitude over the longest edge: corners off by u tilt the triangle by up to 2 u / altitude.
     let allowed = ANGLE + plane.tilt + 2.0 * uncertainty * longest / twice_area.max(f64::MIN_POSITIVE);
     // A sliver narrower than the uncertainty has no direction: the distance alone decides.
-    if allowed < 1.0 && cross.dot(plane.normal) < allowed.cos() * twice_area {
+    // 1 - x^2/2 is below the cosine by less than x^4/24: nothing at the angles in question.
+    if allowed < 1.0 && cross.dot(plane.normal) < (1.0 - allowed * allowed / 2.0) * twice_area {
         return false;
     }
-    sums.add(corners, cross);
+    sums.add(corners, cross, twice_area / 2.0);
     true
 }
 

@@ -24,13 +24,23 @@ pub(super) const MAX_TRIANGLES: usize = 1 << 30;
 ///
 /// An open-addressing table of vertex numbers: one probe costs one cache line of it and one of the vertices, and
 /// neighbouring triangles hit the same ones.
-#[derive(Default)]
 pub(super) struct Welder {
     vertices: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     /// Vertex number plus one; 0 is free. The length is a power of two, at most half full.
     table: Vec<u32>,
+    /// Corners of the last triangles, oldest overwritten: files list neighbours one after the other, so that more than
+    /// half of all corners are found here without a probe of the table.
+    recent: [(DVec3, u32); 6],
+    next_recent: usize,
     read: usize,
+}
+
+impl Default for Welder {
+    fn default() -> Self {
+        // A vertex number that does not exist yet marks an empty place among the recent corners.
+        Self { vertices: Vec::new(), triangles: Vec::new(), table: Vec::new(), recent: [(DVec3::ZERO, u32::MAX); 6], next_recent: 0, read: 0 }
+    }
 }
 
 impl Welder {
@@ -53,6 +63,16 @@ impl Welder {
     fn vertex(&mut self, position: DVec3) -> u32 {
         // Adding +0.0 turns -0.0 into 0.0, so equal values have equal bits.
         let position = position + DVec3::ZERO;
+        if let Some(&(_, vertex)) = self.recent.iter().find(|(recent, vertex)| *recent == position && (*vertex as usize) < self.vertices.len()) {
+            return vertex;
+        }
+        let vertex = self.probe(position);
+        self.recent[self.next_recent] = (position, vertex);
+        self.next_recent = (self.next_recent + 1) % self.recent.len();
+        vertex
+    }
+
+    fn probe(&mut self, position: DVec3) -> u32 {
         if self.vertices.len() * 2 >= self.table.len() {
             self.grow();
         }
