@@ -61,7 +61,9 @@ impl Quantity {
         let Some(factor) = self.units().iter().find(|known| known.0 == unit).map(|known| known.1) else {
             return Err(Error::input(place, format!("'{text}': unknown unit '{unit}'"), format!("use one of: {}", list())));
         };
-        let si = value * factor;
+        // 350 g is 350/1000 kg to the last digit, which 350 * 1e-3 is not.
+        let inverse = (1.0 / factor).round();
+        let si = if factor < 1.0 && (inverse * factor - 1.0).abs() < 1e-15 { value / inverse } else { value * factor };
         if !si.is_finite() {
             return Err(Error::input(place, format!("'{text}' is not a finite value"), "give a finite number"));
         }

@@ -32,4 +32,4 @@ export GRIPFAST_GPU=require GRIPFAST_READERS=require
 
 cargo fmt --check
 cargo clippy --all-targets --features full --quiet -- -D warnings
-cargo test --features full
+cargo test --features full --no-fail-fast

@@ -15,7 +15,7 @@ pub(crate) struct CandidateArgs {
     /// Step of the approach angle.
     #[arg(long, default_value = "15deg")]
     angle_step: String,
-    /// Smallest contact area on either face, as a share of the pad's area.
+    /// Smallest contact area on either face, as a share of the most that the face pair allows (pad or overlap).
     #[arg(long, default_value_t = 0.25, value_name = "SHARE")]
     min_contact: f64,
     /// Largest distance of the grip from the centre of mass.
@@ -33,9 +33,6 @@ pub(crate) struct CandidateArgs {
     /// Only these planar faces, e.g. 0,1,4 (see `gripfast part`).
     #[arg(long, value_delimiter = ',', value_name = "FACES")]
     faces: Option<Vec<u32>>,
-    /// Also grips that open into a slot (needs a gripper with outer pads).
-    #[arg(long)]
-    inside: bool,
     /// List each grip with exchanged jaws as well.
     #[arg(long)]
     flips: bool,
@@ -59,7 +56,6 @@ impl CandidateArgs {
             ground: self.ground.as_deref().map(ground).transpose()?,
             keep_out: self.keep_out.iter().map(|text| keep_out(text)).collect::<Result<_>>()?,
             faces: self.faces.clone(),
-            inside: self.inside,
             flips: self.flips,
             opening: length("--opening", &self.opening)?,
             clearance: length("--clearance", &self.clearance)?,
@@ -81,7 +77,6 @@ impl CandidateArgs {
             ("max_offset_m", options.max_offset.into()),
             ("opening_m", options.opening.into()),
             ("clearance_m", options.clearance.into()),
-            ("inside", options.inside.into()),
             ("flips", options.flips.into()),
         ]
     }

@@ -68,7 +68,6 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 /// What was proposed in the run, as far as it decides about one pose.
 fn options(set: &GripSet) -> ProposeOptions {
     let number = |name: &str| set.provenance.settings.get(name).and_then(serde_json::Value::as_f64);
-    let flag = |name: &str| set.provenance.settings.get(name).and_then(serde_json::Value::as_bool).unwrap_or(false);
     let defaults = ProposeOptions::default();
     ProposeOptions {
         spacing: number("spacing_m"),
@@ -77,7 +76,6 @@ fn options(set: &GripSet) -> ProposeOptions {
         max_offset: number("max_offset_m"),
         opening: number("opening_m").unwrap_or(defaults.opening),
         clearance: number("clearance_m").unwrap_or(defaults.clearance),
-        inside: flag("inside"),
         ..defaults
     }
 }
