@@ -5,6 +5,7 @@
 //! would turn a triangle over or pinch the surface is refused. Nothing here feeds the mechanics.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// Smallest cosine between a triangle's normal before and after a collapse; keeps the surface from folding.
 const FLIP_COSINE: f64 = 0.25;
@@ -119,7 +120,7 @@ fn quadrics(points: &[DVec3], triangles: &[[u32; 3]]) -> Vec<Quadric> {
             edges.push((a.min(b), a.max(b), index as u32));
         }
     }
-    edges.sort_unstable();
+    edges.par_sort_unstable();
     for run in edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).filter(|run| run.len() == 1) {
         let (a, b, t) = run[0];
         let along = points[b as usize] - points[a as usize];
@@ -156,22 +157,27 @@ impl Marks {
 /// One round of collapses; false when none was possible.
 fn pass(points: &[DVec3], quadrics: &mut [Quadric], live: &mut Vec<[u32; 3]>, budget: usize, marks: &mut Marks) -> bool {
     let stars = Stars::new(points.len(), live);
-    let mut candidates: Vec<(f64, u32, u32)> = Vec::new();
-    for v0 in 0..points.len() as u32 {
-        let mut best = (f64::INFINITY, v0, v0);
-        for &v1 in stars.of(v0).iter().flat_map(|&t| &live[t as usize]).filter(|&&v1| v1 != v0) {
+    let cheapest = |v0: u32| {
+        // The next corner of each triangle: every neighbour once, but for one at an open boundary.
+        let neighbours = stars.of(v0).iter().map(|&t| {
+            let t = live[t as usize];
+            if t[0] == v0 {
+                t[1]
+            } else if t[1] == v0 {
+                t[2]
+            } else {
+                t[0]
+            }
+        });
+        let cost = |v1: u32| {
             let (p0, p1) = (points[v0 as usize], points[v1 as usize]);
             let length = p0.distance_squared(p1);
-            let cost = quadrics[v0 as usize].at(p1) + quadrics[v1 as usize].at(p1) + LENGTH_WEIGHT * length * length;
-            if cost < best.0 {
-                best = (cost, v0, v1);
-            }
-        }
-        if best.0.is_finite() {
-            candidates.push(best);
-        }
-    }
-    candidates.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            quadrics[v0 as usize].at(p1) + quadrics[v1 as usize].at(p1) + LENGTH_WEIGHT * length * length
+        };
+        neighbours.map(|v1| (cost(v1), v0, v1)).filter(|candidate| candidate.0.is_finite()).min_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    let mut candidates: Vec<(f64, u32, u32)> = (0..points.len() as u32).into_par_iter().filter_map(cheapest).collect();
+    candidates.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     // Costly collapses wait until the cheap ones, which this pass's neighbours still block, have had their turn.
     let wanted = live.len() - budget;
     let limit = candidates.get((wanted / 2).max(candidates.len() / 4)).map_or(f64::INFINITY, |candidate| candidate.0);

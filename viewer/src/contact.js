@@ -2,7 +2,7 @@
 // The pressure is a plane, so an SVG gradient along its slope shows it exactly.
 
 import { css, gradient, pressure as scale } from './colour.js';
-import { mm, niceStep, number, pressureUnit } from './format.js';
+import { inMm, niceStep, number, pressureUnit } from './format.js';
 
 const SVG = 'http://www.w3.org/2000/svg';
 const STOPS = 24;
@@ -97,7 +97,7 @@ export function drawContact(root, report, i) {
 }
 
 function slipWords(slip) {
-  if (slip.type === 'rotation') return `Would slip by turning about the centre (${mm(slip.c[0])}, ${mm(slip.c[1])}); arrows: friction on the part.`;
+  if (slip.type === 'rotation') return `Would slip by turning about the centre (${inMm(slip.c[0])}, ${inMm(slip.c[1])})\u00a0mm; arrows: friction on the part.`;
   if (slip.type === 'translation') return 'Would slip straight, without turning; arrows: friction on the part.';
   if (slip.type === 'none') return 'No load in the pad plane: nothing slips at any friction.';
   return 'No slip limit was found for this load.';

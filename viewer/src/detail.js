@@ -6,7 +6,7 @@ import { chosen, count, degrees, mm, newtons, NONE, number, percent, words } fro
 import { facts } from './run.js';
 
 export const STATUS = {
-  ok: ['Holds', 'good', 'A slip limit exists; no other was found.'],
+  ok: ['Slip limit found', 'good', 'A slip limit exists; no other was found.'],
   separating: ['Separating', 'fair', 'Part of the pads lifts off; such grips were to be discarded.'],
   ambiguous: ['Ambiguous', 'fair', 'A slip limit was found, but another one exists or could not be excluded.'],
   twisted_out: ['Twists out', 'bad', 'No slip limit exists for this load: the contact twists out.'],
@@ -16,9 +16,23 @@ export const STATUS = {
 };
 
 export const statusOf = (name) => STATUS[name] ?? [words(name), 'fair', ''];
+
+/** What the status means with the pads' friction, where that is known: name, kind, explanation. */
+export function verdict(report, i) {
+  const known = statusOf(report.status(i));
+  if (report.status(i) !== 'ok' || !report.header.gripper?.pad_friction) return known;
+  const [mu, safety] = [report.column.mu[i], report.column.safety[i]];
+  if (mu === 0 || safety >= 1) return ['Holds', 'good', ''];
+  return ['Slips', 'bad', 'The worst load needs more friction than the pads have at this gripping force.'];
+}
+
 const LOADS_SHOWN = 6;
 
-const vectorText = (values, factor, unit) => `(${values.map((v) => number(v * factor)).join(', ')})\u00a0${unit}`;
+/** Components that are nothing but rounding beside the largest one are zeros. */
+function vectorText(values, factor, unit) {
+  const least = 1e-9 * Math.max(...values.map(Math.abs));
+  return `(${values.map((v) => number(Math.abs(v) < least ? 0 : v * factor)).join(', ')})\u00a0${unit}`;
+}
 
 /** Quaternion (x, y, z, w) of orthonormal columns. */
 function quaternion({ x1, x2, x3 }) {
@@ -56,14 +70,14 @@ export class Detail {
   show(i) {
     const { report } = this;
     const c = report.column;
-    const [name, kind, meaning] = statusOf(report.status(i));
+    const [name, kind, meaning] = verdict(report, i);
     this.find('.grip-title').textContent = `Grip ${count(c.rank[i])}`;
     const pill = this.find('.pill');
     pill.className = `pill ${kind}`;
     pill.textContent = name;
     this.root.querySelectorAll('.pad-face').forEach((place, face) => (place.textContent = `on face ${c[face ? 'face_ii' : 'face_i'][i]}`));
     this.find('.grip-sub').textContent = `${c.inside[i] ? 'From inside, faces' : 'Faces'} ${c.face_i[i]} and ${c.face_ii[i]}, id ${c.id[i]}${Number.isFinite(c.flip_of[i]) ? `, jaws exchanged of ${c.flip_of[i]}` : ''}`;
-    this.find('.meaning').textContent = report.status(i) === 'ok' ? '' : meaning;
+    this.find('.meaning').textContent = kind === 'good' ? '' : meaning;
     this.numbers(i);
     drawContact(this.find('.contact'), report, i);
     this.loads(i);
@@ -119,7 +133,10 @@ export class Detail {
     canvas.setAttribute('aria-label', range
       ? `Friction needed over ${count(header.loads.length)} loads: ${number(range.low)} to ${number(range.high)}, worst under ${header.loads[worst].name}`
       : `Worst load ${header.loads[worst].name}; the table of all loads was not stored`);
-    this.find('.ball-note').textContent = values ? 'A point of the ball is the direction in which a load pushes the part; it turns with the view.' : 'Only the worst load of this grip was stored.';
+    const sizes = header.loads.map((load) => Math.hypot(...load.wrench.force)).filter((size) => size > 0);
+    const [least, most] = [Math.min(...sizes), Math.max(...sizes)];
+    const strength = most > 1.02 * least ? ` The loads differ in size: ${number(least)} to ${newtons(most)}.` : '';
+    this.find('.ball-note').textContent = values ? `A point of the ball is the direction in which a load pushes the part; it turns with the view.${strength}` : 'Only the worst load of this grip was stored.';
     const body = this.find('.loads tbody');
     body.replaceChildren();
     const order = values ? [...values.keys()].sort((a, b) => (Number.isFinite(values[b]) ? values[b] : Infinity) - (Number.isFinite(values[a]) ? values[a] : Infinity) || (a === worst ? -1 : b === worst ? 1 : a - b)) : [worst];

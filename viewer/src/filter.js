@@ -1,5 +1,6 @@
 // Which grips are listed, and in which order.
 
+import { verdict } from './detail.js';
 import { words } from './format.js';
 
 /** Sort keys: name shown, value of a grip (smaller first), and the direction that puts the good ones on top. */
@@ -36,7 +37,7 @@ let haystack;
 function searchable(report) {
   haystack ??= Array.from({ length: report.n }, (_, i) => {
     const c = report.column;
-    return `#${c.rank[i]} id ${c.id[i]} faces ${c.face_i[i]}/${c.face_ii[i]} ${words(report.status(i))} ${report.load(i).name}`.toLowerCase();
+    return `#${c.rank[i]} id ${c.id[i]} faces ${c.face_i[i]}/${c.face_ii[i]} ${words(report.status(i))} ${verdict(report, i)[0]} ${report.load(i).name}`.toLowerCase();
   });
   return haystack;
 }

@@ -32,7 +32,9 @@ export const fixed = (value, decimals) => (Number.isFinite(value) ? value.toFixe
 /** Whole numbers with thin spaces between thousands. */
 export const count = (value) => String(Math.round(value)).replace(/\B(?=(\d{3})+$)/g, '\u202f');
 
-export const mm = (metres, digits = 3) => (Number.isFinite(metres) ? `${number(metres * 1e3, digits)}\u00a0mm` : NONE);
+/** Metres as millimetres without unit; below a thousandth of a micrometre there is only rounding. */
+export const inMm = (metres, digits = 3) => number(Math.abs(metres) < 1e-9 ? 0 : metres * 1e3, digits);
+export const mm = (metres, digits = 3) => (Number.isFinite(metres) ? `${inMm(metres, digits)}\u00a0mm` : NONE);
 export const degrees = (radians, digits = 3) => (Number.isFinite(radians) ? `${number((radians * 180) / Math.PI, digits)}\u00b0` : NONE);
 export const newtons = (value, digits = 3) => (Number.isFinite(value) ? `${number(value, digits)}\u00a0N` : NONE);
 export const percent = (value) => (Number.isFinite(value) ? `${fixed(value * 100, value > 0.9995 || value < 0.0005 ? 0 : 1)}\u00a0%` : NONE);
@@ -47,7 +49,7 @@ export function pressureUnit(largest) {
 
 /** `part_interference` -> `Part interference`. */
 export const words = (name) => {
-  const text = String(name).replaceAll('_', ' ');
+  const text = String(name).replaceAll('_', ' ').replace(/:(?=\S)/g, ': ');
   return text.charAt(0).toUpperCase() + text.slice(1);
 };
 

@@ -3,7 +3,7 @@
 import { LoadBall } from './ball.js';
 import { css, friction, frictionScale } from './colour.js';
 import { load } from './data.js';
-import { Detail, statusOf } from './detail.js';
+import { Detail, statusOf, verdict } from './detail.js';
 import { EMPTY, pairName, pairs, select, sortKeys } from './filter.js';
 import { count, fixed, number } from './format.js';
 import { Histogram } from './histogram.js';
@@ -52,12 +52,15 @@ async function start() {
   $('#columns').querySelector('[data-key="squeeze"]').dataset.key = third;
   if (!squeeze) $('#columns').querySelector('[data-key="alpha"]').textContent = 'Tilt, \u00b0';
 
+  // As many decimals as the middle grip needs for three digits.
+  const middle = Float32Array.from(report.column.mu).filter((mu) => mu > 0).sort();
+  const decimals = middle.length ? Math.min(Math.max(2 - Math.floor(Math.log10(middle[middle.length >> 1])), 3), 6) : 3;
   const list = new VirtualList($('#list'), {
     fill(row, position) {
       const i = state.order[position];
       const c = report.column;
       const mu = c.mu[i];
-      const [status, kind] = statusOf(report.status(i));
+      const [status, kind] = verdict(report, i);
       row.replaceChildren();
       const cell = (className, text) => {
         const span = document.createElement('span');
@@ -67,7 +70,7 @@ async function start() {
         return span;
       };
       cell('rank', count(c.rank[i]));
-      const needed = cell('mu', Number.isFinite(mu) ? fixed(mu, 3) : '\u2013');
+      const needed = cell('mu', Number.isFinite(mu) ? fixed(mu, decimals) : '\u2013');
       needed.style.setProperty('--swatch', Number.isFinite(mu) ? css(friction(scale.at(mu))) : 'transparent');
       const value = squeeze ? c.force_needed[i] : (c.alpha[i] * 180) / Math.PI;
       cell('number', fixed(value, value < 99.95 ? 1 : 0));
@@ -85,7 +88,7 @@ async function start() {
     view?.setGrip(i, glide);
     detail.show(i);
     const c = report.column;
-    $('#said').textContent = `Grip ${c.rank[i]}: friction needed ${number(c.mu[i])}, ${statusOf(report.status(i))[0]}`;
+    $('#said').textContent = `Grip ${c.rank[i]}: friction needed ${number(c.mu[i])}, ${verdict(report, i)[0]}`;
     history.replaceState(null, '', `#grip=${c.id[i]}`);
   }
 

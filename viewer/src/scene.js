@@ -162,7 +162,7 @@ export class View {
     }
     this.dotIndex = new Uint32Array(2 * n);
     geometry.setIndex(new BufferAttribute(this.dotIndex, 1));
-    const material = new PointsMaterial({ size: 7, sizeAttenuation: false, vertexColors: true, map: dotTexture(), alphaTest: 0.35, transparent: true });
+    const material = new PointsMaterial({ size: n < 400 ? 7 : n < 3000 ? 6 : 4.5, sizeAttenuation: false, vertexColors: true, map: dotTexture(), alphaTest: 0.35, transparent: true });
     // Dots lie in the part's faces: a little towards the viewer, the faces no longer cut them.
     const lift = (0.025 * this.radius).toExponential(6);
     material.onBeforeCompile = (shader) => {
