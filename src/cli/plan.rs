@@ -384,21 +384,7 @@ fn print(out: &mut impl Write, set: &GripSet, args: &Args, gripper: &Gripper, fo
     let shown: Vec<&RankedGrip> = if args.diverse { rank::choose_diverse(&set.grips, args.top, diagonal) } else { set.grips.iter().take(args.top).collect() };
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
-    table.set_header([
-        "rank",
-        "id",
-        "mu_s",
-        "safety",
-        "force needed",
-        "worst load",
-        "slip centre mm",
-        "contact",
-        "alpha",
-        "score",
-        "width mm",
-        "position mm",
-        "approach",
-    ]);
+    table.set_header(["rank", "id", "mu_s", "safety", "force needed", "worst load", "slip centre mm", "contact", "alpha", "score", "width mm", "position mm"]);
     for grip in shown {
         table.add_row(row(grip, set));
     }
