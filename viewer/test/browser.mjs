@@ -25,6 +25,7 @@ const browser = await chromium.launchPersistentContext(profile, {
 /** A page at its address with everything that may go wrong noted. */
 async function open(path, { width = 1440, height = 900, scheme = 'light', hash = '' } = {}) {
   const page = await browser.newPage();
+  page.setDefaultTimeout(180_000);
   page.trouble = [];
   page.requests = [];
   page.on('console', (message) => ['error', 'warning'].includes(message.type()) && page.trouble.push(message.text()));
@@ -45,7 +46,7 @@ async function open(path, { width = 1440, height = 900, scheme = 'light', hash =
   const session = await page.context().newCDPSession(page);
   await session.send('Performance.enable', { timeDomain: 'threadTicks' });
   await page.goto(address);
-  await page.waitForFunction(() => document.documentElement.dataset.ready, null, { timeout: 120_000 });
+  await page.waitForFunction(() => document.documentElement.dataset.ready, null, { timeout: 180_000 });
   const metrics = Object.fromEntries((await session.send('Performance.getMetrics')).metrics.map(({ name, value }) => [name, value]));
   page.work = metrics.TaskDuration;
   page.address = address;
@@ -83,7 +84,7 @@ const moved = (a, b) => a.some((value, i) => Math.abs(value - b[i]) > 1e-3);
 /** Until the jaws have arrived and the last frame is drawn. */
 const rest = async (page) => {
   await page.waitForTimeout(50);
-  await page.waitForFunction(() => !window.gripfast.view.moving && !window.gripfast.view.pending, null, { timeout: 20_000 });
+  await page.waitForFunction(() => !window.gripfast.view.moving && !window.gripfast.view.pending, null, { timeout: 120_000 });
 };
 
 async function wholePage() {
