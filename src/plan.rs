@@ -122,7 +122,8 @@ impl Assessor<'_> {
         let options = Options { separation: self.settings.score.separation, ..Options::default() };
         grips.par_iter_mut().for_each(|ranked| {
             let grip = &ranked.grip;
-            ranked.force_needed = Pads::new(&grip.contact).and_then(|pads| inverse::force_needed(&pads, grip.distance(), &ranked.worst.wrench, friction, &options));
+            ranked.force_needed =
+                Pads::new(&grip.contact).and_then(|pads| inverse::force_needed(&pads, grip.distance(), &ranked.worst.wrench, friction, &options));
         });
     }
 }

@@ -100,6 +100,9 @@ fn a_mesh_that_cannot_be_used_is_refused_with_place_and_remedy() {
     std::fs::write(folder.path().join("box.stl"), stl(&[[DVec3::ZERO, DVec3::ONE]])).unwrap();
     let message = refused("{ file = \"box.stl\", unit = \"feet\" }");
     assert!(message.contains("finger.tip") && message.contains("mm, cm"), "{message}");
-    let message = gripper::parse("name = \"t\"\nstroke = [\"0mm\", \"9mm\"]\nforce = [\"1N\", \"9N\"]\n[pad]\nrectangle = [\"2mm\", \"2mm\"]\n[[finger]]\nname = \"tip\"\nmesh = { file = \"box.stl\" }\n", "text");
+    let message = gripper::parse(
+        "name = \"t\"\nstroke = [\"0mm\", \"9mm\"]\nforce = [\"1N\", \"9N\"]\n[pad]\nrectangle = [\"2mm\", \"2mm\"]\n[[finger]]\nname = \"tip\"\nmesh = { file = \"box.stl\" }\n",
+        "text",
+    );
     assert!(message.unwrap_err().to_string().contains("save it to a file"));
 }

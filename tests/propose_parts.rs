@@ -5,8 +5,8 @@
 use std::path::PathBuf;
 
 use glam::{DVec2, DVec3};
-use gripfast::geometry::{Bounds2, contains, patch_area, ring_area};
 use gripfast::backend::{Backend, ScoreOptions, SeedSet};
+use gripfast::geometry::{Bounds2, contains, patch_area, ring_area};
 use gripfast::gripper::{self, Gripper, Shape};
 use gripfast::load::LoadSet;
 use gripfast::model::Grip;

@@ -2,8 +2,8 @@
 //! order.
 
 use super::layout::{
-    BASIS, BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader, DEGENERATE, EdgeRecord, LEAST_VARIATION, LoadRecord, OUT_OF_RANGE, SeedRecord,
-    TILT_LIMIT, UNBOUNDED,
+    BASIS, BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader, DEGENERATE, EdgeRecord, LEAST_VARIATION, LoadRecord, OUT_OF_RANGE,
+    SeedRecord, TILT_LIMIT, UNBOUNDED,
 };
 use super::seeds::{NEGATED, RING};
 
@@ -135,7 +135,11 @@ impl Field<'_> {
     pub(crate) fn coupled_share(&self, load: &LoadRecord, planes: Planes, upper: f32) -> f32 {
         let header = self.header;
         let mu = load.scale * upper;
-        if load.distance >= OUT_OF_RANGE || header.resolved == 0 || !planes.full || mu * mu * load.distance * load.distance > 0.5 * (header.area_i + header.area_ii) {
+        if load.distance >= OUT_OF_RANGE
+            || header.resolved == 0
+            || !planes.full
+            || mu * mu * load.distance * load.distance > 0.5 * (header.area_i + header.area_ii)
+        {
             return -1.0;
         }
         let ([q11, q22, q12, q33], [q13, q14, q23, q24]) = (header.variation_first, header.variation_second);

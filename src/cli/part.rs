@@ -8,7 +8,7 @@ use anyhow::Context;
 use clap::Args as ClapArgs;
 use comfy_table::{CellAlignment, Table, presets};
 use glam::DVec3;
-use gripfast::part::{FacePair, Part, drawing, PlanarFace, ReadOptions, Unit};
+use gripfast::part::{FacePair, Part, PlanarFace, ReadOptions, Unit, drawing};
 use gripfast::units::Quantity;
 use serde_json::json;
 

@@ -291,7 +291,8 @@ impl Reader<'_> {
         let Some(folder) = self.folder else {
             return Err(self.bad(field, "names a mesh file, but this gripper is not read from a file", "save it to a file beside the mesh"));
         };
-        let unit = mesh.unit.as_deref().map(str::parse).transpose().map_err(|error| self.bad(field, format!("unit: {error}"), "use mm, cm, m, um, in or ft"))?;
+        let unit =
+            mesh.unit.as_deref().map(str::parse).transpose().map_err(|error| self.bad(field, format!("unit: {error}"), "use mm, cm, m, um, in or ft"))?;
         let shapes: Vec<Shape> = mesh::hulls(&folder.join(&mesh.file), unit)?.into_iter().map(|points| Shape::Hull { points }).filter(has_volume).collect();
         if shapes.is_empty() {
             return Err(self.bad(field, format!("{} encloses no volume", mesh.file.display()), "give the mesh of a solid"));

@@ -168,7 +168,8 @@ fn numbers(part: &Part, view: &View, shapes: &[Shape]) -> Vec<(u32, DVec2)> {
         let on_picture = view.right * point.x + view.up * point.y;
         (face.offset - face.normal.dot(on_picture)) / face.normal.dot(view.eye)
     };
-    let boxes: Vec<Bounds2> = shapes.iter().map(|shape| Bounds2::of(&shape.polygons.iter().flat_map(|p| p.outer.iter().copied()).collect::<Vec<_>>())).collect();
+    let boxes: Vec<Bounds2> =
+        shapes.iter().map(|shape| Bounds2::of(&shape.polygons.iter().flat_map(|p| p.outer.iter().copied()).collect::<Vec<_>>())).collect();
     let mut found = Vec::new();
     for (index, shape) in shapes.iter().enumerate() {
         let Some(face) = shape.face.map(|face| &part.faces[face]) else { continue };
@@ -188,7 +189,8 @@ fn numbers(part: &Part, view: &View, shapes: &[Shape]) -> Vec<(u32, DVec2)> {
         let tries = (0..TRIES * TRIES).map(|k| boxes[index].min + size * DVec2::new((k % TRIES) as f64 + 0.5, (k / TRIES) as f64 + 0.5) / TRIES as f64);
         let room = |point: DVec2| {
             let edges = shape.polygons.iter().flat_map(rings).flat_map(|ring| ring.iter().zip(ring.iter().cycle().skip(1)));
-            edges.map(|(&a, &b)| a + (b - a) * ((point - a).dot(b - a) / (b - a).length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0))
+            edges
+                .map(|(&a, &b)| a + (b - a) * ((point - a).dot(b - a) / (b - a).length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0))
                 .map(|on_edge| on_edge.distance(point))
                 .fold(f64::INFINITY, f64::min)
         };

@@ -20,8 +20,11 @@ use super::weld::{MAX_TRIANGLES, Soup, Welder};
 use crate::error::{Error, Result};
 
 /// Suffixes that are read, for messages.
-const KNOWN: &str =
-    if cfg!(feature = "step") { "stl, obj, ply, off, 3mf, gltf, glb, step (each also as .gz)" } else { "stl, obj, ply, off, 3mf, gltf, glb (each also as .gz)" };
+const KNOWN: &str = if cfg!(feature = "step") {
+    "stl, obj, ply, off, 3mf, gltf, glb, step (each also as .gz)"
+} else {
+    "stl, obj, ply, off, 3mf, gltf, glb (each also as .gz)"
+};
 
 /// Reads the triangles of `path` in the file's own unit.
 ///
