@@ -4,6 +4,7 @@ pub mod catalogue;
 pub mod check;
 pub mod drawing;
 pub mod file;
+mod mesh;
 
 use std::collections::BTreeMap;
 

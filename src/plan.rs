@@ -75,7 +75,7 @@ impl Assessor<'_> {
         };
         let wrenches: Vec<Vec<Wrench>> = grips.par_iter().map(in_grip).collect();
         let problems = grips.iter().zip(&wrenches);
-        let problems = problems.map(|(grip, wrenches)| Problem { contact: &grip.contact, distance: grip.width, force: self.settings.force, wrenches });
+        let problems = problems.map(|(grip, wrenches)| Problem { contact: &grip.contact, distance: grip.distance(), force: self.settings.force, wrenches });
         let batch = Batch { problems: problems.collect() };
         let scored = self.backend.score(&batch, self.seeds, &self.settings.score)?;
         let jobs = grips.into_par_iter().zip(wrenches.par_iter()).zip(scored);
@@ -93,6 +93,7 @@ impl Assessor<'_> {
         RankedGrip {
             rank: 0,
             score: None,
+            // The width for grips from inside too: jaws that push outwards right a part up to `asin w/d`, which is more than `atan w/d`.
             alpha: twist_out::alpha(grip.width, least, self.settings.delta, self.settings.mu_c),
             delta_d: twist_out::delta_d(grip.width, least),
             contact_share,
@@ -109,6 +110,7 @@ impl Assessor<'_> {
                 bounds: score.bounds,
                 residual: score.residual,
             },
+            merged: Vec::new(),
             mu_by_load: scored.all.iter().map(|score| score.mu_s).collect(),
             grip,
         }
@@ -120,7 +122,8 @@ impl Assessor<'_> {
         let options = Options { separation: self.settings.score.separation, ..Options::default() };
         grips.par_iter_mut().for_each(|ranked| {
             let grip = &ranked.grip;
-            ranked.force_needed = Pads::new(&grip.contact).and_then(|pads| inverse::force_needed(&pads, grip.width, &ranked.worst.wrench, friction, &options));
+            ranked.force_needed =
+                Pads::new(&grip.contact).and_then(|pads| inverse::force_needed(&pads, grip.distance(), &ranked.worst.wrench, friction, &options));
         });
     }
 }
@@ -165,7 +168,7 @@ impl Collector {
         for (reason, count) in self.rejections {
             *ranking.rejections.entry(reason).or_default() += count;
         }
-        ranking.ranked = self.ranked;
+        ranking.ranked = self.ranked - ranking.rejections.get("duplicate").copied().unwrap_or(0);
         ranking
     }
 }

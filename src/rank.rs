@@ -11,8 +11,11 @@ use crate::results::RankedGrip;
 /// backends and refiners, and the order shall not depend on which of them ran.
 pub const TIE: f64 = 1e-9;
 
-/// Two lengths [m] (or areas, by their square roots) count as equal for [`Options::merge_duplicates`].
+/// Two lengths [m] (or areas, by their square roots) count as equal for [`Options::merge_duplicates`]: part files have coordinates
+/// of single precision.
 const SAME_LENGTH: f64 = 1e-7;
+/// Scores that such lengths can make differ by no more than this share.
+const SAME_SCORE: f64 = 1e-5;
 
 /// Weights of the score `k1/mu_s + k2 alpha`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,7 +50,7 @@ pub struct Options {
     /// Keeps grips that are another one with the jaws exchanged (`flip_of`).
     pub keep_flips: bool,
     /// Keeps one of the grips that score the same with the same geometry in the grip frame, as those that a symmetry of the part
-    /// maps to each other do.
+    /// maps to each other do; [`RankedGrip::merged`] names the others.
     pub merge_duplicates: bool,
     /// Keeps this many.
     pub top: Option<usize>,
@@ -64,8 +67,6 @@ pub struct Ranking {
     pub ranked: u64,
     /// Grips left out, by reason: the status (`twisted_out`, ...), `not_finite`, `flip`, `duplicate`.
     pub rejections: BTreeMap<String, u64>,
-    /// Ids of the grips merged into each one kept.
-    pub merged: BTreeMap<u64, Vec<u64>>,
 }
 
 /// Scores and orders `grips`; their `rank` and `score` are set here. `centre_of_mass` and `size` (the diagonal of the bounding
@@ -94,10 +95,10 @@ pub fn rank(grips: Vec<RankedGrip>, centre_of_mass: DVec3, size: f64, options: &
         grip.score = score.is_finite().then_some(score);
         kept.push((score, grip));
     }
-    let runs = order(&mut kept);
+    order(&mut kept);
     if options.merge_duplicates {
         let before = kept.len();
-        kept = merge(kept, &runs, centre_of_mass, &mut ranking.merged);
+        kept = merge(kept, centre_of_mass);
         if kept.len() < before {
             ranking.rejections.insert("duplicate".into(), (before - kept.len()) as u64);
         }
@@ -131,19 +132,16 @@ pub fn status_name(status: Status) -> String {
     }
 }
 
-/// Falling score, runs of scores that tie by id; returns the lengths of the runs.
+/// Falling score, runs of scores that tie by id.
 ///
 /// A run ends at a gap between neighbours, not at a distance from its first member: two equal grips stay together whatever lies
 /// between them.
-fn order(grips: &mut [(f64, RankedGrip)]) -> Vec<usize> {
+fn order(grips: &mut [(f64, RankedGrip)]) {
     let same = |a: f64, b: f64| a == b || (a - b).abs() <= TIE * a.abs().max(b.abs());
     grips.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.grip.id.cmp(&b.1.grip.id)));
-    let mut runs = Vec::new();
     for run in grips.chunk_by_mut(|a, b| same(a.0, b.0)) {
         run.sort_by_key(|grip| grip.1.grip.id);
-        runs.push(run.len());
     }
-    runs
 }
 
 /// What a symmetry of the part, or exchanging the jaws, leaves of a grip: width (negative from inside), the centre of mass in the grip frame up to the
@@ -168,21 +166,24 @@ fn size_and_spread(patch: &Patch) -> [f64; 2] {
     [moments.area.sqrt(), (polar / moments.area + moments.centroid.length_squared()).max(0.0).sqrt()]
 }
 
-/// Keeps the first of each set of equal grips among those that tie.
-fn merge(grips: Vec<(f64, RankedGrip)>, runs: &[usize], centre_of_mass: DVec3, merged: &mut BTreeMap<u64, Vec<u64>>) -> Vec<(f64, RankedGrip)> {
+/// Keeps the first of each set of equal grips, from grips in order; each one kept names the others.
+fn merge(grips: Vec<(f64, RankedGrip)>, centre_of_mass: DVec3) -> Vec<(f64, RankedGrip)> {
     let mut kept: Vec<(f64, RankedGrip)> = Vec::with_capacity(grips.len());
-    let mut grips = grips.into_iter();
-    for run in runs {
-        let mut representatives: Vec<(u64, [f64; 8])> = Vec::new();
-        for (score, grip) in grips.by_ref().take(*run) {
-            let shape = geometry(&grip, centre_of_mass);
-            let same = |other: &[f64; 8]| shape.iter().zip(other).all(|(a, b)| (a - b).abs() <= SAME_LENGTH);
-            if let Some((id, _)) = representatives.iter().find(|(_, other)| same(other)) {
-                merged.entry(*id).or_default().push(grip.grip.id);
-            } else {
-                representatives.push((grip.grip.id, shape));
-                kept.push((score, grip));
-            }
+    let mut shapes: Vec<[f64; 8]> = Vec::with_capacity(grips.len());
+    let mut near = 0; // the first kept grip whose score is not clearly larger
+    for (score, mut grip) in grips {
+        let larger = |other: f64| other != score && (other.is_infinite() || other - score > SAME_SCORE * other.abs());
+        while near < kept.len() && larger(kept[near].0) {
+            near += 1;
+        }
+        let shape = geometry(&grip, centre_of_mass);
+        let same = |other: &[f64; 8]| shape.iter().zip(other).all(|(a, b)| (a - b).abs() <= SAME_LENGTH);
+        if let Some(found) = shapes[near..].iter().position(same) {
+            kept[near + found].1.merged.push(grip.grip.id);
+        } else {
+            grip.merged.clear();
+            shapes.push(shape);
+            kept.push((score, grip));
         }
     }
     kept

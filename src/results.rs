@@ -114,6 +114,9 @@ pub struct RankedGrip {
     pub safety: Option<f64>,
     /// Gripping force at which `mu_s` of the worst load equals the pad friction [N].
     pub force_needed: Option<f64>,
+    /// Ids of the grips left out because a symmetry of the part maps them to this one, where they were merged.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub merged: Vec<u64>,
     /// `mu_s` of every load in the order of [`GripSet::loads`], when asked for; a load without limit state is null.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mu_by_load: Vec<Option<f64>>,

@@ -8,6 +8,9 @@ need=()
 ls /usr/share/vulkan/icd.d/*lvp* >/dev/null 2>&1 || need+=(mesa-vulkan-drivers)
 ldconfig -p | grep -q libvulkan.so.1 || need+=(libvulkan1)
 command -v cc >/dev/null || need+=(gcc libc6-dev)
+# For STEP files: Open CASCADE (half a minute to install and build).
+[ -f /usr/include/opencascade/Standard_Version.hxx ] || need+=(libocct-data-exchange-dev libocct-modeling-algorithms-dev)
+command -v c++ >/dev/null || need+=(g++)
 python3 -c 'import ensurepip' 2>/dev/null || need+=(python3-venv)
 if [ ${#need[@]} -gt 0 ]; then
     if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
@@ -32,4 +35,10 @@ export GRIPFAST_GPU=require GRIPFAST_READERS=require
 
 cargo fmt --check
 cargo clippy --all-targets --features full --quiet -- -D warnings
-cargo test --features full --no-fail-fast
+features=full
+if [ -f /usr/include/opencascade/Standard_Version.hxx ] && command -v c++ >/dev/null; then
+    features=full,step
+else
+    echo "SKIPPED: STEP files: install libocct-data-exchange-dev, libocct-modeling-algorithms-dev and g++ (cargo test --features step)"
+fi
+cargo test --features "$features" --no-fail-fast

@@ -150,7 +150,8 @@ fn bounds_enclose_the_answer(backend: &Backend) {
                 2 => random.similar(size),
                 _ => Arc::new(Contact { face_i: random.patch(size), face_ii: random.patch(size) }),
             };
-            let (distance, force) = (size * random.within(0.0, 6.0), 10_f64.powf(random.within(-2.0, 3.0)));
+            // From outside and, less often, from inside.
+            let (distance, force) = (size * random.within(-3.0, 6.0), 10_f64.powf(random.within(-2.0, 3.0)));
             let strength = 10_f64.powf(random.within(-2.0, 0.0));
             let wrenches: Vec<Wrench> = (0..20).map(|_| random.wrench(force * strength, size)).collect();
             let problem = Problem { contact: &contact, distance, force, wrenches: &wrenches };

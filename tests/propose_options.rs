@@ -174,6 +174,15 @@ fn filters_reject_with_their_reason() {
     let (grips, tally) = with(&|options| options.faces = Some(vec![0, 1]));
     assert!(!grips.is_empty() && grips.iter().all(|grip| grip.face_i.max(grip.face_ii) <= 1));
     assert_eq!((tally.pairs, tally.rejections["face_pair_not_chosen"]), (1, 2));
+    // Chosen by a box: the three faces on the side of the origin are not wholly in it, the top and the far ones are.
+    let upper = [DVec3::new(0.0, 0.0, 0.03), DVec3::new(0.06, 0.04, 0.03)];
+    let lower = [DVec3::new(0.0, 0.0, -0.01), DVec3::new(0.06, 0.04, 0.01)];
+    let (grips, tally) = with(&|options| options.faces_in = vec![upper, lower]);
+    assert!(!grips.is_empty() && grips.iter().all(|grip| grip.part_from_grip.rotation.z_axis.z.abs() > 0.999));
+    assert_eq!((tally.pairs, tally.rejections["face_pair_not_chosen"]), (1, 2));
+    let top = part.faces.iter().find(|face| face.normal.z > 0.5).unwrap().id;
+    let (by_both, _) = with(&|options| (options.faces, options.faces_in) = (Some(vec![top]), vec![lower]));
+    assert_eq!(by_both, grips, "faces by number and faces by box add up");
     // Every candidate is accounted for.
     for tally in [tally, all_tally] {
         let rejected: u64 = tally.rejections.iter().filter(|(name, _)| !name.starts_with("face_pair")).map(|(_, count)| count).sum();
@@ -193,7 +202,9 @@ fn a_part_beyond_the_stroke_says_so() {
 fn bad_options_are_refused() {
     let part = cuboid(0.06, 0.04, 0.03);
     let gripper = generic();
-    let changes: [&dyn Fn(&mut ProposeOptions); 11] = [
+    let changes: [&dyn Fn(&mut ProposeOptions); 13] = [
+        &|options| options.outside = false,
+        &|options| options.faces_in = vec![[DVec3::splat(0.1), DVec3::splat(0.2)]],
         &|options| options.spacing = Some(1e-7),
         &|options| options.faces = Some(vec![0, 6]),
         &|options| options.spacing = Some(0.0),

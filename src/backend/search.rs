@@ -2,8 +2,8 @@
 //! order.
 
 use super::layout::{
-    BASIS, BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader, DEGENERATE, EdgeRecord, LEAST_VARIATION, LoadRecord, SeedRecord,
-    TILT_LIMIT, UNBOUNDED,
+    BASIS, BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader, DEGENERATE, EdgeRecord, LEAST_VARIATION, LoadRecord, OUT_OF_RANGE,
+    SeedRecord, TILT_LIMIT, UNBOUNDED,
 };
 use super::seeds::{NEGATED, RING};
 
@@ -89,7 +89,7 @@ impl Field<'_> {
     /// weighted integrals `x1 v/|v|` = `g1`, `x2 v/|v|` = `g2`, `v/|v|` = `g0` (two components each).
     pub(crate) fn full_contact(&self, load: &LoadRecord, mu: f32, g0: [f32; 2], g1: [f32; 2], g2: [f32; 2]) -> bool {
         let header = self.header;
-        if load.distance < 0.0 || header.resolved == 0 {
+        if load.distance >= OUT_OF_RANGE || header.resolved == 0 {
             return false;
         }
         // Tilt equations (6)(7) about the common centroid: slope = compliance * (moments + coupling * slope).
@@ -127,7 +127,7 @@ impl Field<'_> {
     /// For different faces: the largest share by which the friction coupling can change the dissipation at any twist,
     /// or a negative number where that is not known to be small. `upper` bounds `mu_s` without coupling.
     ///
-    /// Friction moves the slope by at most `softness d/2 mu V`, where `V`, the integral of the difference of the two
+    /// Friction moves the slope by at most `softness |d|/2 mu V`, where `V`, the integral of the difference of the two
     /// pressures over both areas, bounds the difference of the two friction forces over `mu`. `V` is at most its value
     /// without coupling plus `spread` times the change of slope, and `mu` at most `upper` over 1 less the share. The
     /// three together are a quadratic equation for the share; its smaller root cannot be left on the way from no
@@ -135,7 +135,11 @@ impl Field<'_> {
     pub(crate) fn coupled_share(&self, load: &LoadRecord, planes: Planes, upper: f32) -> f32 {
         let header = self.header;
         let mu = load.scale * upper;
-        if load.distance < 0.0 || header.resolved == 0 || !planes.full || mu * mu * load.distance * load.distance > 0.5 * (header.area_i + header.area_ii) {
+        if load.distance >= OUT_OF_RANGE
+            || header.resolved == 0
+            || !planes.full
+            || mu * mu * load.distance * load.distance > 0.5 * (header.area_i + header.area_ii)
+        {
             return -1.0;
         }
         let ([q11, q22, q12, q33], [q13, q14, q23, q24]) = (header.variation_first, header.variation_second);
@@ -157,7 +161,7 @@ impl Field<'_> {
             }
             steepest = steepest.max((x * x + y * y) / (pressure * pressure));
         }
-        let reach = 0.5 * header.softness * load.distance * mu;
+        let reach = 0.5 * header.softness * load.distance.abs() * mu;
         let c = 1.0 - reach * header.spread;
         let b = reach * variation * steepest.sqrt();
         if c <= 0.0 || c * c <= 4.0 * b {

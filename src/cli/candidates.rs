@@ -1,11 +1,14 @@
 //! Flags that say which grips to propose.
 
-use clap::Args;
+use std::collections::BTreeMap;
+
+use clap::{Args, ValueEnum};
 use glam::DVec3;
 use gripfast::error::{Error, Result};
 use gripfast::gripper::Gripper;
 use gripfast::propose::{Cone, Ground, ProposeOptions};
 use gripfast::units::Quantity;
+use serde_json::{Value, json};
 
 #[derive(Debug, Args)]
 pub(crate) struct CandidateArgs {
@@ -33,6 +36,12 @@ pub(crate) struct CandidateArgs {
     /// Only these planar faces, e.g. 0,1,4 (see `gripfast part`).
     #[arg(long, value_delimiter = ',', value_name = "FACES")]
     faces: Option<Vec<u32>>,
+    /// Only planar faces that lie wholly in this box, and those of --faces: x,y,z:x,y,z with units; may be repeated.
+    #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
+    faces_in: Vec<String>,
+    /// Grips that close on the part from outside, that open in a slot or bore (needs a gripper with outer pads), or both.
+    #[arg(long, value_enum, default_value = "outside")]
+    grips: Side,
     /// List each grip with exchanged jaws as well.
     #[arg(long)]
     flips: bool,
@@ -42,6 +51,14 @@ pub(crate) struct CandidateArgs {
     /// Distance kept between gripper and part, but for the pads.
     #[arg(long, default_value = "0mm")]
     clearance: String,
+}
+
+/// From where the pads push at the faces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Side {
+    Outside,
+    Inside,
+    Both,
 }
 
 impl CandidateArgs {
@@ -54,8 +71,11 @@ impl CandidateArgs {
             max_offset: self.max_offset.as_deref().map(|text| length("--max-offset", text)).transpose()?,
             approach_cone: self.approach.as_deref().map(cone).transpose()?,
             ground: self.ground.as_deref().map(ground).transpose()?,
-            keep_out: self.keep_out.iter().map(|text| keep_out(text)).collect::<Result<_>>()?,
+            keep_out: self.keep_out.iter().map(|text| corners("--keep-out", text)).collect::<Result<_>>()?,
             faces: self.faces.clone(),
+            faces_in: self.faces_in.iter().map(|text| corners("--faces-in", text)).collect::<Result<_>>()?,
+            outside: self.grips != Side::Inside,
+            inside: self.grips != Side::Outside,
             flips: self.flips,
             opening: length("--opening", &self.opening)?,
             clearance: length("--clearance", &self.clearance)?,
@@ -78,7 +98,40 @@ impl CandidateArgs {
             ("opening_m", options.opening.into()),
             ("clearance_m", options.clearance.into()),
             ("flips", options.flips.into()),
+            ("outside", options.outside.into()),
+            ("inside", options.inside.into()),
+            ("approach_cone", options.approach_cone.map(|cone| json!({"axis": cone.axis, "half_angle_rad": cone.half_angle})).into()),
+            ("ground", options.ground.map(|ground| json!({"normal": ground.normal, "height_m": ground.offset})).into()),
+            ("keep_out_m", json!(options.keep_out)),
+            ("faces", json!(options.faces)),
+            ("faces_in_m", json!(options.faces_in)),
         ]
+    }
+
+    /// The options that [`CandidateArgs::settings`] wrote; what is missing has its default.
+    pub(crate) fn from_settings(settings: &BTreeMap<String, Value>) -> ProposeOptions {
+        let value = |name: &str| settings.get(name).unwrap_or(&Value::Null);
+        let number = |name: &str| value(name).as_f64();
+        let vector = |value: &Value| serde_json::from_value::<DVec3>(value.clone()).ok();
+        let boxes = |name: &str| serde_json::from_value(value(name).clone()).unwrap_or_default();
+        let (cone, ground) = (value("approach_cone"), value("ground"));
+        let defaults = ProposeOptions::default();
+        ProposeOptions {
+            spacing: number("spacing_m"),
+            angle_step: number("angle_step_rad").unwrap_or(defaults.angle_step),
+            min_contact: number("min_contact_share").unwrap_or(defaults.min_contact),
+            max_offset: number("max_offset_m"),
+            opening: number("opening_m").unwrap_or(defaults.opening),
+            clearance: number("clearance_m").unwrap_or(defaults.clearance),
+            outside: value("outside").as_bool().unwrap_or(defaults.outside),
+            inside: value("inside").as_bool().unwrap_or(defaults.inside),
+            approach_cone: vector(&cone["axis"]).zip(cone["half_angle_rad"].as_f64()).map(|(axis, half_angle)| Cone { axis, half_angle }),
+            ground: vector(&ground["normal"]).zip(ground["height_m"].as_f64()).map(|(normal, offset)| Ground { normal, offset }),
+            keep_out: boxes("keep_out_m"),
+            faces: serde_json::from_value(value("faces").clone()).unwrap_or_default(),
+            faces_in: boxes("faces_in_m"),
+            ..defaults
+        }
     }
 }
 
@@ -115,11 +168,12 @@ fn ground(text: &str) -> Result<Ground> {
     Ok(Ground { normal: direction("--ground", normal)?, offset: Quantity::Length.parse("--ground", height)? })
 }
 
-fn keep_out(text: &str) -> Result<[DVec3; 2]> {
-    let (low, high) = two("--keep-out", text, "LOW:HIGH, e.g. 0mm,0mm,0mm:10mm,20mm,5mm")?;
+/// Smallest and largest corner of a box.
+fn corners(flag: &str, text: &str) -> Result<[DVec3; 2]> {
+    let (low, high) = two(flag, text, "LOW:HIGH, e.g. 0mm,0mm,0mm:10mm,20mm,5mm")?;
     let corner = |text: &str| -> Result<DVec3> {
-        let values: Vec<f64> = text.split(',').map(|value| Quantity::Length.parse("--keep-out", value)).collect::<Result<_>>()?;
-        let values: [f64; 3] = values.try_into().map_err(|_| Error::input("--keep-out", format!("'{text}' is not three lengths"), "give x,y,z with units"))?;
+        let values: Vec<f64> = text.split(',').map(|value| Quantity::Length.parse(flag, value)).collect::<Result<_>>()?;
+        let values: [f64; 3] = values.try_into().map_err(|_| Error::input(flag, format!("'{text}' is not three lengths"), "give x,y,z with units"))?;
         Ok(DVec3::from_array(values))
     };
     Ok([corner(low)?, corner(high)?])

@@ -8,14 +8,14 @@ use anyhow::Context;
 use clap::Args as ClapArgs;
 use comfy_table::{CellAlignment, Table, presets};
 use glam::DVec3;
-use gripfast::part::{FacePair, Part, PlanarFace, ReadOptions, Unit};
+use gripfast::part::{FacePair, Part, PlanarFace, ReadOptions, Unit, drawing};
 use gripfast::units::Quantity;
 use serde_json::json;
 
 /// Reads a part, checks its mesh, and lists its planar faces and the pairs of them that can be gripped.
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "EXAMPLES:\n  gripfast part bracket.stl\n  gripfast part bracket.stl --unit in --density 2.7g/cm3\n  gripfast part bracket.3mf --mass 350g --json\n\n\
+    after_help = "EXAMPLES:\n  gripfast part bracket.stl\n  gripfast part bracket.stl --unit in --density 2.7g/cm3\n  gripfast part bracket.3mf --mass 350g --json\n  gripfast part bracket.stl --plot faces.svg\n\n\
 Reads STL, OBJ, PLY, OFF, 3MF and glTF/GLB, each also as .gz."
 )]
 pub(crate) struct Args {
@@ -39,6 +39,9 @@ pub(crate) struct Args {
     /// Also pairs that jaws opening into a slot can grip.
     #[arg(long)]
     internal: bool,
+    /// Drawing (SVG): three views with the planar faces numbered.
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
     /// One JSON object in SI units on standard output.
     #[arg(long)]
     json: bool,
@@ -67,6 +70,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut pairs = part.pairs(stroke[0], stroke[1]);
     if args.internal {
         pairs.extend(part.internal_pairs(stroke[0], stroke[1]));
+    }
+    if let Some(path) = &args.plot {
+        gripfast::file::write(path, |writer| writer.write_all(drawing::svg(&part).as_bytes()))?;
+        eprintln!("wrote {}", path.display());
     }
     let mut out = std::io::stdout().lock();
     if args.json {

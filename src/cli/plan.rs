@@ -99,6 +99,9 @@ pub(crate) struct Args {
     /// Print grips that differ in place, face pair and approach.
     #[arg(long, help_heading = "Output")]
     diverse: bool,
+    /// Lists one of the grips that a symmetry of the part maps to each other, for all of them.
+    #[arg(long, help_heading = "Output")]
+    merge_symmetric: bool,
     /// Best grips to keep in the result file.
     #[arg(long, default_value_t = 10_000, help_heading = "Output")]
     keep: usize,
@@ -202,7 +205,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let ranking = collector.finish(
         mass.centre_of_mass,
         (high - low).length(),
-        &rank::Options { weights: settings.weights, keep_flips: args.candidates.flips(), top: Some(args.keep.max(args.top)), ..rank::Options::default() },
+        &rank::Options {
+            weights: settings.weights,
+            keep_flips: args.candidates.flips(),
+            merge_duplicates: args.merge_symmetric,
+            top: Some(args.keep.max(args.top)),
+            ..rank::Options::default()
+        },
     );
     let mut rejections = proposer.tally().rejections.clone();
     for (reason, count) in &ranking.rejections {
@@ -398,6 +407,9 @@ fn print(out: &mut impl Write, set: &GripSet, args: &Args, gripper: &Gripper, fo
         out,
         "\nmu_s: smallest friction coefficient that holds the worst load. Slip centre from the grip's middle in the pad plane.\nPosition of the grip's middle in the part frame."
     )?;
+    if args.merge_symmetric {
+        writeln!(out, "Rank (+n): stands for n more grips that a symmetry of the part maps to it (`merged` in the result file).")?;
+    }
     Ok(())
 }
 
@@ -412,7 +424,7 @@ fn row(grip: &RankedGrip, set: &GripSet) -> Vec<String> {
     let o = grip.grip.part_from_grip.origin * 1e3;
     let mark = if worst.status == Status::Ambiguous { "?" } else { "" };
     vec![
-        grip.rank.to_string(),
+        if grip.merged.is_empty() { grip.rank.to_string() } else { format!("{} (+{})", grip.rank, grip.merged.len()) },
         grip.grip.id.to_string(),
         format!("{}{mark}", option(worst.mu_s, 5)),
         option(grip.safety, 2),
@@ -422,7 +434,7 @@ fn row(grip: &RankedGrip, set: &GripSet) -> Vec<String> {
         format!("{:.0} %", grip.contact_share * 100.0),
         format!("{:.1} deg", grip.alpha.to_degrees()),
         option(grip.score, 3),
-        format!("{:.2}", grip.grip.width * 1e3),
+        format!("{}{:.2}", if grip.grip.inside { "inside " } else { "" }, grip.grip.width * 1e3),
         tuple(&o.to_array()),
     ]
 }

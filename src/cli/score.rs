@@ -290,7 +290,8 @@ impl Job<'_> {
                 for ranked in set.grips {
                     let grip = ranked.grip;
                     let wrenches = loads.iter().map(|wrench| wrench_in_grip(wrench, set.part.mass.centre_of_mass, &grip.part_from_grip)).collect();
-                    let entry = Entry { id: Some(grip.id.into()), contact: grip.contact, distance: grip.width, force, wrenches: Wrenches::Own(wrenches) };
+                    let (id, distance) = (Some(grip.id.into()), grip.distance());
+                    let entry = Entry { id, contact: grip.contact, distance, force, wrenches: Wrenches::Own(wrenches) };
                     take(entry, out)?;
                 }
             }

@@ -8,9 +8,11 @@ use clap::Args as ClapArgs;
 use gripfast::error::{Error, Result};
 use gripfast::gripper::Gripper;
 use gripfast::part::{Part, ReadOptions, Unit};
-use gripfast::propose::{Explanation, ProposeOptions, Proposer};
+use gripfast::propose::{Explanation, Proposer};
 use gripfast::results::GripSet;
 use gripfast::units::Quantity;
+
+use super::candidates::CandidateArgs;
 
 /// Explains one grip of a result file: every test with body and place, and what its score is made of.
 #[derive(Debug, ClapArgs)]
@@ -42,7 +44,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let path = args.part.unwrap_or_else(|| PathBuf::from(&set.part.file));
     let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == set.part.unit_m);
     let part = Part::read(&path, &ReadOptions { unit })?;
-    let proposer = Proposer::new(&part, &gripper, &options(&set))?;
+    let proposer = Proposer::new(&part, &gripper, &CandidateArgs::from_settings(&set.provenance.settings))?;
     let explanation = proposer.explain_pose(ranked.grip.face_i, ranked.grip.face_ii, &ranked.grip.part_from_grip)?;
     let mut out = std::io::stdout().lock();
     print(&mut out, &explanation)?;
@@ -63,21 +65,6 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         ranked.delta_d * 1e3
     )?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// What was proposed in the run, as far as it decides about one pose.
-fn options(set: &GripSet) -> ProposeOptions {
-    let number = |name: &str| set.provenance.settings.get(name).and_then(serde_json::Value::as_f64);
-    let defaults = ProposeOptions::default();
-    ProposeOptions {
-        spacing: number("spacing_m"),
-        angle_step: number("angle_step_rad").unwrap_or(defaults.angle_step),
-        min_contact: number("min_contact_share").unwrap_or(defaults.min_contact),
-        max_offset: number("max_offset_m"),
-        opening: number("opening_m").unwrap_or(defaults.opening),
-        clearance: number("clearance_m").unwrap_or(defaults.clearance),
-        ..defaults
-    }
 }
 
 /// The pose of `plan --why X,Y,ANGLE,SITE`, e.g. `3mm,-2mm,30deg,0`.

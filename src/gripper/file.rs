@@ -1,12 +1,12 @@
 //! Reading the gripper file: commented TOML in which every quantity carries its unit.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec2, DVec3};
 use serde::Deserialize;
 
-use super::{Body, Gripper, Shape, Source, rectangle};
+use super::{Body, Gripper, Shape, Source, mesh, rectangle};
 use crate::error::{Error, Result};
 use crate::geometry::{convex_hull, is_convex, polygon, ring_area};
 use crate::model::Frame;
@@ -49,8 +49,17 @@ struct Solid {
     r#box: Option<[String; 3]>,
     cylinder: Option<Cylinder>,
     hull: Option<Vec<[String; 3]>>,
+    mesh: Option<MeshFile>,
     at: Option<[String; 3]>,
     rotate: Option<Rotation>,
+}
+
+/// A mesh file, its path relative to the gripper file; the unit is the file's own or millimetres.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MeshFile {
+    file: PathBuf,
+    unit: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -103,20 +112,25 @@ pub fn read(path: &Path) -> Result<Gripper> {
     let place = path.display().to_string();
     let text = String::from_utf8(bytes)
         .map_err(|_| Error::input(&place, "not a text file", "give a gripper file in TOML; `gripfast gripper list` shows shipped ones"))?;
-    parse(&text, &place)
+    parse_in(&text, &place, path.parent())
 }
 
-/// Parses the text of a gripper file; `place` names it in messages.
+/// Parses the text of a gripper file; `place` names it in messages. Such a text cannot name mesh files.
 ///
 /// # Errors
 /// When it is not TOML, a field is unknown, missing or without unit, or a value makes no gripper: stroke or force range
-/// not rising, pad not convex or without area, body without volume, two bodies of one name, source of an unknown field.
+/// not rising, pad not convex or without area, body without volume, mesh that cannot be read, two bodies of one name, source of an unknown field.
 pub fn parse(text: &str, place: &str) -> Result<Gripper> {
+    parse_in(text, place, None)
+}
+
+/// [`parse`] with mesh files in `folder`.
+fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
     let file: File = toml::from_str(text).map_err(|error| {
         let line = error.span().map_or(String::new(), |span| format!(":{}", text[..span.start.min(text.len())].matches('\n').count() + 1));
         Error::input(format!("{place}{line}"), error.message().to_string(), "compare with a shipped file: `gripfast gripper show generic`")
     })?;
-    let reader = Reader { place };
+    let reader = Reader { place, folder };
     if file.name.trim().is_empty() {
         return Err(reader.bad("name", "is empty", "name the gripper"));
     }
@@ -169,6 +183,7 @@ pub fn parse(text: &str, place: &str) -> Result<Gripper> {
 
 struct Reader<'a> {
     place: &'a str,
+    folder: Option<&'a Path>,
 }
 
 impl Reader<'_> {
@@ -232,7 +247,11 @@ impl Reader<'_> {
             if body.name.trim().is_empty() || bodies.iter().any(|other| other.name == body.name) {
                 return Err(self.bad(table, format!("name '{}' is empty or used twice", body.name), "give each body its own name"));
             }
-            bodies.push(body);
+            match &solid.mesh {
+                // All pieces have the name of their body.
+                Some(mesh) => bodies.extend(self.mesh(&format!("{table}.{}", solid.name), mesh)?.into_iter().map(|shape| Body { shape, ..body.clone() })),
+                None => bodies.push(body),
+            }
         }
         Ok(bodies)
     }
@@ -243,9 +262,9 @@ impl Reader<'_> {
             Some(turn) => DMat3::from_axis_angle(turn.axis.vector(), self.value(field, Quantity::Angle, &turn.angle)?),
             None => DMat3::IDENTITY,
         };
-        let shape = match (&solid.r#box, &solid.cylinder, &solid.hull) {
-            (Some(sizes), None, None) => Shape::Box { half: DVec3::from_array(self.vector(field, sizes)?) / 2.0 },
-            (None, Some(cylinder), None) => {
+        let shape = match (&solid.r#box, &solid.cylinder, &solid.hull, &solid.mesh) {
+            (Some(sizes), None, None, None) => Shape::Box { half: DVec3::from_array(self.vector(field, sizes)?) / 2.0 },
+            (None, Some(cylinder), None, None) => {
                 rotation *= match cylinder.axis {
                     Axis::X1 => DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X),
                     Axis::X2 => DMat3::from_cols(DVec3::Z, DVec3::X, DVec3::Y),
@@ -254,15 +273,31 @@ impl Reader<'_> {
                 let half_height = self.positive(field, Quantity::Length, &cylinder.length)? / 2.0;
                 Shape::Cylinder { radius: self.positive(field, Quantity::Length, &cylinder.radius)?, half_height }
             }
-            (None, None, Some(points)) => {
+            (None, None, Some(points), None) => {
                 Shape::Hull { points: points.iter().map(|point| self.vector(field, point).map(DVec3::from_array)).collect::<Result<_>>()? }
             }
-            _ => return Err(self.bad(field, "needs exactly one of box, cylinder, hull", "e.g. box = [\"40mm\", \"20mm\", \"8mm\"] along x1, x2, x3")),
+            // [`Reader::bodies`] puts the mesh's pieces in its place.
+            (None, None, None, Some(_)) => Shape::Box { half: DVec3::ONE },
+            _ => return Err(self.bad(field, "needs exactly one of box, cylinder, hull, mesh", "e.g. box = [\"40mm\", \"20mm\", \"8mm\"] along x1, x2, x3")),
         };
         if !has_volume(&shape) {
             return Err(self.bad(field, "has no volume", "give sizes above zero, or four points that are not in one plane"));
         }
         Ok(Body { name: solid.name.clone(), shape, grip_from_body: Frame { rotation, origin: DVec3::from_array(at) } })
+    }
+
+    /// Convex pieces that together contain a mesh.
+    fn mesh(&self, field: &str, mesh: &MeshFile) -> Result<Vec<Shape>> {
+        let Some(folder) = self.folder else {
+            return Err(self.bad(field, "names a mesh file, but this gripper is not read from a file", "save it to a file beside the mesh"));
+        };
+        let unit =
+            mesh.unit.as_deref().map(str::parse).transpose().map_err(|error| self.bad(field, format!("unit: {error}"), "use mm, cm, m, um, in or ft"))?;
+        let shapes: Vec<Shape> = mesh::hulls(&folder.join(&mesh.file), unit)?.into_iter().map(|points| Shape::Hull { points }).filter(has_volume).collect();
+        if shapes.is_empty() {
+            return Err(self.bad(field, format!("{} encloses no volume", mesh.file.display()), "give the mesh of a solid"));
+        }
+        Ok(shapes)
     }
 
     fn frame(&self, field: &str, axes: &Axes) -> Result<Frame> {

@@ -14,6 +14,7 @@ use crate::model::{Frame, Polygon};
 mod boundary;
 mod cracks;
 mod crossing;
+pub mod drawing;
 mod faces;
 mod facets;
 pub mod health;
@@ -144,7 +145,7 @@ pub struct Part {
 impl Part {
     /// Reads, welds, repairs and orients the mesh in `path`, and finds its planar faces.
     ///
-    /// STL (binary, ASCII), OBJ, PLY, OFF, 3MF, glTF and GLB, each also as `.gz`.
+    /// STL (binary, ASCII), OBJ, PLY, OFF, 3MF, glTF and GLB, each also as `.gz`; STEP with the feature `step`.
     ///
     /// # Errors
     /// When the file cannot be read, is not what its suffix says, is damaged, holds no triangle, or holds more

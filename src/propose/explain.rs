@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::options::Rejection;
-use super::patch::{Scratch, Touch, TurnedPad, outline};
+use super::patch::{Scratch, Touch, TurnedPad};
 use super::site::Site;
 use super::sweep::{Stage, Sweep};
 use super::{Prepared, Proposer, work};
@@ -161,14 +161,15 @@ impl Proposer<'_> {
         let mut patches: [Patch; 2] = [Patch::new(), Patch::new()];
         for (side, name) in ["contact on face I", "contact on face II"].into_iter().enumerate() {
             let mut scratch = Scratch::default();
-            let area = match prepared.patches[side.min(prepared.patches.len() - 1)].touch(&pad, position, &mut scratch) {
+            let patch = &prepared.patches[side.min(prepared.patches.len() - 1)];
+            let area = match patch.touch(&pad, position, &mut scratch) {
                 Touch::Empty => 0.0,
                 Touch::Whole => {
                     patches[side] = vec![Polygon { outer: outline_of_pad.clone(), holes: Vec::new() }];
                     pad.area()
                 }
                 Touch::Part(area) => {
-                    patches[side] = outline(&scratch, angle);
+                    patches[side] = patch.outline(&pad, position, &mut scratch, angle);
                     area
                 }
             };

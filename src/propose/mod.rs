@@ -38,6 +38,9 @@ use tree::{Topology, Tree};
 /// Positions per work item: large enough to share what an angle determines, small enough to spread over the threads.
 /// Fixed, because contacts are shared within an item: results must not depend on the chunk size.
 const ITEM: usize = 2048;
+/// A direction with fewer candidates than one for this many triangles does without a tree of its own: to make one takes some 20 ns
+/// for each triangle, and the looser boxes of another one cost some microseconds for each candidate.
+const TRIANGLES_PER_CANDIDATE: usize = 200;
 /// Corners of contact polygons that a chunk may hold, about (16 bytes each): where pads cover finely tessellated outlines,
 /// chunks have fewer candidates.
 const MOST_CORNERS: usize = 4_000_000;
@@ -81,6 +84,8 @@ pub struct Proposer<'a> {
     /// Corners per candidate in the last chunk.
     corners: f64,
     tree: Option<(usize, Arc<Tree>)>,
+    /// The tree in the part's own axes, once a direction with few candidates has asked for it.
+    own_tree: std::sync::OnceLock<Tree>,
 }
 
 /// Where the next chunk starts.
@@ -125,9 +130,10 @@ impl<'a> Proposer<'a> {
         }
         let mut tally = Tally::default();
         let mut pairs = Vec::new();
+        let chosen = chosen_faces(part, options)?;
         if options.outside {
             let reach = [gripper.stroke[0], gripper.stroke[1] - 2.0 * options.min_opening];
-            choose(part.pairs(0.0, f64::INFINITY), reach, options, &mut pairs, &mut tally);
+            choose(part.pairs(0.0, f64::INFINITY), reach, chosen.as_deref(), &mut pairs, &mut tally);
         }
         if options.inside {
             let Some(outer) = gripper.outer_pad else {
@@ -135,16 +141,9 @@ impl<'a> Proposer<'a> {
                 return Err(Error::input(&gripper.name, "inside grips need outer pads, and this gripper states none", remedy));
             };
             let reach = [gripper.stroke[0] + 2.0 * (outer + options.min_opening), gripper.stroke[1] + 2.0 * outer];
-            choose(part.internal_pairs(0.0, f64::INFINITY), reach, options, &mut pairs, &mut tally);
+            choose(part.internal_pairs(0.0, f64::INFINITY), reach, chosen.as_deref(), &mut pairs, &mut tally);
         }
         tally.pairs = pairs.len() as u64;
-        if let Some(&unknown) = options.faces.iter().flatten().find(|&&face| face as usize >= part.faces.len()) {
-            return Err(Error::input(
-                "faces",
-                format!("there is no planar face {unknown}"),
-                format!("the part has {} of them, counted from 0", part.faces.len()),
-            ));
-        }
         let (sites, directions) = site::sites(part, gripper, options, &pairs)?;
         let pad = vec![Polygon { outer: gripper.pad.clone(), holes: Vec::new() }];
         Ok(Self {
@@ -161,6 +160,7 @@ impl<'a> Proposer<'a> {
             next: Cursor::default(),
             corners: 400.0,
             tree: None,
+            own_tree: std::sync::OnceLock::new(),
         })
     }
 
@@ -230,6 +230,11 @@ impl<'a> Proposer<'a> {
 
     fn new_tree(&self, direction: usize) -> Tree {
         let axes: DMat3 = site::axes(self.directions[direction]);
+        let sites = self.sites.iter().filter(|site| site.direction == direction);
+        let candidates: usize = sites.map(|site| site.positions.len() * site.angles.len()).sum();
+        if candidates.saturating_mul(TRIANGLES_PER_CANDIDATE) < self.part.mesh.triangles.len() {
+            return self.own_tree.get_or_init(|| Tree::new(&self.shape, DMat3::IDENTITY)).turned(axes);
+        }
         Tree::new(&self.shape, axes)
     }
 
@@ -300,9 +305,43 @@ impl Iterator for Proposer<'_> {
     }
 }
 
-fn choose(all: Vec<FacePair>, reach: [f64; 2], options: &ProposeOptions, pairs: &mut Vec<FacePair>, tally: &mut Tally) {
+/// Whether each planar face may be touched; `None`: all may.
+fn chosen_faces(part: &Part, options: &ProposeOptions) -> Result<Option<Vec<bool>>> {
+    if options.faces.is_none() && options.faces_in.is_empty() {
+        return Ok(None);
+    }
+    let mut chosen = vec![false; part.faces.len()];
+    for &face in options.faces.iter().flatten() {
+        let Some(chosen) = chosen.get_mut(face as usize) else {
+            let remedy = format!("the part has {} of them, counted from 0", part.faces.len());
+            return Err(Error::input("faces", format!("there is no planar face {face}"), remedy));
+        };
+        *chosen = true;
+    }
+    for [low, high] in &options.faces_in {
+        // A face may touch the box from inside: coordinates come rounded to single precision.
+        let (low, high) = (*low - 1e-6, *high + 1e-6);
+        let within = |face: &crate::part::PlanarFace| {
+            let points = face.polygons.iter().flat_map(|polygon| &polygon.outer);
+            points.map(|point| face.part_from_face.point(point.extend(0.0))).all(|point| point.cmpge(low).all() && point.cmple(high).all())
+        };
+        let mut any = false;
+        for face in part.faces.iter().filter(|face| within(face)) {
+            chosen[face.id as usize] = true;
+            any = true;
+        }
+        if !any {
+            let [a, b] = [low, high].map(|corner| (corner * 1e3).to_array());
+            let problem = format!("no planar face lies wholly between ({:.2}, {:.2}, {:.2}) and ({:.2}, {:.2}, {:.2}) mm", a[0], a[1], a[2], b[0], b[1], b[2]);
+            return Err(Error::input("box of faces", problem, "make it larger; `gripfast part --faces` lists where the faces lie"));
+        }
+    }
+    Ok(Some(chosen))
+}
+
+fn choose(all: Vec<FacePair>, reach: [f64; 2], chosen: Option<&[bool]>, pairs: &mut Vec<FacePair>, tally: &mut Tally) {
     for pair in all {
-        let chosen = |face: u32| options.faces.as_ref().is_none_or(|faces| faces.contains(&face));
+        let chosen = |face: u32| chosen.is_none_or(|chosen| chosen[face as usize]);
         let reason = if !(reach[0]..=reach[1]).contains(&pair.width) {
             Rejection::Stroke
         } else if !chosen(pair.face_i) || !chosen(pair.face_ii) {

@@ -28,8 +28,11 @@ pub struct ProposeOptions {
     pub keep_out: Vec<[DVec3; 2]>,
     /// The gripper must stay above this plane.
     pub ground: Option<Ground>,
-    /// Only these planar faces may be touched.
+    /// Only these planar faces may be touched, and those of `faces_in`.
     pub faces: Option<Vec<u32>>,
+    /// Only planar faces that lie wholly in one of these boxes may be touched (part frame, smallest and largest corner [m]),
+    /// and those of `faces`; no box: no such limit.
+    pub faces_in: Vec<[DVec3; 2]>,
     /// Propose grips that close on faces from outside.
     pub outside: bool,
     /// Propose grips that open into a slot; needs a gripper with outer pads.
@@ -62,6 +65,7 @@ impl Default for ProposeOptions {
             keep_out: Vec::new(),
             ground: None,
             faces: None,
+            faces_in: Vec::new(),
             outside: true,
             inside: false,
             flips: false,
@@ -130,10 +134,15 @@ impl ProposeOptions {
             positive("ground normal", ground.normal.length())?;
             not_negative("ground offset", ground.offset.abs())?;
         }
-        for [low, high] in &self.keep_out {
-            if !low.is_finite() || !high.is_finite() || !low.cmple(*high).all() {
-                return Err(Error::input("keep-out box", format!("from {low} to {high}"), "give its smallest, then its largest coordinates"));
+        for (name, boxes) in [("keep-out box", &self.keep_out), ("box of faces", &self.faces_in)] {
+            for [low, high] in boxes {
+                if !low.is_finite() || !high.is_finite() || !low.cmple(*high).all() {
+                    return Err(Error::input(name, format!("from {low} to {high} m"), "give its smallest, then its largest coordinates"));
+                }
             }
+        }
+        if !self.outside && !self.inside {
+            return Err(Error::input("grips", "neither outside nor inside ones are asked for", "ask for one of them or both"));
         }
         not_negative("opening", self.opening)?;
         not_negative("smallest opening", self.min_opening)?;

@@ -12,11 +12,10 @@ use glam::DVec2;
 
 pub(super) use pad::TurnedPad;
 use pad::{FLUSH, Piece, clip_edge};
-use walk::loops;
-pub(super) use walk::outline;
+use walk::outline;
 
 use crate::geometry::overlay;
-use crate::geometry::polygon::{self, Bounds2, ring_area, rings};
+use crate::geometry::polygon::{self, Bounds2, rings};
 use crate::model::{Patch, Ring};
 
 /// Pieces with less area than this share of their bounding square are rounding (as in [`overlay`]).
@@ -31,7 +30,7 @@ pub(super) enum Touch {
     Empty,
     /// The whole pad lies on the face.
     Whole,
-    /// Part of it does, with this area [m^2]; the outline is in the [`Scratch`].
+    /// Part of it does, with this area [m^2]; [`PatchIndex::outline`] gives its shape.
     Part(f64),
 }
 
@@ -221,7 +220,7 @@ impl PatchIndex {
         sum(x1 + 1, y1 + 1) + sum(x0, y0) - sum(x0, y1 + 1) - sum(x1 + 1, y0)
     }
 
-    /// How the pad, its origin at `place`, meets the patch. After [`Touch::Part`] the outline lies in `scratch`.
+    /// How the pad, its origin at `place`, meets the patch.
     pub(super) fn touch(&self, pad: &TurnedPad, place: DVec2, scratch: &mut Scratch) -> Touch {
         let bounds = Bounds2 { min: pad.bounds.min + place, max: pad.bounds.max + place };
         if !self.grid.holds(bounds) {
@@ -238,14 +237,20 @@ impl PatchIndex {
             return if self.contains(middle) { Touch::Whole } else { Touch::Empty };
         }
         scratch.fallback = None;
-        if !self.walk(pad, place, scratch) {
+        let area = self.area(pad, place, scratch).unwrap_or_else(|| {
+            let patch = self.clipped_by_library(&pad.window, place);
+            polygon::patch_area(scratch.fallback.insert(patch))
+        });
+        if area <= SLIVER * pad.area { Touch::Empty } else { Touch::Part(area) }
+    }
+
+    /// The shape of the contact after [`Touch::Part`] with the same pad, place and scratch, as proper polygons relative to the pad's
+    /// origin and turned by `-angle`, that is in the grip frame.
+    pub(super) fn outline(&self, pad: &TurnedPad, place: DVec2, scratch: &mut Scratch, angle: f64) -> Patch {
+        if scratch.fallback.is_none() && !self.walk(pad, place, scratch) {
             scratch.fallback = Some(self.clipped_by_library(&pad.window, place));
         }
-        let area = match &scratch.fallback {
-            Some(patch) => polygon::patch_area(patch),
-            None => loops(scratch).map(ring_area).sum(),
-        };
-        if area <= SLIVER * pad.area { Touch::Empty } else { Touch::Part(area) }
+        outline(scratch, angle)
     }
 
     /// The answer for a pad that reaches out of the region: a user's question, not one of a dense set.
@@ -323,7 +328,7 @@ fn bucket(pairs: Vec<(u32, u32)>, count: usize) -> (Vec<u32>, Vec<u32>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{intersect_convex, patch_area};
+    use crate::geometry::{intersect_convex, patch_area, ring_area};
     use crate::gripper::rectangle;
     use crate::model::Polygon;
     use proptest::prelude::*;
@@ -337,7 +342,7 @@ mod tests {
         match index.touch(pad, place, &mut scratch) {
             Touch::Empty => (0.0, Patch::new()),
             Touch::Whole => (pad.area(), vec![Polygon { outer: pad.ring.clone(), holes: Vec::new() }]),
-            Touch::Part(area) => (area, outline(&scratch, 0.0)),
+            Touch::Part(area) => (area, index.outline(pad, place, &mut scratch, 0.0)),
         }
     }
 
@@ -379,7 +384,7 @@ mod tests {
         assert_eq!(face.touch(&pad, DVec2::splat(3.0), &mut scratch), Touch::Whole);
         assert_eq!(face.touch(&pad, DVec2::splat(30.0), &mut scratch), Touch::Empty);
         let Touch::Part(area) = face.touch(&pad, DVec2::new(-4.5, 0.0), &mut scratch) else { panic!("half of the pad") };
-        assert!((area - 0.5).abs() < 1e-12 && (patch_area(&outline(&scratch, 1.0)) - 0.5).abs() < 1e-12);
+        assert!((area - 0.5).abs() < 1e-12 && (patch_area(&face.outline(&pad, DVec2::new(-4.5, 0.0), &mut scratch, 1.0)) - 0.5).abs() < 1e-12);
     }
 
     fn star(count: std::ops::Range<usize>, low: f64, high: f64) -> impl Strategy<Value = Ring> {

@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 
 use super::interference::View;
 use super::options::Rejection;
-use super::patch::{Scratch, Touch, TurnedPad, outline};
+use super::patch::{Scratch, Touch, TurnedPad};
 use super::sweep::{Stage, Sweep};
 use super::tree::Tree;
 use super::{Item, Prepared, Proposer};
@@ -233,7 +233,7 @@ impl Proposer<'_> {
             match prepared.patches[side].touch(pad, place, &mut scratch[side]) {
                 Touch::Empty => Patch::new(),
                 Touch::Whole => vec![Polygon { outer: oriented(&self.gripper.pad, flipped), holes: Vec::new() }],
-                Touch::Part(_) => outline(&scratch[side], angle),
+                Touch::Part(_) => prepared.patches[side].outline(pad, place, &mut scratch[side], angle),
             }
         };
         let face_i = patch(0);

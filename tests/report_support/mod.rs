@@ -117,7 +117,7 @@ fn score(grip: Grip, gripper: &Gripper, cases: &[gripfast::results::LoadCase], c
     let pads = Pads::new(&grip.contact).unwrap();
     let options = Options::default();
     let wrench = |load: usize| wrench_in_grip(&cases[load].wrench, centre_of_mass, &grip.part_from_grip);
-    let scores: Vec<_> = (0..cases.len()).map(|load| solve_pads(&pads, grip.width, FORCE, &wrench(load), &options)).collect();
+    let scores: Vec<_> = (0..cases.len()).map(|load| solve_pads(&pads, grip.distance(), FORCE, &wrench(load), &options)).collect();
     let key = |load: &usize| scores[*load].mu_s.unwrap_or(f64::INFINITY);
     let load = (0..cases.len()).max_by(|a, b| key(a).total_cmp(&key(b))).unwrap();
     let worst = scores[load];
@@ -144,7 +144,8 @@ fn score(grip: Grip, gripper: &Gripper, cases: &[gripfast::results::LoadCase], c
         contact_share: if worst.status == Status::TwistedOut { 0.0 } else { share.min(1.0) },
         twist_margin: levers.margin(FORCE, &wrench(load)),
         safety: worst.mu_s.zip(friction).filter(|(mu, _)| *mu > 0.0).map(|(mu, friction)| friction / mu),
-        force_needed: friction.and_then(|friction| inverse::force_needed(&pads, grip.width, &wrench(load), friction, &options)),
+        force_needed: friction.and_then(|friction| inverse::force_needed(&pads, grip.distance(), &wrench(load), friction, &options)),
+        merged: Vec::new(),
         mu_by_load: if cases.len() > 1 { scores.iter().map(|score| score.mu_s).collect() } else { Vec::new() },
         grip,
     }

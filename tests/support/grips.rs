@@ -68,6 +68,7 @@ pub(crate) fn grip(id: u64, part_from_grip: Frame, mu_s: f64) -> RankedGrip {
         twist_margin: 0.8,
         safety: Some(0.6 / mu_s),
         force_needed: Some(100.0 * mu_s / 0.6),
+        merged: Vec::new(),
         mu_by_load: vec![Some(mu_s), None],
     }
 }

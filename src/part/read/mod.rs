@@ -5,6 +5,8 @@ mod obj;
 mod off;
 mod ply;
 mod polygon;
+#[cfg(feature = "step")]
+mod step;
 mod stl;
 mod threemf;
 
@@ -18,7 +20,11 @@ use super::weld::{MAX_TRIANGLES, Soup, Welder};
 use crate::error::{Error, Result};
 
 /// Suffixes that are read, for messages.
-const KNOWN: &str = "stl, obj, ply, off, 3mf, gltf, glb (each also as .gz)";
+const KNOWN: &str = if cfg!(feature = "step") {
+    "stl, obj, ply, off, 3mf, gltf, glb, step (each also as .gz)"
+} else {
+    "stl, obj, ply, off, 3mf, gltf, glb (each also as .gz)"
+};
 
 /// Reads the triangles of `path` in the file's own unit.
 ///
@@ -27,12 +33,16 @@ const KNOWN: &str = "stl, obj, ply, off, 3mf, gltf, glb (each also as .gz)";
 pub(super) fn read(path: &Path) -> Result<Soup> {
     let place = path.display().to_string();
     let (suffix, zipped) = suffix(path);
-    if matches!(suffix.as_str(), "step" | "stp" | "iges" | "igs" | "brep") {
+    let step = matches!(suffix.as_str(), "step" | "stp");
+    if (step && !cfg!(feature = "step")) || matches!(suffix.as_str(), "iges" | "igs" | "brep") {
+        let build = if step { ", or build gripfast with `--features step` (needs Open CASCADE: Debian's libocct-data-exchange-dev)" } else { "" };
         return Err(Error::input(
             place,
             format!("'.{suffix}' holds exact surfaces, not triangles; this build has no CAD kernel to tessellate them"),
-            "convert it first, for example with the PyPI package cascadio: \
-             python3 -c \"import cascadio; cascadio.step_to_glb('part.step', 'part.glb', tol_linear=0.01)\", or export STL from the CAD system",
+            format!(
+                "convert it first, for example with the PyPI package cascadio: \
+                 python3 -c \"import cascadio; cascadio.step_to_glb('part.step', 'part.glb', tol_linear=0.01)\", or export STL from the CAD system{build}"
+            ),
         ));
     }
     let file = File::open(path).map_err(|source| Error::io(path, "read", source))?;
@@ -53,6 +63,8 @@ pub(super) fn read(path: &Path) -> Result<Soup> {
         "off" => off::read(&mut source)?,
         "3mf" => threemf::read(&mut source)?,
         "gltf" | "glb" => gltf::read(&mut source)?,
+        #[cfg(feature = "step")]
+        "step" | "stp" => step::read(&mut source)?,
         "" => return Err(Error::input(source.place, "the file name has no suffix to tell its format", format!("name it with one of: {KNOWN}"))),
         _ => return Err(Error::input(source.place, format!("unknown mesh format '.{suffix}'"), format!("convert it to one of: {KNOWN}"))),
     };

@@ -8,11 +8,10 @@ use crate::geometry::{Bounds2, contains, ring_area};
 use crate::model::{Patch, Polygon, Ring};
 
 impl PatchIndex {
-    /// Joins the pieces along the window's outline to closed loops; `false` when the crossings do not alternate or two
-    /// of them coincide, where rounding could have mixed them up.
-    pub(super) fn walk(&self, pad: &TurnedPad, place: DVec2, scratch: &mut Scratch) -> bool {
-        scratch.points.clear();
-        scratch.ends.clear();
+    /// Area of the patch in the window from the collected pieces, by Green's theorem: the pieces, and the stretches of the
+    /// window's outline between an exit and the next entry. `None` when the crossings do not alternate or two of them
+    /// coincide, where rounding could have mixed them up.
+    pub(super) fn area(&self, pad: &TurnedPad, place: DVec2, scratch: &mut Scratch) -> Option<f64> {
         scratch.events.clear();
         let along = |side: usize, point: DVec2| {
             let (a, b) = (pad.window[side], pad.window[(side + 1) % pad.window.len()]);
@@ -31,9 +30,32 @@ impl PatchIndex {
             let (event, following) = (scratch.events[index], scratch.events[(index + 1) % count]);
             let tied = count > 1 && event.side == following.side && (event.along - following.along).abs() < 1e-12;
             if event.entry == following.entry || tied {
-                return false;
+                return None;
             }
         }
+        let mut twice: f64 = scratch.pieces.iter().map(|piece| piece.start.perp_dot(piece.end)).sum();
+        for (index, from) in scratch.events.iter().enumerate().filter(|(_, event)| !event.entry) {
+            let to = &scratch.events[(index + 1) % count];
+            let mut at = scratch.pieces[from.piece as usize].end;
+            for corner in corners_between(pad, from, to) {
+                twice += at.perp_dot(corner);
+                at = corner;
+            }
+            twice += at.perp_dot(scratch.pieces[to.piece as usize].start);
+        }
+        // Without a crossing, the outline itself bounds the contact when its corner lies on the face.
+        if count == 0 && self.contains(pad.window[0] + place) {
+            twice += 2.0 * ring_area(&pad.window);
+        }
+        Some(twice / 2.0)
+    }
+
+    /// Joins the pieces that [`PatchIndex::area`] has sorted along the window's outline to closed loops; `false` where they do
+    /// not join.
+    pub(super) fn walk(&self, pad: &TurnedPad, place: DVec2, scratch: &mut Scratch) -> bool {
+        scratch.points.clear();
+        scratch.ends.clear();
+        let count = scratch.events.len();
         scratch.visited.clear();
         scratch.visited.resize(scratch.pieces.len(), false);
         // Loops that cross the outline.
@@ -44,26 +66,11 @@ impl PatchIndex {
             }
             let mut piece = event.piece;
             loop {
-                if !self.follow(piece, scratch) {
-                    return false;
-                }
-                // `follow` ended on a piece with an exit: go on along the outline to the next entry.
-                let Some(exit) = scratch
-                    .events
-                    .iter()
-                    .position(|event| !event.entry && scratch.pieces[event.piece as usize].end == scratch.points[scratch.points.len() - 1])
-                else {
-                    return false;
-                };
+                // From a piece with an exit, on along the outline to the next entry.
+                let Some(last) = self.follow(piece, scratch) else { return false };
+                let Some(exit) = scratch.events.iter().position(|event| !event.entry && event.piece == last) else { return false };
                 let (from, to) = (scratch.events[exit], scratch.events[(exit + 1) % count]);
-                let sides = pad.window.len();
-                let mut steps = (to.side + sides - from.side) % sides;
-                if steps == 0 && to.along < from.along {
-                    steps = sides;
-                }
-                for step in 1..=steps {
-                    scratch.points.push(pad.window[(from.side + step) % sides]);
-                }
+                scratch.points.extend(corners_between(pad, &from, &to));
                 piece = to.piece;
                 if piece == event.piece {
                     break;
@@ -95,20 +102,19 @@ impl PatchIndex {
         true
     }
 
-    /// Appends the chain of pieces that starts at `piece` up to its exit point.
-    fn follow(&self, mut piece: u32, scratch: &mut Scratch) -> bool {
+    /// Appends the chain of pieces that starts at `piece` up to its exit point; the last piece.
+    fn follow(&self, mut piece: u32, scratch: &mut Scratch) -> Option<u32> {
         loop {
             let current = scratch.pieces[piece as usize];
             if std::mem::replace(&mut scratch.visited[piece as usize], true) {
-                return false;
+                return None;
             }
             scratch.points.push(current.start);
             if current.exit.is_some() {
                 scratch.points.push(current.end);
-                return true;
+                return Some(piece);
             }
-            let Some(next) = self.next_piece(current.edge, scratch) else { return false };
-            piece = next;
+            piece = self.next_piece(current.edge, scratch)?;
         }
     }
 
@@ -137,9 +143,20 @@ impl PatchIndex {
     }
 }
 
-/// The outline of the last [`Touch::Part`] as proper polygons, relative to the pad's origin and turned by `-angle`,
+/// Corners of the window passed on the way along its outline from one crossing to another.
+fn corners_between<'p>(pad: &'p TurnedPad, from: &Event, to: &Event) -> impl Iterator<Item = DVec2> + use<'p> {
+    let sides = pad.window.len();
+    let mut steps = (to.side + sides - from.side) % sides;
+    if steps == 0 && to.along < from.along {
+        steps = sides;
+    }
+    let first = from.side;
+    (1..=steps).map(move |step| pad.window[(first + step) % sides])
+}
+
+/// The loops of the last walk, or the library's outline, as proper polygons, relative to the pad's origin and turned by `-angle`,
 /// that is in the grip frame.
-pub(in crate::propose) fn outline(scratch: &Scratch, angle: f64) -> Patch {
+pub(super) fn outline(scratch: &Scratch, angle: f64) -> Patch {
     let turn = DVec2::from_angle(-angle);
     let turned = |ring: &[DVec2]| -> Ring { ring.iter().map(|&point| turn.rotate(point)).collect() };
     if let Some(patch) = &scratch.fallback {

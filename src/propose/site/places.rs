@@ -81,12 +81,15 @@ pub(super) fn angles(overlap: &[Polygon], options: &ProposeOptions, pad: f64) ->
     angles
 }
 
-/// A grid over the overlap, its corners and centroids, and the point nearest the centre of mass.
+/// A grid over the overlap, its corners and centroids, and the point nearest the centre of mass. `reach` is half the pad's longer side:
+/// where the overlap is lower than the pad, the grid goes on beyond its edges until the pad leaves as much of it uncovered as it
+/// covers: a low wall is held from above by pads that stand clear of the floor.
 pub(super) fn positions(overlap: &[Polygon], spacing: f64, reach: f64, centre_of_mass: DVec2) -> Vec<DVec2> {
     let bounds = polygon::bounds(overlap);
-    let index = PatchIndex::new(overlap.to_vec(), bounds.grown(1.01 * reach), reach / 2.0);
+    let index = PatchIndex::new(overlap.to_vec(), bounds.grown(1.6 * reach), reach / 2.0);
+    let beyond = (DVec2::splat(2.0 * reach) - bounds.size()).max(DVec2::ZERO) / 2.0;
     // The site's origin is the middle of the bounds; rounding must not cost the outermost row.
-    let half = (bounds.size() / 2.0 / spacing + 1e-6).floor();
+    let half = ((bounds.size() / 2.0 + beyond) / spacing + 1e-6).floor();
     let mut positions = Vec::new();
     let mut y = -half.y;
     while y <= half.y {
@@ -166,6 +169,16 @@ mod tests {
         // 11 x 5 grid points, corners among them; the point nearest the centre of mass is not
         assert_eq!(found.len(), 56, "{found:?}");
         assert!(found.iter().any(|point| point.distance(DVec2::new(0.05, 0.003)) < 1e-12));
+    }
+
+    #[test]
+    fn a_low_face_is_held_from_beyond_its_edges() {
+        // 6 mm high, pads of 20 mm: their middles go on for 7 mm above and below.
+        let face = [shape(rectangle(DVec2::new(0.1, 0.006)))];
+        let found = positions(&face, 1e-3, 0.01, DVec2::ZERO);
+        let highest = found.iter().map(|point| point.y).fold(0.0, f64::max);
+        assert!((highest - 0.010).abs() < 1e-9, "{highest}");
+        assert!(found.iter().all(|point| point.x.abs() < 0.05 + 1e-9));
     }
 
     #[test]
