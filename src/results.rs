@@ -111,7 +111,7 @@ pub struct Comparison {
     pub spearman: Option<f64>,
     /// Kendall's tau-b; `None` as above.
     pub kendall_tau_b: Option<f64>,
-    /// Grips that gain most places over the earlier order, most first.
+    /// Grips that gain most places over the earlier order, most first; one for all that tie in both.
     pub risen: Vec<u64>,
     /// Grips that lose most places, most first.
     pub fallen: Vec<u64>,

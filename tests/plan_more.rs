@@ -20,8 +20,7 @@ use gripfast::propose::{Displacement, ProposeOptions, Proposer};
 use gripfast::rank::Weights;
 use gripfast::results::{GripSet, LoadCase, RankedGrip};
 
-const BRACKET: [&str; 10] =
-    ["plan", "data/parts/l_bracket.stl", "--gripper", "robotiq-2f85", "--mass", "350g", "--backend", "cpu", "--angle-step", "90deg"];
+const BRACKET: [&str; 10] = ["plan", "data/parts/l_bracket.stl", "--gripper", "robotiq-2f85", "--mass", "350g", "--backend", "cpu", "--angle-step", "90deg"];
 
 fn gripfast(arguments: &[&str]) -> Output {
     Command::cargo_bin("gripfast").unwrap().current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments).output().unwrap()
@@ -208,14 +207,7 @@ fn displaced_grips_agree_with_pads_clipped_by_hand() {
     let loads: Vec<LoadCase> = [DVec3::new(0.0, 0.0, -1.0), DVec3::new(1.0, -3.0, 0.5), DVec3::new(-2.0, 0.0, 1.0)]
         .map(|force| LoadCase { name: "by hand".into(), wrench: Wrench { force, moment: DVec3::new(0.01, 0.0, -0.02) } })
         .to_vec();
-    let settings = Settings {
-        force: 40.0,
-        weights: Weights::default(),
-        delta: 0.0,
-        mu_c: 0.0,
-        pad_friction: None,
-        score: ScoreOptions::default(),
-    };
+    let settings = Settings { force: 40.0, weights: Weights::default(), delta: 0.0, mu_c: 0.0, pad_friction: None, score: ScoreOptions::default() };
     let seeds = SeedSet::with_at_least(81).unwrap();
     let assessor = Assessor { loads: &loads, mass, settings: &settings, backend: &Backend::Cpu, seeds: &seeds };
     let mut ranked = assessor.assess(edge.iter().map(|&grip| grip.clone()).collect()).unwrap();

@@ -79,7 +79,8 @@ pub(crate) struct Args {
     /// Weight of alpha [1/rad] in the score.
     #[arg(long, default_value_t = 1.0, help_heading = "Scoring")]
     k2: f64,
-    /// Friction coefficient of the pads, for safety and the force needed [default: the gripper's].
+    /// Friction coefficient of the pads [default: the gripper's], for the safety, the force needed and the multiple of the worst load, all of it
+    /// with its moments, that is held. Another load may end at a smaller multiple, where it twists the contact out.
     #[arg(long, value_name = "MU", help_heading = "Scoring")]
     pad_friction: Option<f64>,
     /// Uncertainty of the part's position along the pads, for alpha.
@@ -256,12 +257,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let set = GripSet {
         format: results::FORMAT.into(),
         version: results::VERSION,
-        provenance: Provenance {
-            gripfast: env!("CARGO_PKG_VERSION").into(),
-            command: std::env::args().collect(),
-            backend: found.backend,
-            settings: described,
-        },
+        provenance: Provenance { gripfast: env!("CARGO_PKG_VERSION").into(), command: std::env::args().collect(), backend: found.backend, settings: described },
         part: PartSummary {
             file: args.part.display().to_string(),
             unit_m: part.unit_m,

@@ -71,7 +71,10 @@ fn limits(out: &mut impl Write, ranked: &RankedGrip, set: &GripSet) -> std::io::
     if let (Some(safety), Some(needed), Some(multiple)) = (ranked.safety, ranked.force_needed, ranked.load_multiple) {
         let friction = set.provenance.settings.get("pad_friction").and_then(serde_json::Value::as_f64);
         let friction = friction.map_or(String::new(), |friction| format!(" {friction}"));
-        writeln!(out, "  with the pads' friction{friction}: safety {safety:.2}, gripping force needed {needed:.2} N, held up to {multiple:.2} times this load")?;
+        writeln!(
+            out,
+            "  with the pads' friction{friction}: safety {safety:.2}, gripping force needed {needed:.2} N, held up to {multiple:.2} times this load"
+        )?;
     }
     if let Some(noise) = ranked.pose_noise {
         let mu = |value: Option<f64>| value.map_or("lost".to_owned(), |mu| format!("{mu:.5}"));

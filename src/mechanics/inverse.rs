@@ -72,8 +72,7 @@ struct Limit<S: Fn(f64) -> Score> {
 
 impl<S: Fn(f64) -> Score> Limit<S> {
     fn holds(&self, k: f64) -> bool {
-        let score = (self.solve)(k);
-        score.status.holds() && score.mu_s.is_some_and(|mu| mu <= self.friction)
+        holds(&(self.solve)(k), self.friction)
     }
 
     /// The load at which `mu_s` equals the friction, when the contact is whole there; else `None`.
@@ -121,6 +120,10 @@ impl<S: Fn(f64) -> Score> Limit<S> {
         }
         Some(low)
     }
+}
+
+fn holds(score: &Score, friction: f64) -> bool {
+    score.status.holds() && score.mu_s.is_some_and(|mu| mu <= friction)
 }
 
 /// A step up from small loads: a share of the nearest of the limits that they foretell, to slip, to a pad pulled off and to
@@ -192,7 +195,11 @@ mod tests {
             }
             assert!(held(limit * (1.0 - 1e-8)) && !held(limit * (1.0 + 1e-8)), "{index}: {limit}");
             let (before, after) = (at(limit * (1.0 - 1e-8)), at(limit * (1.0 + 1e-8)));
-            if after.status.holds() { by_slip += 1 } else { otherwise += 1 }
+            if after.status.holds() {
+                by_slip += 1
+            } else {
+                otherwise += 1
+            }
             falling += u32::from(at(limit * 0.9).mu_s.unwrap() > before.mu_s.unwrap());
         }
         assert!(by_slip > 10 && otherwise > 10 && falling > 0, "{by_slip} {otherwise} {falling}");

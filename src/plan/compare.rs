@@ -23,11 +23,14 @@ pub fn compare(grips: &mut [RankedGrip], centre_of_mass: DVec3, force: f64, weig
             earlier.place = place;
         }
     }
-    let mut moved: Vec<(f64, u64)> = listed.iter().enumerate().map(|(at, &index)| (before[at] - now[at], grips[index].grip.id)).collect();
-    moved.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    let risen = moved.iter().take_while(|(places, _)| *places > 0.0).take(NAMED).map(|(_, id)| *id).collect();
-    moved.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let fallen = moved.iter().take_while(|(places, _)| *places < 0.0).take(NAMED).map(|(_, id)| *id).collect();
+    // Of grips that tie in both orders, as those that a symmetry maps to each other do, the first stands for all.
+    let mut moved: Vec<(f64, f64, u64)> = listed.iter().enumerate().map(|(at, &index)| (before[at] - now[at], now[at], grips[index].grip.id)).collect();
+    let mut most = |sense: f64| -> Vec<u64> {
+        moved.sort_by(|a, b| (sense * b.0).total_cmp(&(sense * a.0)).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+        let first = moved.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).map(|tied| tied[0]);
+        first.take_while(|moved| sense * moved.0 > 0.0).take(NAMED).map(|moved| moved.2).collect()
+    };
+    let (risen, fallen) = (most(1.0), most(-1.0));
     Comparison {
         grips: listed.len() as u64,
         k1: weights.k1,

@@ -57,10 +57,5 @@ fn summary(scored: &[RankedGrip]) -> PoseNoise {
     values.sort_by(f64::total_cmp);
     // The smallest value that 95 of 100 do not exceed; a lost pose exceeds all.
     let at = |share: f64| values.get(((share * values.len() as f64).ceil() as usize).saturating_sub(1)).copied().filter(|mu| mu.is_finite());
-    PoseNoise {
-        samples: values.len() as u32,
-        lost: values.iter().filter(|mu| mu.is_infinite()).count() as u32,
-        mu_s_95: at(0.95),
-        mu_s_worst: at(1.0),
-    }
+    PoseNoise { samples: values.len() as u32, lost: values.iter().filter(|mu| mu.is_infinite()).count() as u32, mu_s_95: at(0.95), mu_s_worst: at(1.0) }
 }

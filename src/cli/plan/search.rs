@@ -170,4 +170,3 @@ fn progress_bar(total: u64, quiet: bool) -> ProgressBar {
     }
     bar
 }
-

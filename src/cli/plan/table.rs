@@ -25,7 +25,7 @@ pub(super) fn print(out: &mut impl Write, set: &GripSet, shown: &[&RankedGrip], 
     let friction = set.provenance.settings.get("pad_friction").and_then(serde_json::Value::as_f64);
     writeln!(out, "\nmu_s: smallest friction coefficient that holds the worst load. Slip centre from the grip's middle in the pad plane.")?;
     if let Some(friction) = friction {
-        writeln!(out, "With the pads' friction of {friction}: force needed for the worst load; the multiple of it (all of it, weight and all) that is held.")?;
+        writeln!(out, "Pads with a friction of {friction}: gripping force needed for the worst load, and how far all of that load may grow (multiple).")?;
     }
     writeln!(out, "Position of the grip's middle in the part frame.")?;
     let number = |name: &str| set.provenance.settings.get(name).and_then(serde_json::Value::as_f64);
