@@ -2,10 +2,15 @@
 //!
 //! Candidates flow through in chunks: proposed, scored under every load, measured; only the best [`Settings::keep`] stay.
 
+pub mod checkpoint;
+pub mod compare;
+pub mod noise;
+
 use std::collections::BTreeMap;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::backend::{Backend, Batch, Problem, ScoreOptions, Scored, SeedSet};
 use crate::error::Result;
@@ -82,7 +87,7 @@ impl Assessor<'_> {
         Ok(jobs.map(|((grip, wrenches), scored)| self.measure(grip, wrenches, &scored)).collect())
     }
 
-    /// A grip's numbers from its worst load; the gripping force needed is left to [`Assessor::finish`].
+    /// A grip's numbers from its worst load; what takes more solving is left to [`Assessor::finish`].
     fn measure(&self, grip: Grip, wrenches: &[Wrench], scored: &Scored) -> RankedGrip {
         let (load, score) = scored.worst.unwrap_or((0, refused(Status::NoContact, 0)));
         let wrench = wrenches.get(load).copied().unwrap_or_default();
@@ -100,6 +105,9 @@ impl Assessor<'_> {
             twist_margin: lever.margin(self.settings.force, &wrench),
             safety: self.settings.pad_friction.zip(score.mu_s).filter(|(_, mu)| *mu > 0.0).map(|(friction, mu)| friction / mu),
             force_needed: None,
+            load_multiple: None,
+            earlier: None,
+            pose_noise: None,
             worst: LoadScore {
                 load: load as u32,
                 wrench,
@@ -116,20 +124,22 @@ impl Assessor<'_> {
         }
     }
 
-    /// Adds what only the grips of the final list need: the gripping force needed under the worst load.
+    /// Adds what only the grips of the final list need: the gripping force needed and the largest multiple under the worst load.
     pub fn finish(&self, grips: &mut [RankedGrip]) {
         let Some(friction) = self.settings.pad_friction else { return };
         let options = Options { separation: self.settings.score.separation, ..Options::default() };
         grips.par_iter_mut().for_each(|ranked| {
             let grip = &ranked.grip;
-            ranked.force_needed =
-                Pads::new(&grip.contact).and_then(|pads| inverse::force_needed(&pads, grip.distance(), &ranked.worst.wrench, friction, &options));
+            let Some(pads) = Pads::new(&grip.contact) else { return };
+            ranked.force_needed = inverse::force_needed(&pads, grip.distance(), &ranked.worst.wrench, friction, &options);
+            let multiple = ranked.force_needed.map_or(0.0, |needed| self.settings.force / needed);
+            ranked.load_multiple = multiple.is_finite().then_some(multiple);
         });
     }
 }
 
 /// Collects scored grips chunk by chunk, keeping the best.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Collector {
     kept: Vec<RankedGrip>,
     ranked: u64,

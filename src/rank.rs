@@ -132,14 +132,18 @@ pub fn status_name(status: Status) -> String {
     }
 }
 
+/// Whether two scores count as equal, see [`TIE`]. Infinite ones, of grips that need no friction, tie with each other only.
+pub(crate) fn ties(a: f64, b: f64) -> bool {
+    a == b || ((a - b).is_finite() && (a - b).abs() <= TIE * a.abs().max(b.abs()))
+}
+
 /// Falling score, runs of scores that tie by id.
 ///
 /// A run ends at a gap between neighbours, not at a distance from its first member: two equal grips stay together whatever lies
 /// between them.
 fn order(grips: &mut [(f64, RankedGrip)]) {
-    let same = |a: f64, b: f64| a == b || (a - b).abs() <= TIE * a.abs().max(b.abs());
     grips.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.grip.id.cmp(&b.1.grip.id)));
-    for run in grips.chunk_by_mut(|a, b| same(a.0, b.0)) {
+    for run in grips.chunk_by_mut(|a, b| ties(a.0, b.0)) {
         run.sort_by_key(|grip| grip.1.grip.id);
     }
 }

@@ -88,6 +88,61 @@ pub struct Summary {
     pub ranked: u64,
     /// Rejected candidates by reason.
     pub rejections: BTreeMap<String, u64>,
+    /// Against the earlier evaluation function, when asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub comparison: Option<Comparison>,
+}
+
+/// How the ranking agrees with that of the earlier evaluation function
+/// `(k1 Delta_d + k2 tau_s/(mu_s N))/(D + epsilon) + k3 alpha` (the paper's section 2).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// Grips compared: those of the list.
+    pub grips: u64,
+    /// Weight of `Delta_d`.
+    pub k1: f64,
+    /// Weight of the mean radius `tau_s/(mu_s N)`.
+    pub k2: f64,
+    /// Weight of alpha [1/rad].
+    pub k3: f64,
+    /// Added to the distance from the centre of mass [m].
+    pub epsilon_m: f64,
+    /// Spearman's rank correlation; `None` where one of the orders has no two different places.
+    pub spearman: Option<f64>,
+    /// Kendall's tau-b; `None` as above.
+    pub kendall_tau_b: Option<f64>,
+    /// Grips that gain most places over the earlier order, most first; one for all that tie in both.
+    pub risen: Vec<u64>,
+    /// Grips that lose most places, most first.
+    pub fallen: Vec<u64>,
+}
+
+/// What the earlier method (slip centre at the centroid, uniform pressure) says of a grip.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EarlierScore {
+    /// The earlier evaluation function, larger is better.
+    pub evaluation: f64,
+    /// Place by it among the grips of the list, 1 is the best; grips that tie share the mean of their places.
+    pub place: f64,
+    /// Its friction coefficient under [`RankedGrip::worst`]'s load.
+    pub mu_s: f64,
+    /// Its slip centre, the centroid of the contact, in `(x1, x2)` [m].
+    pub slip_centre: [f64; 2],
+    /// Distance of the slip centre from the centre of mass in the pad plane [m], the function's `D`.
+    pub distance: f64,
+}
+
+/// What a grip becomes when the gripper stands a little off its pose.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PoseNoise {
+    /// Displaced poses tried.
+    pub samples: u32,
+    /// Of these, how many do not hold: no contact on a face, twisted out, a pad pulled off.
+    pub lost: u32,
+    /// 95 of 100 poses hold with this friction coefficient or less; `None` when more are lost.
+    pub mu_s_95: Option<f64>,
+    /// Largest `mu_s` of all; `None` when any is lost.
+    pub mu_s_worst: Option<f64>,
 }
 
 /// A grip with its score, worst load and rank.
@@ -117,6 +172,16 @@ pub struct RankedGrip {
     /// Ids of the grips left out because a symmetry of the part maps them to this one, where they were merged.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub merged: Vec<u64>,
+    /// Largest multiple of the worst load, all of it, that the pad friction holds together with every smaller one; `None`
+    /// without a pad friction, or without a load. Another load may end at a smaller multiple: see [`crate::mechanics::inverse`].
+    #[serde(default)]
+    pub load_multiple: Option<f64>,
+    /// By the earlier method, when asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub earlier: Option<EarlierScore>,
+    /// Under an uncertain pose, when asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose_noise: Option<PoseNoise>,
     /// `mu_s` of every load in the order of [`GripSet::loads`], when asked for; a load without limit state is null.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mu_by_load: Vec<Option<f64>>,

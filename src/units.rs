@@ -21,6 +21,8 @@ pub enum Quantity {
     Density,
     /// Pascals inside.
     Pressure,
+    /// Seconds inside.
+    Time,
 }
 
 /// Standard gravity [m/s^2] (exact by definition).
@@ -38,6 +40,7 @@ impl Quantity {
             Self::Acceleration => &[("m/s2", 1.0), ("m/s^2", 1.0), ("mm/s2", 1e-3), ("g", STANDARD_GRAVITY)],
             Self::Density => &[("kg/m3", 1.0), ("kg/m^3", 1.0), ("g/cm3", 1e3), ("g/cm^3", 1e3)],
             Self::Pressure => &[("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("GPa", 1e9), ("bar", 1e5), ("psi", 6_894.757_293_168)],
+            Self::Time => &[("s", 1.0), ("ms", 1e-3), ("min", 60.0), ("h", 3600.0)],
         }
     }
 

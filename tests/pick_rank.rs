@@ -45,6 +45,8 @@ fn no_friction_needed_is_best_and_weights_count() {
     let found = rank(list.clone(), DVec3::ZERO, SIZE, &Options::default());
     assert_eq!(ids(&found.grips), [1, 2, 0]);
     assert_eq!(found.grips[0].score, None, "infinite is null");
+    // A grip that needs none ties with no other, whatever their numbers.
+    assert_eq!(ids(&rank(vec![at(0, DVec3::ZERO, 0.1), at(1, DVec3::ZERO, 0.0)], DVec3::ZERO, SIZE, &Options::default()).grips), [1, 0]);
     let weights = Weights { k1: 0.0, k2: 2.0 };
     let found = rank(list, DVec3::ZERO, SIZE, &Options { weights, ..Options::default() });
     assert_eq!(ids(&found.grips), [0, 1, 2]);

@@ -11,7 +11,7 @@ use gripfast::results::GripSet;
 use gripfast::units::Quantity;
 
 /// Grippers drawn into a GLB when `--top` is not given: more hide the part.
-const GLB_TOP: usize = 10;
+pub(crate) const GLB_TOP: usize = 10;
 
 /// Writes a result file in the format of another program.
 #[derive(Debug, ClapArgs)]

@@ -1,39 +1,47 @@
 //! `gripfast plan`: from a part to ranked grips.
 
+mod flags;
+mod search;
+mod table;
+
 use std::collections::BTreeMap;
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Args as ClapArgs, ValueEnum};
-use comfy_table::{CellAlignment, Table, presets};
 use gripfast::backend::{Polish, ScoreOptions};
-use gripfast::error::{Error, Result};
-use gripfast::gripper::{self, Gripper};
+use gripfast::error::Error;
+use gripfast::export::{self, Format};
+use gripfast::gripper;
 use gripfast::load::LoadSet;
-use gripfast::model::{Slip, Status};
-use gripfast::part::{MassProperties, Part, ReadOptions, Unit};
-use gripfast::plan::{Assessor, Collector, Settings};
-use gripfast::propose::{ProposeOptions, Proposer};
+use gripfast::part::{Part, ReadOptions, Unit};
+use gripfast::plan::{Assessor, Settings, checkpoint, compare};
+use gripfast::propose::Proposer;
 use gripfast::rank::{self, Weights};
 
 use gripfast::report;
 use gripfast::results::{self, GripSet, PartSummary, Provenance, RankedGrip, Summary};
 use gripfast::units::Quantity;
-use indicatif::{ProgressBar, ProgressStyle};
 
 use super::backend::BackendArgs;
 use super::candidates::CandidateArgs;
+use super::export::GLB_TOP;
 use super::solve::{RefinerArg, SeparationArg};
 use super::why;
+use flags::{check_force, finite, not_negative};
+use search::{Partial, Search};
 
 /// Finds and ranks the grips on a part.
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "EXAMPLES:\n  gripfast plan bracket.stl --gripper robotiq-2f85 --mass 350g\n  \
 gripfast plan bracket.stl --gripper my-gripper.toml --density 2700kg/m3 --force 80N --accel 2g -o grips.json\n  \
-gripfast plan bracket.stl --gripper franka-hand --mass 350g --loads ball:500 --top 20 --diverse --report bracket.html\n\n\
+gripfast plan bracket.stl --gripper franka-hand --mass 350g --loads ball:500 --top 20 --diverse --report bracket.html\n  \
+gripfast plan bracket.stl --gripper franka-hand --mass 350g --pose-noise 1mm,2deg --compare\n  \
+gripfast plan housing.stl --gripper wsg50-110 --mass 2kg --spacing 0.5mm --loads ball:500 -o housing.parquet --resume\n  \
+for part in *.stl; do gripfast plan \"$part\" --gripper generic --density 2700kg/m3 -q -o \"${part%.stl}.json\" >\"${part%.stl}.txt\"; done\n\n\
+A run with -o keeps its state in FILE.partial and removes it at the end: after an interrupt, a kill or a power cut the same\n\
+command with --resume goes on from there, to the same result.\n\n\
 `gripfast gripper list` names the grippers that come with the program.")]
 pub(crate) struct Args {
     /// Part file: STL, OBJ, PLY, ...
@@ -71,7 +79,8 @@ pub(crate) struct Args {
     /// Weight of alpha [1/rad] in the score.
     #[arg(long, default_value_t = 1.0, help_heading = "Scoring")]
     k2: f64,
-    /// Friction coefficient of the pads, for safety and the force needed [default: the gripper's].
+    /// Friction coefficient of the pads [default: the gripper's], for the safety, the force needed and the multiple of the worst load, all of it
+    /// with its moments, that is held. Another load may end at a smaller multiple, where it twists the contact out.
     #[arg(long, value_name = "MU", help_heading = "Scoring")]
     pad_friction: Option<f64>,
     /// Uncertainty of the part's position along the pads, for alpha.
@@ -105,8 +114,8 @@ pub(crate) struct Args {
     /// Best grips to keep in the result file.
     #[arg(long, default_value_t = 10_000, help_heading = "Output")]
     keep: usize,
-    /// Result file (JSON).
-    #[arg(long, short, help_heading = "Output")]
+    /// Result file; its ending says the format: .json (read by the other subcommands), .jsonl, .csv, .parquet, .npz, ... as `export`.
+    #[arg(long, short, value_name = "FILE", help_heading = "Output")]
     output: Option<PathBuf>,
     /// Self-contained page to look at.
     #[arg(long, value_name = "FILE.html", help_heading = "Output")]
@@ -117,6 +126,25 @@ pub(crate) struct Args {
     /// Explains one pose instead of planning: position and approach angle in the plane of a face pair, and its number.
     #[arg(long, value_name = "X,Y,ANGLE,SITE", allow_hyphen_values = true, help_heading = "Output")]
     why: Option<String>,
+    /// Goes on with the unfinished run whose state lies beside the result file; starts anew when there is none.
+    #[arg(long, requires = "output", help_heading = "Long runs")]
+    resume: bool,
+    /// Time between two states written to FILE.partial; 0s: after every chunk.
+    #[arg(long, value_name = "TIME", default_value = "30s", help_heading = "Long runs")]
+    checkpoint: String,
+
+    /// Tries each printed grip at poses off by up to this along both axes of the pad plane and about the closing axis, e.g. 1mm,2deg:
+    /// mu_s that 95 % of them hold with, the worst, and how many are lost (no contact, twisted out). Interference is not tested again.
+    #[arg(long, value_name = "LENGTH,ANGLE", help_heading = "More about each grip")]
+    pose_noise: Option<String>,
+    /// Displaced poses per grip for --pose-noise, spread evenly.
+    #[arg(long, value_name = "N", default_value_t = 64, requires = "pose_noise", help_heading = "More about each grip")]
+    noise_samples: u32,
+    /// Beside the score the evaluation function of the earlier method, (K1 Delta_d + K2 tau_s/(mu_s N))/(D + EPSILON) + K3 alpha [default: 1,1,1,1mm],
+    /// for all grips kept; rank correlation, and the grips whose place differs most.
+    #[arg(long, value_name = "K1,K2,K3,EPSILON", num_args = 0..=1, require_equals = true, default_missing_value = "", help_heading = "More about each grip")]
+    compare: Option<String>,
+
     /// No progress bar and no notes.
     #[arg(long, short, help_heading = "Output")]
     quiet: bool,
@@ -162,6 +190,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         },
     };
     let seeds = args.backend.seed_set()?;
+    let format = args.output.as_deref().map(flags::output_format).transpose()?;
+    let noise = flags::noise(&args)?;
+    let earlier = args.compare.as_deref().map(flags::earlier_weights).transpose()?;
+    let every = flags::interval(&args.checkpoint)?;
 
     let part = Part::read(&args.part, &ReadOptions { unit: args.unit })?;
     for line in part.health.warnings.iter() {
@@ -170,7 +202,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !part.health.watertight {
         note("warning: the surface is not watertight: volume, centre of mass and inertia are estimates (see `gripfast part`)");
     }
-    let mass = mass(&args, &part)?;
+    let mass = flags::mass(&args, &part)?;
     let cases = loads.cases(&mass)?;
     let selection = args.backend.select()?;
     note(&format!("backend {}", selection.reason));
@@ -182,34 +214,29 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         why::print(&mut std::io::stdout().lock(), &explanation)?;
         return Ok(if explanation.rejection.is_none() { ExitCode::SUCCESS } else { ExitCode::from(1) });
     }
-    let stop = stop_on_interrupt();
-    let bar = progress(proposer.candidates(), args.quiet);
+    let keep = args.keep.max(args.top);
     let assessor = Assessor { loads: &cases, mass, settings: &settings, backend: &selection.backend, seeds: &seeds };
-    let mut collector = Collector::default();
-    let mut complete = true;
-    for chunk in proposer.by_ref() {
-        collector.add(assessor.assess(chunk.grips)?, args.keep.max(args.top), settings.weights);
-        bar.inc(chunk.candidates);
-        bar.set_message(format!("{} grips", collector.ranked()));
-        if stop.load(Ordering::Relaxed) {
-            complete = false;
-            break;
-        }
+    let mut described = describe(&settings, seeds.len());
+    described.insert("keep".into(), keep.into());
+    let partial = args.output.as_deref().and_then(Partial::beside).map(|path| Partial {
+        path,
+        every,
+        inputs: checkpoint::inputs(&part, &mass, &gripper, &cases, &propose, described.clone()),
+    });
+    if args.resume && partial.is_none() {
+        return Err(Error::input("--resume", "the result does not go to a regular file", "give a file after -o").into());
     }
-    bar.finish_and_clear();
-    if !complete {
-        note("interrupted: the ranking covers the candidates looked at so far");
-    }
+    let found = Search { assessor: &assessor, keep, partial: partial.as_ref(), quiet: args.quiet }.run(&mut proposer, args.resume)?;
 
     let (low, high) = part.mesh.bounding_box();
-    let ranking = collector.finish(
+    let ranking = found.collector.finish(
         mass.centre_of_mass,
         (high - low).length(),
         &rank::Options {
             weights: settings.weights,
             keep_flips: args.candidates.flips(),
             merge_duplicates: args.merge_symmetric,
-            top: Some(args.keep.max(args.top)),
+            top: Some(keep),
             ..rank::Options::default()
         },
     );
@@ -219,15 +246,27 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let mut grips = ranking.grips;
     assessor.finish(&mut grips);
+    let comparison = earlier.map(|weights| compare::compare(&mut grips, mass.centre_of_mass, force, &weights));
+    let shown: Vec<u64> = if args.diverse {
+        rank::choose_diverse(&grips, args.top, (high - low).length()).into_iter().map(|ranked| ranked.grip.id).collect()
+    } else {
+        grips.iter().take(args.top).map(|ranked| ranked.grip.id).collect()
+    };
+    if let Some(noise) = noise {
+        let mut chosen: Vec<&mut RankedGrip> = grips.iter_mut().filter(|ranked| shown.contains(&ranked.grip.id)).collect();
+        noise.assess(&proposer, &assessor, &mut chosen)?;
+        described.extend([
+            ("pose_noise_m".into(), noise.shift.into()),
+            ("pose_noise_rad".into(), noise.turn.into()),
+            ("noise_samples".into(), noise.samples.into()),
+        ]);
+    }
+    described.extend(CandidateArgs::settings(&propose, &gripper).into_iter().map(|(name, value)| (name.to_owned(), value)));
+    described.insert("complete".into(), found.complete.into());
     let set = GripSet {
         format: results::FORMAT.into(),
         version: results::VERSION,
-        provenance: Provenance {
-            gripfast: env!("CARGO_PKG_VERSION").into(),
-            command: std::env::args().collect(),
-            backend: selection.backend.name(),
-            settings: describe(&settings, &propose, &gripper, seeds.len(), complete),
-        },
+        provenance: Provenance { gripfast: env!("CARGO_PKG_VERSION").into(), command: std::env::args().collect(), backend: found.backend, settings: described },
         part: PartSummary {
             file: args.part.display().to_string(),
             unit_m: part.unit_m,
@@ -238,11 +277,22 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         },
         gripper: serde_json::to_value(&gripper)?,
         loads: cases,
-        summary: Summary { pairs: proposer.tally().pairs, candidates: proposer.tally().candidates, ranked: ranking.ranked, rejections },
+        summary: Summary { pairs: proposer.tally().pairs, candidates: proposer.tally().candidates, ranked: ranking.ranked, rejections, comparison },
         grips,
     };
-    if let Some(path) = &args.output {
-        set.write(path)?;
+    if let (Some(path), Some(format)) = (&args.output, format) {
+        match format {
+            Format::Json => set.write(path)?,
+            Format::JsonLines => set.write_lines(path)?,
+            _ => {
+                let options =
+                    export::Options { top: (format == Format::Glb).then_some(GLB_TOP), pad_friction: settings.pad_friction, ..export::Options::default() };
+                export::write(&set, format, path, &options, Some(&part.mesh))?;
+            }
+        }
+    }
+    if let Some(partial) = partial.filter(|_| found.complete) {
+        partial.remove()?;
     }
     if let Some(path) = &args.report {
         report::write(&set, Some(&part.mesh), path)?;
@@ -252,7 +302,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         set.write_json(&mut out)?;
         writeln!(out)?;
     } else {
-        print(&mut out, &set, &args, &gripper, force)?;
+        let shown: Vec<&RankedGrip> = set.grips.iter().filter(|ranked| shown.contains(&ranked.grip.id)).collect();
+        table::print(&mut out, &set, &shown, &gripper, force)?;
     }
     for path in args.output.iter().chain(&args.report) {
         note(&format!("wrote {}", path.display()));
@@ -260,82 +311,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(if set.grips.is_empty() { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
 
-fn finite(flag: &str, value: f64) -> Result<f64> {
-    if value.is_finite() { Ok(value) } else { Err(Error::input(flag, format!("is {value}"), "give a finite number")) }
-}
-
-fn not_negative(flag: &str, value: f64) -> Result<f64> {
-    if value.is_finite() && value >= 0.0 { Ok(value) } else { Err(Error::input(flag, format!("is {value}"), "give a number, zero or more")) }
-}
-
-fn check_force(force: f64, gripper: &Gripper) -> Result<()> {
-    let [least, most] = gripper.force;
-    if force <= 0.0 {
-        return Err(Error::input("--force", format!("is {force} N"), "give a force above zero"));
-    }
-    if force < least * (1.0 - 1e-9) || force > most * (1.0 + 1e-9) {
-        return Err(Error::input("--force", format!("{force} N is outside what {} can do", gripper.name), format!("give {least} N to {most} N")));
-    }
-    Ok(())
-}
-
-/// Mass properties at the mass or density asked for.
-fn mass(args: &Args, part: &Part) -> Result<MassProperties> {
-    match (&args.mass, &args.density) {
-        (Some(text), _) => {
-            let mass = Quantity::Mass.parse("--mass", text)?;
-            let unit = part.mass_properties(1.0);
-            if mass <= 0.0 {
-                return Err(Error::input("--mass", format!("is {mass} kg"), "give a mass above zero"));
-            }
-            if unit.volume.is_nan() || unit.volume <= 0.0 {
-                return Err(Error::input(
-                    part.file.display().to_string(),
-                    "the surface encloses no volume",
-                    "repair the mesh: without a volume there is no centre of mass",
-                ));
-            }
-            Ok(part.mass_properties(mass / unit.volume))
-        }
-        (None, Some(text)) => Ok(part.mass_properties(Quantity::Density.parse("--density", text)?)),
-        (None, None) if args.loads.split(',').all(|source| source.trim().starts_with("ball")) => Ok(part.mass_properties(1000.0)),
-        (None, None) => Err(Error::input(
-            "--mass",
-            "the part's mass is not known",
-            "give --mass 350g, or --density 2700kg/m3 (aluminium), 7850kg/m3 (steel), 1200kg/m3 (plastic)",
-        )),
-    }
-}
-
-/// Set when the user asks to stop: the run ends after the chunk in flight with what it has.
-fn stop_on_interrupt() -> Arc<AtomicBool> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    // A second handler in one process is refused; then an interrupt just ends the program, which is all right too.
-    let _ = ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    });
-    stop
-}
-
-/// A bar with rate and time left; hidden when asked for or when nobody watches.
-fn progress(total: u64, quiet: bool) -> ProgressBar {
-    if quiet || !std::io::stderr().is_terminal() {
-        return ProgressBar::hidden();
-    }
-    let bar = ProgressBar::new(total);
-    if let Ok(style) = ProgressStyle::with_template("{bar:32} {human_pos}/{human_len} candidates  {per_sec}  {eta} left  {msg}") {
-        bar.set_style(style);
-    }
-    bar
-}
-
-fn describe(settings: &Settings, propose: &ProposeOptions, gripper: &Gripper, seeds: usize, complete: bool) -> BTreeMap<String, serde_json::Value> {
-    let mut all: BTreeMap<String, serde_json::Value> =
-        CandidateArgs::settings(propose, gripper).into_iter().map(|(name, value)| (name.to_string(), value)).collect();
-    all.extend([
+/// The settings that decide the answer, but for the candidates'.
+fn describe(settings: &Settings, seeds: usize) -> BTreeMap<String, serde_json::Value> {
+    BTreeMap::from([
         ("force_n".to_string(), settings.force.into()),
         ("k1".to_string(), settings.weights.k1.into()),
         ("k2".to_string(), settings.weights.k2.into()),
@@ -346,101 +324,5 @@ fn describe(settings: &Settings, propose: &ProposeOptions, gripper: &Gripper, se
         ("refiner".to_string(), format!("{:?}", settings.score.refiner).to_lowercase().into()),
         ("polish".to_string(), format!("{:?}", settings.score.polish).to_lowercase().into()),
         ("seeds".to_string(), seeds.into()),
-        ("complete".to_string(), complete.into()),
-    ]);
-    all
-}
-
-/// The table a user reads.
-fn print(out: &mut impl Write, set: &GripSet, args: &Args, gripper: &Gripper, force: f64) -> anyhow::Result<()> {
-    let mass = &set.part.mass;
-    let size = (set.part.bbox_max - set.part.bbox_min) * 1e3;
-    writeln!(
-        out,
-        "{}: {:.1} x {:.1} x {:.1} mm, {} triangles, {:.4} kg, centre of mass ({:.2}, {:.2}, {:.2}) mm",
-        set.part.file,
-        size.x,
-        size.y,
-        size.z,
-        set.part.triangles,
-        mass.mass,
-        mass.centre_of_mass.x * 1e3,
-        mass.centre_of_mass.y * 1e3,
-        mass.centre_of_mass.z * 1e3
-    )?;
-    writeln!(
-        out,
-        "{} at {force} N, {} loads, {} face pairs, {} candidates, {} grips hold",
-        gripper.name,
-        set.loads.len(),
-        set.summary.pairs,
-        set.summary.candidates,
-        set.summary.ranked
-    )?;
-    if !set.summary.rejections.is_empty() {
-        let mut reasons: Vec<_> = set.summary.rejections.iter().collect();
-        reasons.sort_by(|a, b| b.1.cmp(a.1));
-        writeln!(out, "rejected: {}", reasons.iter().map(|(reason, count)| format!("{count} {}", reason.replace('_', " "))).collect::<Vec<_>>().join(", "))?;
-    }
-    if set.grips.is_empty() {
-        writeln!(out, "\nno grip holds this part: see the reasons above")?;
-        if set.summary.pairs == 0 {
-            writeln!(out, "no two opposite planar faces lie within the stroke of {:.1} to {:.1} mm", gripper.stroke[0] * 1e3, gripper.stroke[1] * 1e3)?;
-        }
-        return Ok(());
-    }
-    let diagonal = (set.part.bbox_max - set.part.bbox_min).length();
-    let shown: Vec<&RankedGrip> = if args.diverse { rank::choose_diverse(&set.grips, args.top, diagonal) } else { set.grips.iter().take(args.top).collect() };
-    let mut table = Table::new();
-    table.load_style(presets::NOTHING);
-    table.set_header(["rank", "id", "mu_s", "safety", "force needed", "worst load", "slip centre mm", "contact", "alpha", "score", "width mm", "position mm"]);
-    for grip in shown {
-        table.add_row(row(grip, set));
-    }
-    for column in [0, 1, 2, 3, 4, 7, 8, 9, 10] {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    writeln!(out, "\n{table}")?;
-    writeln!(
-        out,
-        "\nmu_s: smallest friction coefficient that holds the worst load. Slip centre from the grip's middle in the pad plane.\nPosition of the grip's middle in the part frame."
-    )?;
-    if args.merge_symmetric {
-        writeln!(out, "Rank (+n): stands for n more grips that a symmetry of the part maps to it (`merged` in the result file).")?;
-    }
-    Ok(())
-}
-
-fn row(grip: &RankedGrip, set: &GripSet) -> Vec<String> {
-    let worst = &grip.worst;
-    let option = |value: Option<f64>, digits: usize| value.map_or_else(|| "-".to_string(), |value| format!("{value:.digits$}"));
-    let slip = match worst.slip {
-        Some(Slip::Rotation { c, .. }) => tuple(&[c[0] * 1e3, c[1] * 1e3]),
-        Some(Slip::Translation { .. }) => "slides".into(),
-        _ => "-".into(),
-    };
-    let o = grip.grip.part_from_grip.origin * 1e3;
-    let mark = if worst.status == Status::Ambiguous { "?" } else { "" };
-    vec![
-        if grip.merged.is_empty() { grip.rank.to_string() } else { format!("{} (+{})", grip.rank, grip.merged.len()) },
-        grip.grip.id.to_string(),
-        format!("{}{mark}", option(worst.mu_s, 5)),
-        option(grip.safety, 2),
-        grip.force_needed.map_or_else(|| "-".into(), |force| format!("{force:.2} N")),
-        set.loads[worst.load as usize].name.clone(),
-        slip,
-        format!("{:.0} %", grip.contact_share * 100.0),
-        format!("{:.1} deg", grip.alpha.to_degrees()),
-        option(grip.score, 3),
-        format!("{}{:.2}", if grip.grip.inside { "inside " } else { "" }, grip.grip.width * 1e3),
-        tuple(&o.to_array()),
-    ]
-}
-
-/// Numbers to two places in brackets, without negative zeros.
-fn tuple(numbers: &[f64]) -> String {
-    let text = numbers.iter().map(|x| format!("{x:.2}")).map(|x| if x == "-0.00" { "0.00".into() } else { x }).collect::<Vec<_>>();
-    format!("({})", text.join(", "))
+    ])
 }

@@ -90,7 +90,8 @@ impl From<RefinerArg> for Refiner {
 #[derive(serde::Serialize)]
 struct Inverse {
     force_needed: Option<f64>,
-    load_multiple: f64,
+    /// `None`: any multiple is held.
+    load_multiple: Option<f64>,
 }
 
 #[derive(serde::Serialize)]
@@ -139,18 +140,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         let inverse = args.pad_friction.and_then(|friction| {
             let pads = Pads::new(&case.contact)?;
+            let multiple = inverse::load_multiple(&pads, case.distance, case.force, &case.wrench, friction, &options);
             Some(Inverse {
                 force_needed: inverse::force_needed(&pads, case.distance, &case.wrench, friction / args.safety, &options),
-                load_multiple: inverse::load_multiple(&pads, case.distance, case.force, &case.wrench, friction, &options),
+                load_multiple: multiple.is_finite().then_some(multiple),
             })
         });
         if args.json {
-            let mut inverse = inverse;
-            if let Some(inverse) = &mut inverse
-                && !inverse.load_multiple.is_finite()
-            {
-                inverse.load_multiple = f64::MAX;
-            }
             writeln!(out, "{}", serde_json::to_string(&Answer { id: case.id.as_deref(), score, inverse })?)?;
         } else {
             if cases.len() > 1 {
@@ -205,7 +201,8 @@ fn print(out: &mut impl Write, case: &Case, score: &Score, inverse: Option<&Inve
             )?,
             None => writeln!(out, "gripping force needed                     none is enough at this pad friction")?,
         }
-        writeln!(out, "load multiple held                        {:.4}", inverse.load_multiple)?;
+        let multiple = inverse.load_multiple.map_or("any: there is no load".into(), |multiple| format!("{multiple:.4}"));
+        writeln!(out, "load multiple held                        {multiple}")?;
     }
     if args.explain {
         let solver = match (args.method, args.refiner) {

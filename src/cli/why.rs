@@ -9,7 +9,7 @@ use gripfast::error::{Error, Result};
 use gripfast::gripper::Gripper;
 use gripfast::part::{Part, ReadOptions, Unit};
 use gripfast::propose::{Explanation, Proposer};
-use gripfast::results::GripSet;
+use gripfast::results::{GripSet, RankedGrip};
 use gripfast::units::Quantity;
 
 use super::candidates::CandidateArgs;
@@ -64,7 +64,40 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         ranked.alpha.to_degrees(),
         ranked.delta_d * 1e3
     )?;
+    limits(&mut out, ranked, &set)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// How much more it holds, and what was asked for besides.
+fn limits(out: &mut impl Write, ranked: &RankedGrip, set: &GripSet) -> std::io::Result<()> {
+    if let (Some(safety), Some(needed), Some(multiple)) = (ranked.safety, ranked.force_needed, ranked.load_multiple) {
+        let friction = set.provenance.settings.get("pad_friction").and_then(serde_json::Value::as_f64);
+        let friction = friction.map_or(String::new(), |friction| format!(" {friction}"));
+        writeln!(
+            out,
+            "  with the pads' friction{friction}: safety {safety:.2}, gripping force needed {needed:.2} N, held up to {multiple:.2} times this load"
+        )?;
+    }
+    if let Some(noise) = ranked.pose_noise {
+        let mu = |value: Option<f64>| value.map_or("lost".to_owned(), |mu| format!("{mu:.5}"));
+        writeln!(
+            out,
+            "  pose uncertain: of {} displaced poses {} are lost; mu_s of 95 % at most {}, of all {}",
+            noise.samples,
+            noise.lost,
+            mu(noise.mu_s_95),
+            mu(noise.mu_s_worst)
+        )?;
+    }
+    if let (Some(earlier), Some(comparison)) = (&ranked.earlier, &set.summary.comparison) {
+        let [x, y] = earlier.slip_centre.map(|value| value * 1e3);
+        writeln!(
+            out,
+            "  earlier method: evaluation {:.4}, place {} of {}, mu_s {:.5} about the centroid ({x:.2}, {y:.2}) mm",
+            earlier.evaluation, earlier.place, comparison.grips, earlier.mu_s
+        )?;
+    }
+    Ok(())
 }
 
 /// The pose of `plan --why X,Y,ANGLE,SITE`, e.g. `3mm,-2mm,30deg,0`.

@@ -240,8 +240,11 @@ pub fn write_to(set: &GripSet, format: Format, writer: &mut (impl Write + Send),
     write_view(&view, format, writer, part).map_err(|error| Error::io(Path::new("standard output"), "write", error))
 }
 
-/// Refuses a format that this build lacks before anything is written.
-fn check(format: Format) -> Result<()> {
+/// Refuses a format that this build lacks, before anything is computed or written.
+///
+/// # Errors
+/// When the format is not built in.
+pub fn check(format: Format) -> Result<()> {
     match format {
         Format::Parquet if !cfg!(feature = "parquet") => Err(Error::input(
             "--format parquet",

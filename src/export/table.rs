@@ -90,6 +90,7 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
         number("delta_d_m", &|grip| Some(grip.delta_d)),
         number("safety", &|grip| grip.safety),
         number("force_needed_n", &|grip| grip.force_needed),
+        number("load_multiple", &|grip| grip.load_multiple),
         text("slip", &|grip| match grip.worst.slip {
             Some(Slip::Rotation { .. }) => "rotation".into(),
             Some(Slip::Translation { .. }) => "translation".into(),
@@ -106,6 +107,21 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
         number("mu_upper", &|grip| grip.worst.bounds.map(|bounds| bounds.upper)),
         number("residual", &|grip| Some(grip.worst.residual)),
     ]);
+    // Only where they were asked for.
+    if grips.iter().any(|grip| grip.pose_noise.is_some()) {
+        columns.extend([
+            number("noise_mu_s_95", &|grip| grip.pose_noise.and_then(|noise| noise.mu_s_95)),
+            number("noise_mu_s_worst", &|grip| grip.pose_noise.and_then(|noise| noise.mu_s_worst)),
+            number("noise_lost_share", &|grip| grip.pose_noise.map(|noise| f64::from(noise.lost) / f64::from(noise.samples))),
+        ]);
+    }
+    if grips.iter().any(|grip| grip.earlier.is_some()) {
+        columns.extend([
+            number("earlier_evaluation", &|grip| grip.earlier.as_ref().map(|earlier| earlier.evaluation)),
+            number("earlier_place", &|grip| grip.earlier.as_ref().map(|earlier| earlier.place)),
+            number("earlier_mu_s", &|grip| grip.earlier.as_ref().map(|earlier| earlier.mu_s)),
+        ]);
+    }
     Table { columns, rows: grips.len() }
 }
 

@@ -1,16 +1,21 @@
 //! Questions asked the other way round: how hard to squeeze for a given pad friction, how much load before slip.
+//!
+//! Loads and forces enter the equations only by their ratio `k`, the load in units of the gripping force, so both are one
+//! question: up to which `k` does the grip hold? `mu_s(k)` is `k` times a constant while congruent faces are pressed all
+//! over. It rises with `k` on any faces pressed all over as long as the friction coupling is weak: `D(v)` is linear in the
+//! pressure, so every twist's bound `k w.v / (D_0 + k D_1)` rises. Where the pads separate it may fall again before the
+//! contact twists out, and a `k` at which `mu_s` equals the pad friction need not be the smallest one: there the limit is
+//! looked for from small loads upwards.
 
 use crate::model::{Score, Status, Wrench};
 
-use super::{Options, Pads, Search, solve_pads};
+use super::{COUPLING_SEARCH, Options, Pads, Search, solve_pads};
 
-/// The gripping force [N] needed to hold `wrench` with the pad friction `friction`: at it `mu_s` equals `friction`, or just
-/// below it the contact twists out. `None` when no force up to `1e9` times the load's size holds it (or `friction` is not positive).
+/// The gripping force [N] needed to hold `wrench` with the pad friction `friction`: every larger force holds it too, and
+/// just below it the load slips (`mu_s` equals `friction`), twists out or pulls a pad off. `None` when no force up to
+/// `1e9` times the load's size holds it (or `friction` is not positive).
 ///
-/// `mu_s` times the force hardly changes while the contact stays whole, so the force is found by proportion in a few
-/// steps. Where that does not settle (separation, several limit states) it is the smallest force from which on every
-/// larger one tried holds, by search from above and bisection to 1e-9. Only limit states on the branch from `d = 0` count
-/// ([`Search::Off`]), which errs towards more force.
+/// Only limit states on the branch from `d = 0` count ([`Search::Off`]), which errs towards more force.
 pub fn force_needed(pads: &Pads, distance: f64, wrench: &Wrench, friction: f64, options: &Options) -> Option<f64> {
     if friction.is_nan() || friction <= 0.0 {
         return None;
@@ -20,62 +25,116 @@ pub fn force_needed(pads: &Pads, distance: f64, wrench: &Wrench, friction: f64, 
         return Some(0.0);
     }
     let options = Options { search: Search::Off, ..*options };
-    let solve = |force: f64| solve_pads(pads, distance, force, wrench, &options);
-    by_proportion(1e3 * size, friction, solve).or_else(|| from_above(size, friction, solve))
+    let search = Limit { friction, solve: |k: f64| solve_pads(pads, distance, size / k, wrench, &options) };
+    let start = START.iter().copied().find(|&k| search.holds(k))?;
+    // Where the friction coupling is strong, contact that is whole at the limit may separate before it.
+    let weak = friction * distance.abs() <= COUPLING_SEARCH * pads.length;
+    let by_proportion = if weak { search.by_proportion(start, pads) } else { None };
+    let limit = by_proportion.or_else(|| search.upwards(start, first_step(pads, distance, wrench, size, &search, start)))?;
+    Some(size / limit)
 }
 
-/// Steps of [`by_proportion`]; it settles in two where the contact stays whole.
-const STEPS: usize = 12;
-
-fn by_proportion(mut force: f64, friction: f64, solve: impl Fn(f64) -> Score) -> Option<f64> {
-    for _ in 0..STEPS {
-        let score = solve(force);
-        let mu = score.mu_s.filter(|mu| score.status == Status::Ok && *mu > 0.0)?;
-        if (mu / friction - 1.0).abs() <= 1e-10 {
-            return Some(force);
-        }
-        force *= mu / friction;
+/// The largest multiple of `wrench` that `friction` holds at the gripping force `force` [N] together with every smaller
+/// multiple; infinite for no load, 0 when not even a small one is held.
+///
+/// The whole wrench grows, moments and normal force with it. It is one load's answer: of several loads, the one with the
+/// smallest multiple need not be the one with the largest `mu_s`, because `M1`, `M2` and `F3` may twist the contact out
+/// or pull a pad off long before another load slips.
+pub fn load_multiple(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, friction: f64, options: &Options) -> f64 {
+    match force_needed(pads, distance, wrench, friction, options) {
+        Some(needed) => force / needed,
+        None => 0.0,
     }
-    None
 }
 
-fn from_above(size: f64, friction: f64, solve: impl Fn(f64) -> Score) -> Option<f64> {
-    let holds = |force: f64| holds(&solve(force), friction);
-    let mut high = size;
-    while !holds(high) || !holds(2.0 * high) {
-        high *= 2.0;
-        if high > 1e9 * size {
-            return None;
+/// Loads in units of the gripping force at which the search may begin; the first is below any limit of practice.
+const START: [f64; 3] = [1e-3, 1e-6, 1e-9];
+/// Largest load in units of the gripping force.
+const MOST: f64 = 1e9;
+/// Equal steps up to the limit that small loads foretell. A window narrower than a step in which the load is not held,
+/// between loads that are, can be missed.
+const STEPS: u32 = 16;
+/// Growth of the steps beyond it.
+const GROWTH: f64 = 1.05;
+/// Parts into which the step with the limit is cut, twice, before bisection.
+const PARTS: u32 = 8;
+/// Relative width at which the limit counts as found.
+const FOUND: f64 = 1e-9;
+
+/// Steps of [`Limit::by_proportion`]; it settles in two where `mu_s` is proportional to the load.
+const PROPORTIONS: usize = 12;
+
+/// The search for the largest load held, in units of the gripping force.
+struct Limit<S: Fn(f64) -> Score> {
+    friction: f64,
+    solve: S,
+}
+
+impl<S: Fn(f64) -> Score> Limit<S> {
+    fn holds(&self, k: f64) -> bool {
+        holds(&(self.solve)(k), self.friction)
+    }
+
+    /// The load at which `mu_s` equals the friction, when the contact is whole there; else `None`.
+    fn by_proportion(&self, mut k: f64, pads: &Pads) -> Option<f64> {
+        for _ in 0..PROPORTIONS {
+            let score = (self.solve)(k);
+            let left = [score.contact_area_i, score.contact_area_ii];
+            let whole = (0..2).all(|face| left[face] >= pads.moments[face][0] * pads.length * pads.length * (1.0 - 1e-12));
+            let mu = score.mu_s.filter(|mu| whole && score.status == Status::Ok && *mu > 0.0)?;
+            if (mu / self.friction - 1.0).abs() <= 1e-10 {
+                return Some(k);
+            }
+            k *= self.friction / mu;
         }
+        None
     }
-    let mut low = high / 1.25;
-    while holds(low) {
-        high = low;
-        low /= 1.25;
-        if low < 1e-9 * size {
-            return Some(high);
+
+    /// The smallest load above `start`, which holds, at which it holds no longer; `None` beyond [`MOST`].
+    fn upwards(&self, start: f64, step: f64) -> Option<f64> {
+        let (mut low, mut high) = (start, start + step);
+        let mut steps = 0;
+        while self.holds(high) {
+            low = high;
+            steps += 1;
+            high = if steps < STEPS { high + step } else { high * GROWTH };
+            if high > MOST {
+                return None;
+            }
         }
+        for _ in 0..2 {
+            let part = (high - low) / f64::from(PARTS);
+            let bottom = low;
+            for index in 1..PARTS {
+                let k = bottom + part * f64::from(index);
+                if !self.holds(k) {
+                    high = k;
+                    break;
+                }
+                low = k;
+            }
+        }
+        while high - low > FOUND * high {
+            let middle = (low + high) / 2.0;
+            if self.holds(middle) { low = middle } else { high = middle }
+        }
+        Some(low)
     }
-    while high - low > 1e-9 * high {
-        let middle = (low + high) / 2.0;
-        if holds(middle) { high = middle } else { low = middle }
-    }
-    Some(high)
 }
 
 fn holds(score: &Score, friction: f64) -> bool {
     score.status.holds() && score.mu_s.is_some_and(|mu| mu <= friction)
 }
 
-/// The largest multiple of `wrench` that `friction` holds at the gripping force `force` [N] together with every smaller
-/// multiple tried; infinite for no load, 0 when not even a small one holds.
-///
-/// Loads and forces enter only by their ratio, so this is `force / force_needed`.
-pub fn load_multiple(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, friction: f64, options: &Options) -> f64 {
-    match force_needed(pads, distance, wrench, friction, options) {
-        Some(needed) => force / needed,
-        None => 0.0,
-    }
+/// A step up from small loads: a share of the nearest of the limits that they foretell, to slip, to a pad pulled off and to
+/// twisting out.
+fn first_step<S: Fn(f64) -> Score>(pads: &Pads, distance: f64, wrench: &Wrench, size: f64, search: &Limit<S>, start: f64) -> f64 {
+    let load = pads.load(distance, size, wrench);
+    let reach = pads.hulls.iter().flatten().map(|point| point.length()).fold(0.0, f64::max);
+    let slip = (search.solve)(start).mu_s.map_or(f64::INFINITY, |mu| start * search.friction / mu);
+    let pulled_off = 1.0 / (load.normal[0] - 1.0).abs();
+    let twisted_out = 2.0 * reach / load.moment[0].hypot(load.moment[1]);
+    slip.min(pulled_off).min(twisted_out).clamp(start, MOST) / f64::from(STEPS)
 }
 
 #[cfg(test)]
@@ -107,6 +166,43 @@ mod tests {
             let mu = solve_pads(&pads, 0.02, 50.0, &grown, &Options::default()).mu_s.unwrap();
             assert!(if twists_out { mu < 0.4 } else { (mu / 0.4 - 1.0).abs() < 1e-8 }, "{moment:?} {multiple}");
         }
+    }
+
+    #[test]
+    fn the_limit_is_the_first_on_the_way_up() {
+        // Different faces, every kind of load, a friction that many loads reach only with the pads separated: a scan far
+        // finer than the search's steps finds no load below the limit that is not held.
+        let square = |x: f64, a: f64, b: f64| {
+            let corner = |i: f64, j: f64| DVec2::new(x + i * a / 2.0, j * b / 2.0);
+            vec![Polygon { outer: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], holes: Vec::new() }]
+        };
+        let number = |index: u32, factor: f64| (f64::from(index) * factor).fract() * 2.0 - 1.0;
+        let (mut by_slip, mut otherwise, mut falling) = (0, 0, 0);
+        for index in 1..=60 {
+            let contact = Contact { face_i: square(0.0, 0.02, 0.01), face_ii: square(0.004 * number(index, 0.31), 0.02, 0.012) };
+            let pads = Pads::new(&contact).unwrap();
+            let n = |factor: f64| number(index, factor);
+            let force = DVec3::new(n(0.754_877), n(0.569_840), n(0.819_172));
+            let wrench = Wrench { force, moment: 0.02 * DVec3::new(n(0.671_043), n(0.549_700), n(0.450_299)) };
+            let (distance, friction) = (0.01 * f64::from(index % 4), 0.1 + 0.2 * f64::from(index % 3));
+            let limit = load_multiple(&pads, distance, 1.0, &wrench, friction, &Options::default());
+            let options = Options { search: Search::Off, ..Options::default() };
+            let at = |multiple: f64| solve_pads(&pads, distance, 1.0 / multiple, &wrench, &options);
+            let held = |multiple: f64| at(multiple).status.holds() && at(multiple).mu_s.unwrap() <= friction;
+            for step in 1..300 {
+                let multiple = limit * f64::from(step) / 300.0;
+                assert!(held(multiple), "{index}: {multiple} of {limit}");
+            }
+            assert!(held(limit * (1.0 - 1e-8)) && !held(limit * (1.0 + 1e-8)), "{index}: {limit}");
+            let (before, after) = (at(limit * (1.0 - 1e-8)), at(limit * (1.0 + 1e-8)));
+            if after.status.holds() {
+                by_slip += 1
+            } else {
+                otherwise += 1
+            }
+            falling += u32::from(at(limit * 0.9).mu_s.unwrap() > before.mu_s.unwrap());
+        }
+        assert!(by_slip > 10 && otherwise > 10 && falling > 0, "{by_slip} {otherwise} {falling}");
     }
 
     #[test]

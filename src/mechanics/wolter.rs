@@ -34,6 +34,13 @@ pub struct Weights {
     pub epsilon: f64,
 }
 
+impl Default for Weights {
+    /// One each, and 1 mm: the paper states none.
+    fn default() -> Self {
+        Self { k1: 1.0, k2: 1.0, k3: 1.0, epsilon: 1e-3 }
+    }
+}
+
 /// Slip centre and mean radius under uniform pressure; `None` unless both areas are positive.
 ///
 /// DEVIATION: reference [4] speaks of one contact polygon. Where the two faces' areas differ, each carries the gripping

@@ -87,6 +87,12 @@ impl Proposer<'_> {
     /// # Errors
     /// When no site holds these faces, or the frame's closing axis is not theirs.
     pub fn explain_pose(&self, face_i: u32, face_ii: u32, part_from_grip: &Frame) -> Result<Explanation> {
+        let (index, local) = self.site_of(face_i, face_ii, part_from_grip)?;
+        self.explain(index, local.origin.truncate(), local.rotation.x_axis.truncate().to_angle(), local.rotation.z_axis.z < 0.0)
+    }
+
+    /// The nearest site with these faces, and the grip frame in its frame.
+    pub(super) fn site_of(&self, face_i: u32, face_ii: u32, part_from_grip: &Frame) -> Result<(usize, Frame)> {
         let place = || format!("faces {face_i} and {face_ii}");
         let holds = |site: &Site| {
             let has = |side: usize, face: u32| site.faces[side].contains(&face);
@@ -107,11 +113,11 @@ impl Proposer<'_> {
                 "take the faces and the gripper from the run that made the grip",
             ));
         };
-        let axes = site.part_from_site.rotation.transpose() * part_from_grip.rotation;
-        if axes.z_axis.z.abs() < 1.0 - 1e-6 {
+        let site_from_grip = site.part_from_site.inverse().compose(part_from_grip);
+        if site_from_grip.rotation.z_axis.z.abs() < 1.0 - 1e-6 {
             return Err(Error::input(place(), "the closing axis of the frame is not their normal", "take frame and faces from one grip"));
         }
-        self.explain(index, local(site).truncate(), axes.x_axis.truncate().to_angle(), axes.z_axis.z < 0.0)
+        Ok((index, site_from_grip))
     }
 
     /// Explains the pose at `position` [m] of a site's plane, approaching at `angle` [rad]; `flipped`: jaws exchanged.

@@ -5,12 +5,14 @@
 //! part, in the grip, while the jaws close, and along the straight approach. Candidates flow in chunks, so that memory
 //! stays bounded whatever their number; their order and numbers depend on the input and the options alone.
 
+mod displace;
 mod environment;
 mod explain;
 mod interference;
 pub(crate) mod obstacle;
 mod options;
 mod patch;
+mod progress;
 mod site;
 mod sweep;
 mod tree;
@@ -21,9 +23,12 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
+pub use displace::Displacement;
 pub use explain::{Check, Explanation, SiteInfo};
 pub use options::{Cone, Ground, ProposeOptions, Rejection};
+pub use progress::Progress;
 
 use crate::error::{Error, Result};
 use crate::gripper::Gripper;
@@ -46,7 +51,7 @@ const TRIANGLES_PER_CANDIDATE: usize = 200;
 const MOST_CORNERS: usize = 4_000_000;
 
 /// Counts of a run so far.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Tally {
     /// Antiparallel face pairs within the stroke.
     pub pairs: u64,
@@ -89,7 +94,7 @@ pub struct Proposer<'a> {
 }
 
 /// Where the next chunk starts.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 struct Cursor {
     site: usize,
     angle: usize,

@@ -1,13 +1,14 @@
 //! What to propose, and the reasons for which a candidate falls.
 
 use glam::DVec3;
+use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::geometry::Bounds2;
 use crate::gripper::Gripper;
 
 /// What to propose.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ProposeOptions {
     /// Step of the position grid [m]; `None`: a fifth of the pad's shorter side.
     pub spacing: Option<f64>,
@@ -79,7 +80,7 @@ impl Default for ProposeOptions {
 }
 
 /// Directions within an angle of an axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cone {
     /// Axis in the part frame; any length.
     pub axis: DVec3,
@@ -88,7 +89,7 @@ pub struct Cone {
 }
 
 /// The half-space `normal . x >= offset` of the part frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Ground {
     /// Points up; any length.
     pub normal: DVec3,

@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 
 use super::interference::View;
 use super::options::Rejection;
-use super::patch::{Scratch, Touch, TurnedPad};
+use super::patch::{PatchIndex, Scratch, Touch, TurnedPad};
 use super::sweep::{Stage, Sweep};
 use super::tree::Tree;
 use super::{Item, Prepared, Proposer};
@@ -35,7 +35,7 @@ pub(super) struct Buffers {
 }
 
 /// Contacts of one item by their rounded coordinates: a pad moved along a straight edge keeps its contact.
-type Known = FxHashMap<Vec<i64>, Arc<Contact>>;
+pub(super) type Known = FxHashMap<Vec<i64>, Arc<Contact>>;
 
 /// Contacts with more corners than this hardly ever repeat; looking for them would cost more than it saves.
 const SHARED_CORNERS: usize = 40;
@@ -78,7 +78,7 @@ impl Proposer<'_> {
             let alive = std::mem::take(&mut buffers.alive);
             for &index in &alive {
                 let place = site.positions[item.positions.start + index as usize];
-                let contact = self.contact(prepared, &pad, place, angle, flipped, buffers.whole[index as usize], &mut buffers.scratch, &mut known);
+                let contact = self.contact(&prepared.patches, &pad, place, angle, flipped, buffers.whole[index as usize], &mut buffers.scratch, &mut known);
                 let mut grip = Grip {
                     id: item.id + u64::from(index) * self.stride(),
                     part_from_grip: frame(site, place, angle),
@@ -215,9 +215,9 @@ impl Proposer<'_> {
     }
 
     #[expect(clippy::too_many_arguments, reason = "one call; a struct would only rename them")]
-    fn contact(
+    pub(super) fn contact(
         &self,
-        prepared: &Prepared<'_>,
+        patches: &[PatchIndex],
         pad: &TurnedPad,
         place: DVec2,
         angle: f64,
@@ -226,18 +226,18 @@ impl Proposer<'_> {
         scratch: &mut [Scratch; 2],
         known: &mut Known,
     ) -> Arc<Contact> {
-        if whole.iter().take(prepared.patches.len()).all(|&whole| whole) {
+        if whole.iter().take(patches.len()).all(|&whole| whole) {
             return Arc::clone(&self.whole);
         }
         let mut patch = |side: usize| -> Patch {
-            match prepared.patches[side].touch(pad, place, &mut scratch[side]) {
+            match patches[side].touch(pad, place, &mut scratch[side]) {
                 Touch::Empty => Patch::new(),
                 Touch::Whole => vec![Polygon { outer: oriented(&self.gripper.pad, flipped), holes: Vec::new() }],
-                Touch::Part(_) => prepared.patches[side].outline(pad, place, &mut scratch[side], angle),
+                Touch::Part(_) => patches[side].outline(pad, place, &mut scratch[side], angle),
             }
         };
         let face_i = patch(0);
-        let face_ii = if prepared.patches.len() == 2 { patch(1) } else { face_i.clone() };
+        let face_ii = if patches.len() == 2 { patch(1) } else { face_i.clone() };
         let contact = Contact { face_i, face_ii };
         self.shared(if flipped { mirror(&contact) } else { contact }, known)
     }

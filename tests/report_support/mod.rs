@@ -146,6 +146,9 @@ fn score(grip: Grip, gripper: &Gripper, cases: &[gripfast::results::LoadCase], c
         safety: worst.mu_s.zip(friction).filter(|(mu, _)| *mu > 0.0).map(|(mu, friction)| friction / mu),
         force_needed: friction.and_then(|friction| inverse::force_needed(&pads, grip.distance(), &wrench(load), friction, &options)),
         merged: Vec::new(),
+        load_multiple: friction.map(|friction| inverse::load_multiple(&pads, grip.distance(), FORCE, &wrench(load), friction, &options)),
+        earlier: None,
+        pose_noise: None,
         mu_by_load: if cases.len() > 1 { scores.iter().map(|score| score.mu_s).collect() } else { Vec::new() },
         grip,
     }

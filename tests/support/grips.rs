@@ -69,6 +69,9 @@ pub(crate) fn grip(id: u64, part_from_grip: Frame, mu_s: f64) -> RankedGrip {
         safety: Some(0.6 / mu_s),
         force_needed: Some(100.0 * mu_s / 0.6),
         merged: Vec::new(),
+        load_multiple: Some(0.6 / mu_s),
+        earlier: None,
+        pose_noise: None,
         mu_by_load: vec![Some(mu_s), None],
     }
 }
@@ -111,7 +114,7 @@ pub(crate) fn grip_set(count: u64) -> GripSet {
             LoadCase { name: "gravity -z".into(), wrench: Wrench { force: DVec3::new(0.0, 0.0, -1.27), moment: DVec3::ZERO } },
             LoadCase { name: "gravity, \"+z\"".into(), wrench: Wrench { force: DVec3::new(0.0, 0.0, 1.27), moment: DVec3::ZERO } },
         ],
-        summary: Summary { pairs: 3, candidates: 100, ranked: count, rejections: BTreeMap::from([("twisted_out".to_owned(), 5)]) },
+        summary: Summary { pairs: 3, candidates: 100, ranked: count, rejections: BTreeMap::from([("twisted_out".to_owned(), 5)]), comparison: None },
         grips,
     }
 }

@@ -1,0 +1,46 @@
+//! How far a run has come, so that another one can go on from there.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Cursor, Proposer, Tally};
+use crate::error::{Error, Result};
+
+/// Where the next chunk starts and what was counted so far. It fits the same part, gripper and options only.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Progress {
+    next: Cursor,
+    corners: f64,
+    tally: Tally,
+}
+
+impl Progress {
+    /// Candidates looked at so far.
+    pub fn candidates(&self) -> u64 {
+        self.tally.candidates
+    }
+}
+
+impl Proposer<'_> {
+    /// How far this run has come: after the last chunk taken.
+    pub fn progress(&self) -> Progress {
+        Progress { next: self.next, corners: self.corners, tally: self.tally.clone() }
+    }
+
+    /// Goes on where a run with the same part, gripper and options had come to: the chunks that follow are the same as there.
+    ///
+    /// # Errors
+    /// When there is no such place among the candidates.
+    pub fn resume(&mut self, progress: &Progress) -> Result<()> {
+        let Progress { next, corners, tally } = progress;
+        let there = match self.sites.get(next.site) {
+            Some(site) => next.angle <= site.angles.len() && next.position <= site.positions.len(),
+            None => next.site == self.sites.len(),
+        };
+        if !(there && corners.is_finite() && *corners >= 1.0 && tally.candidates <= self.candidates()) {
+            let problem = format!("the place at which it stopped (face pair {}, angle {}, position {}) is not there", next.site, next.angle, next.position);
+            return Err(Error::input("unfinished run", problem, "start anew without --resume"));
+        }
+        (self.next, self.corners, self.tally) = (*next, *corners, tally.clone());
+        Ok(())
+    }
+}
