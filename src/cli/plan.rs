@@ -40,7 +40,7 @@ gripfast plan bracket.stl --gripper franka-hand --mass 350g --loads ball:500 --t
 gripfast plan bracket.stl --gripper franka-hand --mass 350g --pose-noise 1mm,2deg --compare\n  \
 gripfast plan housing.stl --gripper wsg50-110 --mass 2kg --spacing 0.5mm --loads ball:500 -o housing.parquet --resume\n  \
 for part in *.stl; do gripfast plan \"$part\" --gripper generic --density 2700kg/m3 -q -o \"${part%.stl}.json\" >\"${part%.stl}.txt\"; done\n\n\
-A run with -o keeps its state in FILE.partial and removes it at the end: after an interrupt, a kill or a power cut the same\n\
+A run with -o keeps its state in FILE.partial and removes it at the end: after an interrupt, a kill or a power cut the same \
 command with --resume goes on from there, to the same result.\n\n\
 `gripfast gripper list` names the grippers that come with the program.")]
 pub(crate) struct Args {

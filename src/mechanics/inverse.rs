@@ -60,6 +60,8 @@ const GROWTH: f64 = 1.05;
 const PARTS: u32 = 8;
 /// Relative width at which the limit counts as found.
 const FOUND: f64 = 1e-9;
+/// Relative difference at which `mu_s` counts as the pad friction.
+const EQUAL: f64 = 1e-10;
 
 /// Steps of [`Limit::by_proportion`]; it settles in two where `mu_s` is proportional to the load.
 const PROPORTIONS: usize = 12;
@@ -71,8 +73,14 @@ struct Limit<S: Fn(f64) -> Score> {
 }
 
 impl<S: Fn(f64) -> Score> Limit<S> {
+    /// By how much the friction that `k` asks for exceeds the pads', as a share of it; `None` without a limit state.
+    fn excess(&self, k: f64) -> Option<f64> {
+        let score = (self.solve)(k);
+        score.mu_s.filter(|_| score.status.holds()).map(|mu| mu / self.friction - 1.0)
+    }
+
     fn holds(&self, k: f64) -> bool {
-        holds(&(self.solve)(k), self.friction)
+        self.excess(k).is_some_and(|excess| excess <= 0.0)
     }
 
     /// The load at which `mu_s` equals the friction, when the contact is whole there; else `None`.
@@ -82,7 +90,7 @@ impl<S: Fn(f64) -> Score> Limit<S> {
             let left = [score.contact_area_i, score.contact_area_ii];
             let whole = (0..2).all(|face| left[face] >= pads.moments[face][0] * pads.length * pads.length * (1.0 - 1e-12));
             let mu = score.mu_s.filter(|mu| whole && score.status == Status::Ok && *mu > 0.0)?;
-            if (mu / self.friction - 1.0).abs() <= 1e-10 {
+            if (mu / self.friction - 1.0).abs() <= EQUAL {
                 return Some(k);
             }
             k *= self.friction / mu;
@@ -114,16 +122,33 @@ impl<S: Fn(f64) -> Score> Limit<S> {
                 low = k;
             }
         }
-        while high - low > FOUND * high {
-            let middle = (low + high) / 2.0;
-            if self.holds(middle) { low = middle } else { high = middle }
-        }
-        Some(low)
+        Some(self.between(low, high))
     }
-}
 
-fn holds(score: &Score, friction: f64) -> bool {
-    score.status.holds() && score.mu_s.is_some_and(|mu| mu <= friction)
+    /// The limit between a load that holds and one that does not: by false position, an end that stays counting half
+    /// (Illinois), where `mu_s` is known at both, by bisection where the load ends otherwise.
+    fn between(&self, mut low: f64, mut high: f64) -> f64 {
+        let (mut below, mut above) = (self.excess(low).unwrap_or(-1.0), self.excess(high));
+        let mut stays = 0;
+        while high - low > FOUND * high {
+            let share = above.map_or(0.5, |above| below / (below - above));
+            let k = low + share.clamp(0.01, 0.99) * (high - low);
+            let excess = self.excess(k);
+            if excess.is_some_and(|excess| excess.abs() <= EQUAL) {
+                return k;
+            }
+            if let Some(excess) = excess.filter(|excess| *excess <= 0.0) {
+                (low, below) = (k, excess);
+                above = if stays > 0 { above.map(|above| above / 2.0) } else { above };
+                stays = 1;
+            } else {
+                (high, above) = (k, excess);
+                below = if stays < 0 { below / 2.0 } else { below };
+                stays = -1;
+            }
+        }
+        low
+    }
 }
 
 /// A step up from small loads: a share of the nearest of the limits that they foretell, to slip, to a pad pulled off and to
@@ -160,7 +185,8 @@ mod tests {
             // The last of these twists out before its mu_s comes up to the pads' friction.
             let twists_out = at(force * 0.999).status == Status::TwistedOut;
             assert!(twists_out == (moment[1] != 0.0) && (twists_out || (at(force).mu_s.unwrap() / 0.4 - 1.0).abs() < 1e-8), "{moment:?}");
-            assert!(!holds(&at(force * 0.999), 0.4) && holds(&at(force * 1.001), 0.4), "{moment:?}");
+            let held = |score: Score| score.status.holds() && score.mu_s.unwrap() <= 0.4;
+            assert!(!held(at(force * 0.999)) && held(at(force * 1.001)), "{moment:?}");
             let multiple = load_multiple(&pads, 0.02, 50.0, &wrench, 0.4, &Options::default());
             let grown = Wrench { force: wrench.force * multiple, moment: wrench.moment * multiple };
             let mu = solve_pads(&pads, 0.02, 50.0, &grown, &Options::default()).mu_s.unwrap();
