@@ -61,8 +61,8 @@ pub fn draw(title: &str, contact: &Contact, score: &Score) -> String {
     }
     let y = MARGIN + height + 62.0;
     let mu = score.mu_s.map_or_else(|| format!("no limit state ({:?})", score.status), |mu| format!("mu_s = {mu:.6}"));
-    let _ = write!(svg, r#"<text x="{MARGIN}" y="{y:.1}" font-weight="600">{}</text>"#, escape(&format!("{title}   {mu}")));
-    let text = format!("pressure 0 (white) to {:.4} kPa (blue); arrows: friction on the body; dashed: separation line; cross: slip centre", peak * 1e-3);
+    let _ = write!(svg, r#"<text x="{MARGIN}" y="{y:.1}" font-weight="600">{}</text>"#, escape(&format!("{title}: {mu}")));
+    let text = format!("pressure 0 (white) to {:.1} kPa (blue); arrows: friction on the body; dashed: separation line; cross: slip centre", peak * 1e-3);
     let _ = write!(svg, r##"<text x="{MARGIN}" y="{:.1}" fill="#555" font-size="12">{text}</text></svg>"##, y + 20.0);
     svg
 }
