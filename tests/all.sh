@@ -4,21 +4,43 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
+have() { command -v "$1" >/dev/null; }
+node_18() { have node && node -e 'process.exit(process.versions.node.split(".")[0] >= 18 ? 0 : 1)'; }
+
+# What the report page's browser test needs, and what the others do.
+browser=()
+have "${CHROMIUM:-/usr/bin/chromium}" || browser+=(chromium)
+fc-list 2>/dev/null | grep -q . || browser+=(fonts-dejavu-core)
+node_18 || browser+=(nodejs)
+have npm || browser+=(npm)
 need=()
 ls /usr/share/vulkan/icd.d/*lvp* >/dev/null 2>&1 || need+=(mesa-vulkan-drivers)
 ldconfig -p | grep -q libvulkan.so.1 || need+=(libvulkan1)
-command -v cc >/dev/null || need+=(gcc libc6-dev)
+have cc || need+=(gcc libc6-dev)
 # For STEP files: Open CASCADE (half a minute to install and build).
 [ -f /usr/include/opencascade/Standard_Version.hxx ] || need+=(libocct-data-exchange-dev libocct-modeling-algorithms-dev)
-command -v c++ >/dev/null || need+=(g++)
+have c++ || need+=(g++)
 python3 -c 'import ensurepip' 2>/dev/null || need+=(python3-venv)
-if [ ${#need[@]} -gt 0 ]; then
-    if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+
+missing=("${need[@]}" "${browser[@]}")
+export GRIPFAST_BROWSER=require
+if [ ${#missing[@]} -gt 0 ]; then
+    if [ "$(id -u)" = 0 ] && have apt-get; then
+        echo "installing: ${missing[*]}"
         apt-get update -qq
-        DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${need[@]}" >/dev/null
+        DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
     else
-        echo "missing: ${need[*]} (install them, or run this as root on Debian)"
+        echo "missing: ${missing[*]} (install them, or run this as root on Debian)"
+        if [ ${#browser[@]} -gt 0 ]; then
+            unset GRIPFAST_BROWSER
+            echo "without ${browser[*]} the browser test of the report page says SKIPPED"
+        fi
     fi
+fi
+
+# Packages of the report page's sources and of its test, at the versions of the lock file.
+if [ -n "${GRIPFAST_BROWSER:-}" ] && ! [ viewer/node_modules/.package-lock.json -nt viewer/package-lock.json ]; then
+    (cd viewer && npm ci --no-audit --no-fund --loglevel=error)
 fi
 
 # Independent readers of the export formats.
@@ -30,8 +52,6 @@ export GRIPFAST_PYTHON="$PWD/target/readers/bin/python"
 
 # With the software Vulkan driver there is always an adapter: a test that needs one fails instead of skipping.
 export GRIPFAST_GPU=require GRIPFAST_READERS=require
-# The report page's browser test runs where Chromium, Node and viewer/node_modules (npm ci) are there, and says SKIPPED
-# elsewhere; GRIPFAST_BROWSER=require makes it fail instead.
 
 cargo fmt --check
 cargo clippy --all-targets --features full --quiet -- -D warnings

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use glam::{DMat3, DVec3};
-use gripfast::export::{self, Convention, Format, Joint, Options, Origin};
+use gripfast::export::{self, Convention, Format, Joint, Options, Origin, Stated};
 use gripfast::part::Mesh;
 use gripfast::results::GripSet;
 use serde_json::Value;
@@ -116,7 +116,7 @@ fn expected(grip: DMat3, origin: DVec3, options: &Options, format: Format) -> (D
     let behind = match options.origin {
         Origin::Pads => 0.0,
         Origin::Behind(distance) => distance,
-        Origin::Flange => 0.1,
+        Origin::Stated(_) => 0.1,
     };
     let rotation = match (format, options.convention) {
         (Format::Json | Format::JsonLines, _) => return (grip, origin),
@@ -180,7 +180,8 @@ fn parquet() {
 #[test]
 fn isaac_grasp() {
     let set = grips::grip_set(5);
-    let options = Options { joints: vec![Joint { name: "joint: \"1\"".into(), ..Joint::default() }], origin: Origin::Flange, ..Options::default() };
+    let options =
+        Options { joints: vec![Joint { name: "joint: \"1\"".into(), ..Joint::default() }], origin: Origin::Stated(Stated::Flange), ..Options::default() };
     let Some(found) = round_trip(&set, Format::IsaacGrasp, "grips.yaml", ("read_isaac_grasp.py", "yaml"), &options, 1e-15) else { return };
     assert_eq!(found["joints"][0], "joint: \"1\"");
     // Each jaw opens by the 5 mm of the plan.

@@ -35,13 +35,16 @@ pub(crate) fn apply(command: &Command, arguments: Vec<OsString>, file: &Path) ->
         if !subcommand.get_arguments().any(|argument| argument.get_long() == Some(key)) {
             bail!("{}: `{name}` has no flag --{key}; see `gripfast {name} --help`", at());
         }
-        match value {
-            toml::Value::Boolean(true) => flags.push(format!("--{key}")),
-            toml::Value::Boolean(false) => {}
-            toml::Value::String(text) => flags.push(format!("--{key}={text}")),
-            toml::Value::Integer(number) => flags.push(format!("--{key}={number}")),
-            toml::Value::Float(number) => flags.push(format!("--{key}={number}")),
-            _ => bail!("{}: give a text, a number, true or false", at()),
+        // A list gives the flag once for each of its values.
+        for value in value.as_array().map_or(std::slice::from_ref(value), Vec::as_slice) {
+            match value {
+                toml::Value::Boolean(true) => flags.push(format!("--{key}")),
+                toml::Value::Boolean(false) => {}
+                toml::Value::String(text) => flags.push(format!("--{key}={text}")),
+                toml::Value::Integer(number) => flags.push(format!("--{key}={number}")),
+                toml::Value::Float(number) => flags.push(format!("--{key}={number}")),
+                _ => bail!("{}: give a text, a number, true, false, or a list of these", at()),
+            }
         }
     }
     let mut out = arguments;
@@ -69,6 +72,13 @@ mod tests {
         assert_eq!(got, ["gripfast", "solve", "--json", "--safety=2", "case.json", "--safety", "3"]);
         use clap::Parser;
         assert!(super::super::Cli::try_parse_from(got).is_ok());
+    }
+
+    #[test]
+    fn a_list_repeats_its_flag() {
+        let got = applied("[plan]\nkeep-out = [\"a\", \"b\"]\n", "gripfast plan x").unwrap();
+        assert_eq!(got, ["gripfast", "plan", "--keep-out=a", "--keep-out=b", "x"]);
+        assert!(applied("[plan]\nkeep-out = [[1]]\n", "gripfast plan x").unwrap_err().to_string().contains("keep-out"));
     }
 
     #[test]

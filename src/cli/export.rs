@@ -28,11 +28,12 @@ pub(crate) struct Args {
     /// File to write; `-` is standard output.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Axes of the tool frame: standard, moveit (z approach, y closing), graspgen (z, x), graspnet, dexnet (x, y).
+    /// Axes of the tool frame: standard, moveit (z approach, y closing), graspgen (z, x), graspnet, dexnet (x, y),
+    /// flange or tool (as the gripper file states them).
     /// The format's own when not given.
     #[arg(long, value_name = "NAME")]
     convention: Option<String>,
-    /// Origin of the tool frame: pads (midway between them), flange, or a distance behind the pads.
+    /// Origin of the tool frame: pads (midway between them), flange, tool, or a distance behind the pads.
     #[arg(long, value_name = "ORIGIN", default_value = "pads")]
     origin: String,
     /// Write only the best N (glb: 10 when not given).

@@ -1,17 +1,19 @@
 //! `gripfast gripper`: the shipped grippers, and a look at one.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::Context;
 use clap::{Args as ClapArgs, Subcommand};
 use comfy_table::{Table, presets};
+use gripfast::file;
 use gripfast::geometry::Bounds2;
 use gripfast::gripper::{self, Body, Gripper, Shape, catalogue, check, drawing};
 
 /// Lists, prints and checks grippers.
 #[derive(Debug, ClapArgs)]
+#[command(after_help = "EXAMPLES:\n  gripfast gripper list\n  gripfast gripper show generic > my-gripper.toml\n  \
+gripfast gripper check my-gripper.toml --svg my-gripper.svg\n\nThe file is described in docs/gripper-file.md.")]
 pub(crate) struct Args {
     #[command(subcommand)]
     action: Action,
@@ -20,13 +22,16 @@ pub(crate) struct Args {
 #[derive(Debug, Subcommand)]
 enum Action {
     /// Lists the shipped grippers.
+    #[command(after_help = "EXAMPLES:\n  gripfast gripper list")]
     List,
     /// Prints the file of a gripper, e.g. as a start for your own.
+    #[command(after_help = "EXAMPLES:\n  gripfast gripper show generic > my-gripper.toml")]
     Show {
         /// Shipped name or gripper file.
         gripper: String,
     },
     /// Reads a gripper, prints its dimensions with their sources, and warns of what is doubtful.
+    #[command(after_help = "EXAMPLES:\n  gripfast gripper check robotiq-2f85\n  gripfast gripper check my-gripper.toml --svg my-gripper.svg")]
     Check {
         /// Shipped name or gripper file.
         gripper: String,
@@ -45,7 +50,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             let gripper = gripper::find(&gripper)?;
             println!("{}", describe(&gripper));
             if let Some(path) = svg {
-                write_whole(&path, &drawing::svg(&gripper))?;
+                file::write(&path, |writer| writer.write_all(drawing::svg(&gripper).as_bytes()))?;
                 println!("drawing: {}", path.display());
             }
         }
@@ -132,15 +137,4 @@ fn new_table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::UTF8_FULL_CONDENSED).set_content_arrangement(comfy_table::ContentArrangement::Dynamic).set_header(header.to_vec());
     table
-}
-
-/// Writes a file under its final name only when it is whole.
-fn write_whole(path: &Path, text: &str) -> anyhow::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let context = || format!("{}: cannot write", path.display());
-    let mut file = tempfile::NamedTempFile::new_in(folder).with_context(context)?;
-    file.write_all(text.as_bytes()).with_context(context)?;
-    file.as_file().sync_all().with_context(context)?;
-    file.persist(path).with_context(context)?;
-    Ok(())
 }

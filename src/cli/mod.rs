@@ -25,7 +25,8 @@ use clap::{CommandFactory, Parser, Subcommand};
 /// Finds and ranks every two-finger grip on a CAD part by the smallest friction coefficient that holds it.
 #[derive(Debug, Parser)]
 #[command(name = "gripfast", version, about, propagate_version = true, args_override_self = true)]
-#[command(after_help = "EXIT CODES:\n  0  done    1  done, but nothing found    2  bad input, bad usage or a failed run\n\n\
+#[command(after_help = "EXAMPLES:\n  gripfast plan bracket.stl --gripper robotiq-2f85 --mass 350g --accel 2g -o grips.json --report bracket.html\n  \
+gripfast why grips.json 962\n  gripfast export grips.json -o grips.csv\n  gripfast pick grips.json --scene cell.toml\n\nEXIT CODES:\n  0  done    1  done, but nothing found    2  bad input, bad usage or a failed run\n\n\
 PROJECT DEFAULTS:\n  A file gripfast.toml in the current folder sets flags, one table for each subcommand, e.g.\n    [plan]\n    gripper = \"robotiq-2f85\"\n    mass = \"350g\"")]
 struct Cli {
     #[command(subcommand)]
@@ -73,10 +74,15 @@ pub(crate) fn main() -> ExitCode {
         Ok(code) => code,
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            eprintln!("error: {}", message(&error));
             ExitCode::from(2)
         }
     }
+}
+
+/// The error with its causes, without those that it already names.
+fn message(error: &anyhow::Error) -> String {
+    error.chain().skip(1).map(ToString::to_string).fold(error.to_string(), |text, cause| if text.contains(&cause) { text } else { format!("{text}: {cause}") })
 }
 
 /// Whether the reader of our output has gone (`gripfast .. | head`): no failure of ours.

@@ -31,10 +31,11 @@ pub(crate) struct Args {
     /// Print JSON, with the reason for every grip passed over.
     #[arg(long)]
     json: bool,
-    /// Axes of the tool frame: standard, moveit (z approach, y closing), graspgen (z, x), graspnet, dexnet (x, y).
+    /// Axes of the tool frame: standard, moveit (z approach, y closing), graspgen (z, x), graspnet, dexnet (x, y),
+    /// flange or tool (as the gripper file states them).
     #[arg(long, value_name = "NAME", default_value = "standard")]
     convention: String,
-    /// Origin of the tool frame: pads (midway between them), flange, or a distance behind the pads.
+    /// Origin of the tool frame: pads (midway between them), flange, tool, or a distance behind the pads.
     #[arg(long, value_name = "ORIGIN", default_value = "pads")]
     origin: String,
 }
@@ -96,8 +97,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         match chosen.zip(pose) {
             None => writeln!(out, "no grip of {} is free", set.grips.len())?,
             Some((grip, pose)) => {
-                let [x, y, z] = (pose.origin * 1e3).to_array();
-                let [qx, qy, qz, qw] = quaternion_xyzw(pose.rotation);
+                // Rounded first: no negative zeros.
+                let tidy = |value: f64, step: f64| (value * step).round() / step + 0.0;
+                let [x, y, z] = (pose.origin * 1e3).to_array().map(|value| tidy(value, 1e3));
+                let [qx, qy, qz, qw] = quaternion_xyzw(pose.rotation).map(|value| tidy(value, 1e6));
                 writeln!(out, "free: rank {}, id {}", grip.rank, grip.grip.id)?;
                 if let Some(mu_s) = grip.worst.mu_s {
                     writeln!(out, "  smallest friction that holds  {mu_s:.4}")?;

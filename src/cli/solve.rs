@@ -136,7 +136,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             } else {
                 path.clone()
             };
-            std::fs::write(&path, contact_svg::draw(&place(), &case.contact, &score)).map_err(|error| gripfast::error::Error::io(&path, "write", error))?;
+            let svg = contact_svg::draw(&place(), &case.contact, &score);
+            gripfast::file::write(&path, |writer| writer.write_all(svg.as_bytes()))?;
         }
         let inverse = args.pad_friction.and_then(|friction| {
             let pads = Pads::new(&case.contact)?;
@@ -170,7 +171,9 @@ fn print(out: &mut impl Write, case: &Case, score: &Score, inverse: Option<&Inve
     match score.slip {
         Some(Slip::Rotation { c, sense }) => {
             let turn = if sense > 0 { "counter-clockwise" } else { "clockwise" };
-            writeln!(out, "about to turn                             {turn} about ({:.4}, {:.4}) mm", c[0] * mm, c[1] * mm)?;
+            // Rounded first: no negative zeros.
+            let [x, y] = c.map(|value| (value * mm * 1e4).round() / 1e4 + 0.0);
+            writeln!(out, "about to turn                             {turn} about ({x:.4}, {y:.4}) mm")?;
         }
         Some(Slip::Translation { direction }) => writeln!(out, "about to slide                            along ({:.4}, {:.4})", direction[0], direction[1])?,
         Some(Slip::None) => writeln!(out, "nothing slips                             the load has no part in the pad plane")?,
@@ -179,7 +182,7 @@ fn print(out: &mut impl Write, case: &Case, score: &Score, inverse: Option<&Inve
     if let Some(p) = score.pressure {
         let per_mm = 1e-3;
         writeln!(out, "pressure on face I  [Pa, x in mm]         {:.6e} {:+.6e} x1 {:+.6e} x2", p.a_i0, p.a1 * per_mm, p.a2 * per_mm)?;
-        writeln!(out, "pressure on face II [Pa, x in mm]         {:.6e} {:+.6e} x1 {:+.6e} x2", p.a_ii0, -p.a1 * per_mm, -p.a2 * per_mm)?;
+        writeln!(out, "pressure on face II [Pa, x in mm]         {:.6e} {:+.6e} x1 {:+.6e} x2", p.a_ii0, 0.0 - p.a1 * per_mm, 0.0 - p.a2 * per_mm)?;
         let area = |patch: &[gripfast::model::Polygon]| gripfast::geometry::patch_area(patch);
         let share = |left: f64, patch: &[gripfast::model::Polygon]| 100.0 * left / area(patch);
         writeln!(

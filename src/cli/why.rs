@@ -51,7 +51,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let worst = &ranked.worst;
     writeln!(out, "rank {} of {}: score {}", ranked.rank, set.summary.ranked, ranked.score.map_or("-".into(), |score| format!("{score:.4}")))?;
     writeln!(out, "worst load: {}", set.loads.get(worst.load as usize).map_or("?", |load| load.name.as_str()))?;
-    let [f, m] = [worst.wrench.force.to_array(), worst.wrench.moment.to_array()];
+    // Rounded first: no negative zeros.
+    let tidy = |values: glam::DVec3, step: f64| (values * step).round().to_array().map(|value| value / step + 0.0);
+    let [f, m] = [tidy(worst.wrench.force, 1e4), tidy(worst.wrench.moment, 1e5)];
     writeln!(out, "  in the grip frame: F ({:.4}, {:.4}, {:.4}) N, M ({:.5}, {:.5}, {:.5}) N m", f[0], f[1], f[2], m[0], m[1], m[2])?;
     if let (Some(mu), Some(bounds)) = (worst.mu_s, worst.bounds) {
         writeln!(out, "  mu_s {mu:.9}, certified between {:.9} and {:.9} for its pressure, residual {:.1e}", bounds.lower, bounds.upper, worst.residual)?;

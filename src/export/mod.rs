@@ -23,7 +23,7 @@ use crate::part::Mesh;
 use crate::results::{GripSet, RankedGrip};
 
 pub use table::{Column, Table, Values, table};
-pub use tool::{Convention, Joint, Origin, grip_from_tool};
+pub use tool::{Convention, Joint, Origin, Stated, grip_from_tool};
 
 /// A file format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -22,10 +22,53 @@ pub enum Convention {
     DexNet,
     /// z approach, y closing (MoveIt).
     MoveIt,
+    /// The axes of a frame that the gripper file states.
+    Stated(Stated),
+}
+
+/// A frame that a gripper file may state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stated {
+    /// The robot's mounting face, `[flange]`.
+    Flange,
+    /// The user's own tool frame, `[tool]`.
+    Tool,
+}
+
+impl Stated {
+    /// Both with their names.
+    const ALL: [(Self, &'static str); 2] = [(Self::Flange, "flange"), (Self::Tool, "tool")];
+
+    fn parse(name: &str) -> Option<Self> {
+        Self::ALL.iter().find(|known| known.1.eq_ignore_ascii_case(name)).map(|known| known.0)
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Flange => "flange",
+            Self::Tool => "tool",
+        }
+    }
+
+    /// The frame in the grip frame; `flag` is what asked for it.
+    fn frame(self, flag: &str, gripper: Option<&Gripper>) -> Result<Frame> {
+        let stated = gripper.and_then(|gripper| match self {
+            Self::Flange => gripper.grip_from_flange,
+            Self::Tool => gripper.grip_from_tool,
+        });
+        let name = self.name();
+        stated.ok_or_else(|| {
+            Error::input(
+                format!("{flag} {name}"),
+                format!("the gripper of this result states no {name}"),
+                format!("add [{name}] to the gripper file and plan anew, or give the distance behind the pads, e.g. --origin 103.4mm"),
+            )
+        })
+    }
 }
 
 impl Convention {
-    /// Every convention with its name.
+    /// Every convention with its name, but for the frames that a gripper file states.
     pub const ALL: [(Self, &'static str); 5] =
         [(Self::Standard, "standard"), (Self::GraspGen, "graspgen"), (Self::GraspNet, "graspnet"), (Self::DexNet, "dexnet"), (Self::MoveIt, "moveit")];
 
@@ -34,9 +77,10 @@ impl Convention {
     /// # Errors
     /// When there is none; the message lists them.
     pub fn parse(place: &str, name: &str) -> Result<Self> {
-        Self::ALL.iter().find(|known| known.1.eq_ignore_ascii_case(name)).map(|known| known.0).ok_or_else(|| {
+        let known = Self::ALL.iter().find(|known| known.1.eq_ignore_ascii_case(name)).map(|known| known.0);
+        known.or(Stated::parse(name).map(Self::Stated)).ok_or_else(|| {
             let names = Self::ALL.map(|(convention, name)| format!("{name} ({})", convention.axes())).join(", ");
-            Error::input(place, format!("'{name}' is not a convention"), format!("use one of: {names}"))
+            Error::input(place, format!("'{name}' is not a convention"), format!("use one of: {names}, flange, tool (as the gripper file states them)"))
         })
     }
 
@@ -46,17 +90,23 @@ impl Convention {
             Self::Standard | Self::MoveIt => "z approach, y closing",
             Self::GraspGen => "z approach, x closing",
             Self::GraspNet | Self::DexNet => "x approach, y closing",
+            Self::Stated(Stated::Flange) => "axes of the gripper's flange",
+            Self::Stated(Stated::Tool) => "axes of the gripper's tool frame",
         }
     }
 
     /// Tool axes in the grip frame (x1 approach, x3 closing), as columns.
-    pub fn rotation(self) -> DMat3 {
+    ///
+    /// # Errors
+    /// When the axes are those of a frame that the gripper does not state.
+    pub fn rotation(self, gripper: Option<&Gripper>) -> Result<DMat3> {
         let (approach, closing) = (DVec3::X, DVec3::Z);
-        match self {
+        Ok(match self {
             Self::Standard | Self::MoveIt => DMat3::from_cols(closing.cross(approach), closing, approach),
             Self::GraspGen => DMat3::from_cols(closing, approach.cross(closing), approach),
             Self::GraspNet | Self::DexNet => DMat3::from_cols(approach, closing, approach.cross(closing)),
-        }
+            Self::Stated(stated) => stated.frame("--convention", gripper)?.rotation,
+        })
     }
 }
 
@@ -65,24 +115,26 @@ impl Convention {
 pub enum Origin {
     /// Midway between the pads, at the grip frame's origin.
     Pads,
-    /// At the gripper's flange, as its file states it.
-    Flange,
+    /// At that of a frame that the gripper file states.
+    Stated(Stated),
     /// This far behind the pads, against the approach [m].
     Behind(f64),
 }
 
 impl Origin {
-    /// Parses `pads`, `flange` or a length.
+    /// Parses `pads`, `flange`, `tool` or a length.
     ///
     /// # Errors
     /// When the text is none of these.
     pub fn parse(place: &str, text: &str) -> Result<Self> {
         match text {
             "pads" => Ok(Self::Pads),
-            "flange" => Ok(Self::Flange),
-            _ => match Quantity::Length.parse(place, text) {
-                Ok(distance) => Ok(Self::Behind(distance)),
-                Err(_) => Err(Error::input(place, format!("'{text}' is not an origin"), "use pads, flange, or a distance behind the pads, e.g. 103.4mm")),
+            _ => match (Stated::parse(text), Quantity::Length.parse(place, text)) {
+                (Some(stated), _) => Ok(Self::Stated(stated)),
+                (None, Ok(distance)) => Ok(Self::Behind(distance)),
+                (None, Err(_)) => {
+                    Err(Error::input(place, format!("'{text}' is not an origin"), "use pads, flange, tool, or a distance behind the pads, e.g. 103.4mm"))
+                }
             },
         }
     }
@@ -92,7 +144,8 @@ impl fmt::Display for Origin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Pads => f.write_str("midway between the pads"),
-            Self::Flange => f.write_str("at the flange"),
+            Self::Stated(Stated::Flange) => f.write_str("at the flange"),
+            Self::Stated(Stated::Tool) => f.write_str("at the gripper's tool frame"),
             Self::Behind(distance) => write!(f, "{} mm behind the pads", distance * 1e3),
         }
     }
@@ -147,23 +200,14 @@ impl Joint {
 /// The tool frame in the grip frame.
 ///
 /// # Errors
-/// When the flange is asked for and the gripper states none.
+/// When the flange or the tool frame is asked for and the gripper states none.
 pub fn grip_from_tool(convention: Convention, origin: Origin, gripper: Option<&Gripper>) -> Result<Frame> {
     let origin = match origin {
         Origin::Pads => DVec3::ZERO,
         Origin::Behind(distance) => DVec3::X * -distance,
-        Origin::Flange => match gripper.and_then(|gripper| gripper.grip_from_flange) {
-            Some(flange) => flange.origin,
-            None => {
-                return Err(Error::input(
-                    "--origin flange",
-                    "the gripper of this result states no flange",
-                    "add [flange] to the gripper file and plan anew, or give the distance behind the pads, e.g. --origin 103.4mm",
-                ));
-            }
-        },
+        Origin::Stated(stated) => stated.frame("--origin", gripper)?.origin,
     };
-    Ok(Frame { rotation: convention.rotation(), origin })
+    Ok(Frame { rotation: convention.rotation(gripper)?, origin })
 }
 
 #[cfg(test)]
@@ -173,7 +217,7 @@ mod tests {
     #[test]
     fn every_convention_is_right_handed_with_its_axes_where_it_says() {
         for (convention, name) in Convention::ALL {
-            let rotation = convention.rotation();
+            let rotation = convention.rotation(None).unwrap();
             assert!((rotation.determinant() - 1.0).abs() < 1e-15, "{name}");
             let axis = |letter: &str| match letter {
                 "x" => rotation.x_axis,
@@ -186,6 +230,23 @@ mod tests {
             assert_eq!(Convention::parse("--convention", name).unwrap(), convention);
         }
         assert!(Convention::parse("--convention", "other").unwrap_err().to_string().contains("graspgen (z approach, x closing)"));
+    }
+
+    #[test]
+    fn frames_of_the_gripper_file() {
+        let text = crate::gripper::catalogue::text("generic").unwrap() + "\n[tool]\norigin = [\"5mm\", \"0mm\", \"0mm\"]\nz = [1, 0, 0]\ny = [0, 1, 1]\n";
+        let gripper = crate::gripper::parse(&text, "test").unwrap();
+        let [convention, origin] = [Convention::parse("--convention", "tool").unwrap(), Convention::parse("--convention", "flange").unwrap()];
+        let tool = grip_from_tool(convention, Origin::parse("--origin", "tool").unwrap(), Some(&gripper)).unwrap();
+        assert_eq!(tool, gripper.grip_from_tool.unwrap());
+        assert!((tool.rotation.y_axis - DVec3::new(0.0, 1.0, 1.0).normalize()).length() < 1e-15);
+        let flange = grip_from_tool(origin, Origin::parse("--origin", "flange").unwrap(), Some(&gripper)).unwrap();
+        assert_eq!(flange, gripper.grip_from_flange.unwrap());
+        let franka = crate::gripper::find("franka-hand").unwrap();
+        for (convention, origin) in [(convention, Origin::Pads), (Convention::Standard, Origin::Stated(Stated::Tool))] {
+            let message = grip_from_tool(convention, origin, Some(&franka)).unwrap_err().to_string();
+            assert!(message.contains("states no tool") && message.contains("[tool]"), "{message}");
+        }
     }
 
     #[test]

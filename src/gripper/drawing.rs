@@ -44,7 +44,7 @@ pub fn svg(gripper: &Gripper) -> String {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.1} {total:.1}\" width=\"{width:.0}\" height=\"{total:.0}\" font-family=\"sans-serif\" font-size=\"12\">\n\
          <style>.palm{{fill:#b9c2cc;stroke:#444}}.finger{{fill:#8fa3b8;stroke:#333;fill-opacity:.8}}.pad{{fill:#d9822b;stroke:#8a4b0f}}.dim{{stroke:#06c;fill:none}}text{{fill:#013;stroke:#fff;stroke-width:4px;paint-order:stroke}}.axis{{stroke:#a00;stroke-dasharray:6 3 1 3}}</style>\n\
          <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"16\" y=\"24\" font-size=\"16\">{}</text>\n\
-         <text x=\"16\" y=\"42\">jaws open, {}; dimensions in mm; approach downwards</text>",
+         <text x=\"16\" y=\"42\">jaws open to {} mm; dimensions in mm; approach downwards</text>",
         escape(&gripper.name),
         millimetres(open),
     );
@@ -72,7 +72,7 @@ pub fn svg(gripper: &Gripper) -> String {
     drawing.horizontal(&side_place, pad.min.y, pad.max.y, bottom, 24.0, "pad");
     drawing.horizontal(&side_place, side_bounds.min.x, side_bounds.max.x, bottom, 52.0, "depth");
     drawing.vertical(&side_place, pad.min.x, pad.max.x, side_bounds.max.x, 18.0, "pad");
-    drawing.vertical(&front_place, front_bounds.min.y, front_bounds.max.y, front_bounds.min.x, -50.0, "");
+    drawing.vertical(&front_place, front_bounds.min.y, front_bounds.max.y, front_bounds.min.x, -46.0, "");
     if let Some(throat) = super::check::throat(gripper).filter(|throat| *throat > 0.0) {
         drawing.vertical(&front_place, pad.min.x - throat, pad.min.x, front_bounds.max.x, 14.0, "throat");
         drawing.vertical(&front_place, front_bounds.min.y, 0.0, front_bounds.min.x, -22.0, "");
@@ -125,10 +125,16 @@ impl Drawing {
         let (a, b) = (place.point(DVec2::new(x, y0)), place.point(DVec2::new(x, y1)));
         let line = a.x + gap;
         let (from, to) = (a.x + gap.signum() * 3.0, line + gap.signum() * 4.0);
-        let (x_text, middle) = (line + 4.0, (a.y + b.y) / 2.0);
+        let middle = (a.y + b.y) / 2.0;
+        // Left of the gripper there is room for upright text only.
+        let place = if gap < 0.0 {
+            format!("transform=\"translate({:.1} {middle:.1}) rotate(-90)\" text-anchor=\"middle\"", line - 4.0)
+        } else {
+            format!("x=\"{:.1}\" y=\"{middle:.1}\"", line + 4.0)
+        };
         let _ = writeln!(
             self.text,
-            "<path class=\"dim\" d=\"M{from:.1} {0:.1}H{to:.1}M{from:.1} {1:.1}H{to:.1}M{line:.1} {0:.1}V{1:.1}\"/><text x=\"{x_text:.1}\" y=\"{middle:.1}\">{label} {2}</text>",
+            "<path class=\"dim\" d=\"M{from:.1} {0:.1}H{to:.1}M{from:.1} {1:.1}H{to:.1}M{line:.1} {0:.1}V{1:.1}\"/><text {place}>{label} {2}</text>",
             a.y,
             b.y,
             millimetres(y1 - y0)

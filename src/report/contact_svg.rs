@@ -12,8 +12,6 @@ use crate::model::{Contact, Patch, Pressure, Score, Slip};
 /// Panel size and margins [px].
 const PANEL: f64 = 360.0;
 const MARGIN: f64 = 56.0;
-/// Pressure cells along the longer side.
-const CELLS: usize = 48;
 /// Friction arrows along the longer side.
 const ARROWS: usize = 9;
 
@@ -53,8 +51,7 @@ pub fn draw(title: &str, contact: &Contact, score: &Score) -> String {
     for (k, (patch, name)) in [(&contact.face_i, "face I  (x3 = +d/2)"), (&contact.face_ii, "face II  (x3 = -d/2)")].into_iter().enumerate() {
         let view = View { low, scale, left: MARGIN + k as f64 * (PANEL + MARGIN), height };
         let _ = write!(svg, r#"<text x="{:.1}" y="{:.1}" font-weight="600">{name}</text>"#, view.left, MARGIN - 22.0);
-        cells(&mut svg, &view, patch, &pressure, k, size, peak);
-        outline(&mut svg, &view, patch);
+        area(&mut svg, &view, patch, &pressure, k, peak);
         separation(&mut svg, &view, patch, &pressure, k);
         if let Some(slip) = score.slip {
             arrows(&mut svg, &view, patch, &pressure, k, size, slip);
@@ -64,8 +61,8 @@ pub fn draw(title: &str, contact: &Contact, score: &Score) -> String {
     }
     let y = MARGIN + height + 62.0;
     let mu = score.mu_s.map_or_else(|| format!("no limit state ({:?})", score.status), |mu| format!("mu_s = {mu:.6}"));
-    let _ = write!(svg, r#"<text x="{MARGIN}" y="{y:.1}" font-weight="600">{}</text>"#, escape(&format!("{title}   {mu}")));
-    let text = format!("pressure 0 to {:.4e} Pa; arrows: friction on the body; dashed: separation line; cross: slip centre", peak);
+    let _ = write!(svg, r#"<text x="{MARGIN}" y="{y:.1}" font-weight="600">{}</text>"#, escape(&format!("{title}: {mu}")));
+    let text = format!("pressure 0 (white) to {:.1} kPa (blue); arrows: friction on the body; dashed: separation line; cross: slip centre", peak * 1e-3);
     let _ = write!(svg, r##"<text x="{MARGIN}" y="{:.1}" fill="#555" font-size="12">{text}</text></svg>"##, y + 20.0);
     svg
 }
@@ -78,35 +75,40 @@ fn inside(patch: &Patch, x: DVec2) -> bool {
     patch.iter().any(|polygon| contains(polygon, x))
 }
 
-fn cells(svg: &mut String, view: &View, patch: &Patch, pressure: &Pressure, k: usize, size: DVec2, peak: f64) {
-    let step = size.max_element() / CELLS as f64;
-    let (nx, ny) = ((size.x / step).ceil() as usize, (size.y / step).ceil() as usize);
-    let side = step * view.scale;
-    for j in 0..ny {
-        for i in 0..nx {
-            let x = view.low + DVec2::new(i as f64 + 0.5, j as f64 + 0.5) * step;
-            if !inside(patch, x) {
-                continue;
-            }
-            let share = if peak > 0.0 { (value(pressure, k, x) / peak).clamp(0.0, 1.0) } else { 0.0 };
-            let corner = view.at(x) - DVec2::splat(side / 2.0);
-            let _ =
-                write!(svg, r#"<rect x="{:.2}" y="{:.2}" width="{:.2}" height="{:.2}" fill="{}"/>"#, corner.x, corner.y, side + 0.3, side + 0.3, colour(share));
+/// The contact area, filled with the pressure: a linear function is a linear gradient.
+fn area(svg: &mut String, view: &View, patch: &Patch, pressure: &Pressure, k: usize, peak: f64) {
+    let slope = DVec2::new(pressure.a1, pressure.a2) * if k == 0 { 1.0 } else { -1.0 };
+    let at_origin = value(pressure, k, DVec2::ZERO);
+    let rings = || patch.iter().flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes));
+    let across = rings().flatten().map(|x| x.dot(slope)).fold(0.0, |most: f64, p| most.max(p.abs()));
+    let fill = if across <= 1e-9 * peak {
+        colour(if peak > 0.0 { (at_origin / peak).clamp(0.0, 1.0) } else { 0.0 })
+    } else {
+        let zero = -at_origin * slope / slope.length_squared();
+        let (from, to) = (view.at(zero), view.at(zero + slope * (peak / slope.length_squared())));
+        let _ =
+            write!(svg, r#"<linearGradient id="p{k}" gradientUnits="userSpaceOnUse" x1="{:.1}" y1="{:.1}" x2="{:.1}" y2="{:.1}">"#, from.x, from.y, to.x, to.y);
+        for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
+            let _ = write!(svg, r#"<stop offset="{share}" stop-color="{}"/>"#, colour(share));
         }
+        svg.push_str("</linearGradient>");
+        format!("url(#p{k})")
+    };
+    let mut path = String::new();
+    for ring in rings() {
+        for (index, &x) in ring.iter().enumerate() {
+            let x = view.at(x);
+            let _ = write!(path, "{}{:.1} {:.1}", if index == 0 { 'M' } else { 'L' }, x.x, x.y);
+        }
+        path.push('Z');
     }
+    let _ = write!(svg, r##"<path d="{path}" fill="{fill}" fill-rule="evenodd" stroke="#222" stroke-width="1.4"/>"##);
 }
 
-/// White for no pressure, deep blue for the peak.
+/// White for no pressure, blue for the peak, light enough for the arrows on it.
 fn colour(share: f64) -> String {
     let mix = |from: f64, to: f64| (from + share.powf(0.8) * (to - from)).round();
-    format!("rgb({},{},{})", mix(244.0, 8.0), mix(246.0, 81.0), mix(250.0, 156.0))
-}
-
-fn outline(svg: &mut String, view: &View, patch: &Patch) {
-    for ring in patch.iter().flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes)) {
-        let list: Vec<String> = ring.iter().map(|&x| view.at(x)).map(|x| format!("{:.2},{:.2}", x.x, x.y)).collect();
-        let _ = write!(svg, r##"<polygon points="{}" fill="none" stroke="#222" stroke-width="1.4"/>"##, list.join(" "));
-    }
+    format!("rgb({},{},{})", mix(250.0, 86.0), mix(251.0, 152.0), mix(253.0, 214.0))
 }
 
 fn separation(svg: &mut String, view: &View, patch: &Patch, pressure: &Pressure, k: usize) {
@@ -149,7 +151,9 @@ fn arrows(svg: &mut String, view: &View, patch: &Patch, pressure: &Pressure, k: 
                 Slip::Translation { direction } => DVec2::from_array(direction),
                 Slip::None => return,
             };
-            let Some(direction) = (-velocity).try_normalize() else { continue };
+            // Beside the slip centre the direction of one arrow says nothing.
+            let near = matches!(slip, Slip::Rotation { c, .. } if (x - DVec2::from_array(c)).length() < 0.35 * step);
+            let Some(direction) = (-velocity).try_normalize().filter(|_| !near) else { continue };
             let half = 0.32 * step * direction;
             let (a, b) = (view.at(x - half), view.at(x + half));
             let back = (a - b) * 0.35;
@@ -157,7 +161,7 @@ fn arrows(svg: &mut String, view: &View, patch: &Patch, pressure: &Pressure, k: 
             let (w1, w2) = (b + back + wing, b + back - wing);
             let _ = write!(
                 svg,
-                r##"<path d="M{:.1} {:.1}L{:.1} {:.1}M{:.1} {:.1}L{:.1} {:.1}L{:.1} {:.1}" fill="none" stroke="#111" stroke-width="1.1" stroke-opacity="0.75"/>"##,
+                r##"<path d="M{:.1} {:.1}L{:.1} {:.1}M{:.1} {:.1}L{:.1} {:.1}L{:.1} {:.1}" fill="none" stroke="#111" stroke-width="1.2"/>"##,
                 a.x, a.y, b.x, b.y, w1.x, w1.y, b.x, b.y, w2.x, w2.y
             );
         }
@@ -223,6 +227,11 @@ mod tests {
         let svg = draw("square <I>", &contact, &score);
         assert_eq!(svg.matches("stroke-dasharray").count(), 2, "one separation line a face");
         assert_eq!(svg.matches("<circle").count(), 2);
-        assert!(svg.contains("square &lt;I&gt;") && svg.matches("<rect").count() > 1000);
+        assert!(svg.contains("square &lt;I&gt;"));
+        // Both faces are filled along the slope of their pressure, from its zero line on.
+        assert_eq!(svg.matches("<linearGradient").count(), 2);
+        assert!(svg.contains("fill=\"url(#p0)\"") && svg.contains("fill=\"url(#p1)\""));
+        let level = solve(&contact, 0.02, 50.0, &Wrench { force: glam::DVec3::X, moment: glam::DVec3::ZERO }, &Options::default()).unwrap();
+        assert!(!draw("level", &contact, &level).contains("linearGradient"));
     }
 }

@@ -200,17 +200,23 @@ fn key(contact: &Contact) -> Vec<u64> {
     key
 }
 
+/// A `mu_s` below this share of the largest one is shown as zero: a colour scale has no use for more.
+const LEAST_SHARE: f64 = 1e-6;
+
 /// `mu_s` of each load on a logarithmic scale of 65,533 steps (0: no limit state, 1: zero), for as many grips as fit.
 fn loads(columns: &mut Columns, set: &GripSet, grips: &[RankedGrip]) -> Value {
     let n = set.loads.len();
     let whole = |grip: &&RankedGrip| n > 0 && grip.mu_by_load.len() == n;
     let rows = grips.iter().take_while(whole).count().min(MAX_LOAD_VALUES / n.max(1));
-    let positive = || grips[..rows].iter().flat_map(|g| &g.mu_by_load).filter_map(|mu| *mu).filter(|mu| *mu > 0.0 && mu.is_finite());
+    let finite = || grips[..rows].iter().flat_map(|g| &g.mu_by_load).filter_map(|mu| *mu).filter(|mu| mu.is_finite());
+    // A load along the closing axis needs no friction but for rounding; many decades of that would leave few steps for the rest.
+    let zero = LEAST_SHARE * finite().fold(0.0, f64::max);
+    let positive = || finite().filter(|mu| *mu > zero);
     let (low, high) = positive().fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), mu| (low.min(mu), high.max(mu)));
     let (low, high) = if low < high { (low, high) } else { (if high > 0.0 { high } else { 1.0 }, high.max(1.0) * 2.0) };
     let code = |mu: Option<f64>| match mu {
-        Some(mu) if mu > 0.0 && mu.is_finite() => 2 + ((mu / low).ln() / (high / low).ln() * 65_533.0).round().clamp(0.0, 65_533.0) as u16,
-        Some(mu) if mu <= 0.0 => 1,
+        Some(mu) if mu > zero && mu.is_finite() => 2 + ((mu / low).ln() / (high / low).ln() * 65_533.0).round().clamp(0.0, 65_533.0) as u16,
+        Some(mu) if mu <= zero => 1,
         _ => 0,
     };
     columns.add("by_load", "u16", &grips[..rows].iter().flat_map(|g| g.mu_by_load.iter().map(|&mu| code(mu))).collect::<Vec<_>>());

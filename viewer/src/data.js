@@ -90,6 +90,9 @@ export class Report {
     if (i >= rows) return null;
     const n = this.header.loads.length;
     const factor = Math.log(high / low) / 65533;
-    return Float64Array.from(this.column.by_load.subarray(i * n, (i + 1) * n), (code) => (code === 0 ? NaN : code === 1 ? 0 : low * Math.exp((code - 2) * factor)));
+    const values = Float64Array.from(this.column.by_load.subarray(i * n, (i + 1) * n), (code) => (code === 0 ? NaN : code === 1 ? 0 : low * Math.exp((code - 2) * factor)));
+    // The worst one is known to all its digits.
+    values[this.column.load[i]] = this.column.mu[i];
+    return values;
   }
 }

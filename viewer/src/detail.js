@@ -128,7 +128,8 @@ export class Detail {
     this.find('.worst-load').textContent = header.loads[worst].name;
     const sorted = values ? [...values].map((mu) => (Number.isFinite(mu) ? mu : Infinity)).sort((a, b) => a - b) : [];
     const part = (share) => (sorted.length ? number(sorted[Math.round((sorted.length - 1) * share)]) : NONE);
-    this.find('.spread').replaceChildren(facts([['Easiest load', part(0)], ['Median', part(0.5)], ['Hardest load', values ? part(1) : number(this.report.column.mu[i])]]));
+    const hardest = ['Hardest load', values ? part(1) : number(this.report.column.mu[i])];
+    this.find('.spread').replaceChildren(facts(values ? [['Easiest load', part(0)], ['Median', part(0.5)], hardest] : [hardest]));
     const canvas = this.find('.ball');
     canvas.setAttribute('aria-label', range
       ? `Friction needed over ${count(header.loads.length)} loads: ${number(range.low)} to ${number(range.high)}, worst under ${header.loads[worst].name}`
@@ -136,7 +137,7 @@ export class Detail {
     const sizes = header.loads.map((load) => Math.hypot(...load.wrench.force)).filter((size) => size > 0);
     const [least, most] = [Math.min(...sizes), Math.max(...sizes)];
     const strength = most > 1.02 * least ? ` The loads differ in size: ${number(least)} to ${newtons(most)}.` : '';
-    this.find('.ball-note').textContent = values ? `A point of the ball is the direction in which a load pushes the part; it turns with the view.${strength}` : 'Only the worst load of this grip was stored.';
+    this.find('.ball-note').textContent = values ? `A point of the ball is the direction in which a load pushes the part; it turns with the view.${strength}` : 'Only the worst load of this grip was stored; gripfast plan --polish all keeps every load.';
     const body = this.find('.loads tbody');
     body.replaceChildren();
     const order = values ? [...values.keys()].sort((a, b) => (Number.isFinite(values[b]) ? values[b] : Infinity) - (Number.isFinite(values[a]) ? values[a] : Infinity) || (a === worst ? -1 : b === worst ? 1 : a - b)) : [worst];

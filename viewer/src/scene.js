@@ -14,7 +14,7 @@ const MOVE_MS = 260;
 const UP = new Vector3(0, 0, 1);
 
 const PALETTE = {
-  light: { part: '#b4bdc8', edge: '#4b5663', jaw: '#33475c', jawEdge: '#22303f', pad: '#d9762b', load: '#a3158f', sky: '#ffffff', ground: '#9aa3ad' },
+  light: { part: '#b4bdc8', edge: '#4b5663', jaw: '#4a6785', jawEdge: '#2f4a66', pad: '#d9762b', load: '#a3158f', sky: '#ffffff', ground: '#9aa3ad' },
   dark: { part: '#76828f', edge: '#11161b', jaw: '#9db4cc', jawEdge: '#c9d8e6', pad: '#f0964d', load: '#ef6bd8', sky: '#f2f6fa', ground: '#4a535d' },
 };
 
@@ -94,10 +94,11 @@ export class View {
     this.materials = {
       part: new MeshStandardMaterial({ roughness: 0.72, metalness: 0.08, side: DoubleSide, ...lift }),
       edge: new LineBasicMaterial({ transparent: true, opacity: 0.75 }),
-      jaw: new MeshStandardMaterial({ roughness: 0.6, metalness: 0.1, opacity: 0.26, ...glass }),
-      jawEdge: new LineBasicMaterial({ transparent: true, opacity: 0.8 }),
-      palm: new MeshStandardMaterial({ roughness: 0.6, metalness: 0.1, opacity: 0.14, ...glass }),
-      pad: new MeshStandardMaterial({ roughness: 0.9, metalness: 0, opacity: 0.5, ...glass }),
+      // Nearly clear: the part and its contact areas lie behind up to four of these surfaces.
+      jaw: new MeshStandardMaterial({ roughness: 0.6, metalness: 0.1, opacity: 0.1, ...glass }),
+      jawEdge: new LineBasicMaterial({ transparent: true, opacity: 0.55 }),
+      palm: new MeshStandardMaterial({ roughness: 0.6, metalness: 0.1, opacity: 0.06, ...glass }),
+      pad: new MeshStandardMaterial({ roughness: 0.9, metalness: 0, opacity: 0.3, ...glass }),
       padEdge: new LineBasicMaterial(),
       contact: new MeshBasicMaterial({ transparent: true, opacity: 0.85, depthWrite: false, side: DoubleSide }),
       contactEdge: new LineBasicMaterial(),
