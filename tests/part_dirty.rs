@@ -151,10 +151,10 @@ fn assert_contains(name: &str, mode: &str, clean: &Part, dirty: &Part, moved: DV
 /// All grips of a coarse set, scored and in order.
 fn ranking(part: &Part) -> Vec<RankedGrip> {
     let gripper = gripper::find("generic").unwrap();
-    let options = ProposeOptions { spacing: Some(8e-3), angle_step: std::f64::consts::FRAC_PI_2, ..ProposeOptions::default() };
+    let options = ProposeOptions { spacing: Some(15e-3), angle_step: std::f64::consts::FRAC_PI_2, ..ProposeOptions::default() };
     let grips = Proposer::new(part, &gripper, &options).unwrap().flat_map(|chunk| chunk.grips).collect();
     let mass = part.mass_properties(0.2 / part.mass_properties(1.0).volume);
-    let loads = LoadSet::parse("loads", "gravity").unwrap().with_acceleration(9.8).cases(&mass).unwrap();
+    let loads = LoadSet::parse("loads", "gravity").unwrap().cases(&mass).unwrap();
     let settings =
         Settings { force: 40.0, weights: Weights::default(), delta: 0.0, mu_c: 0.0, pad_friction: gripper.pad_friction, score: ScoreOptions::default() };
     let ranked = Assessor { loads: &loads, mass, settings: &settings, backend: &Backend::Cpu, seeds: &SeedSet::default() }.assess(grips).unwrap();
@@ -299,7 +299,12 @@ fn defects_that_change_the_shape_are_reported() {
             if mode == "jitter5" {
                 assert_contains(name, mode, &clean, &part, DVec3::ZERO);
             }
-            assert!(part.health.warnings.iter().any(|warning| warning.contains("rough")), "{name} {mode}: {:?}", part.health.lines());
+            if mode == "jitter5" {
+                assert!(part.health.warnings.iter().any(|warning| warning.contains("rough")), "{name}: {:?}", part.health.lines());
+            }
+            // Rougher than that, flat faces are no longer taken for flat; none is made up.
+            let area = |part: &Part| part.faces.iter().map(|face| face.area).sum::<f64>();
+            assert!(area(&part) < 1.05 * area(&clean), "{name} {mode}: {:?}", part.health.lines());
         }
 
         let shift = DVec3::new(0.1, 0.07, 0.05) * size;
@@ -355,7 +360,13 @@ fn files_that_are_no_mesh_are_refused_with_place_and_remedy() {
         refused("flat.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 1 1\nvertex 1 1 1\nvertex 1 1 1\nendloop\nendfacet\nendsolid\n")
             .contains("area")
     );
-    assert!(refused("part.step", b"ISO-10303-21;").contains("cascadio"));
+    let step = refused("part.step", b"ISO-10303-21;");
+    if cfg!(feature = "step") {
+        assert!(step.contains("cannot be read as STEP"), "{step}");
+    } else {
+        assert!(step.contains("cascadio") && step.contains("--features step"), "{step}");
+    }
+    assert!(refused("part.igs", b"").contains("cascadio"));
     assert!(refused("part.xyz", b"1 2 3").contains("unknown mesh format"));
     assert!(refused("part", b"1 2 3").contains("suffix"));
     assert!(refused("bad.obj", b"v 0 0 0\nv 1 0 0\nv 0 x 0\nf 1 2 3\n").contains("line 3"));

@@ -148,12 +148,12 @@ fn refined(part: &Part, times: u32) -> Part {
     Part::from_triangles("refined", &vertices, &indices).unwrap()
 }
 
-/// Scores of some grips of a part of 300 g, under gravity and 1 g of acceleration any way.
+/// Scores of some grips of a part of 300 g, under gravity in 26 directions.
 fn scores(part: &Part, gripper: &Gripper, grips: Vec<Grip>) -> Vec<RankedGrip> {
     let mass = part.mass_properties(0.3 / part.mass_properties(1.0).volume);
-    let loads = LoadSet::parse("loads", "gravity").unwrap().with_acceleration(9.80665).cases(&mass).unwrap();
+    let loads = LoadSet::parse("loads", "gravity:26").unwrap().cases(&mass).unwrap();
     let settings = Settings {
-        force: gripper.force[0],
+        force: gripper.force[1] / 4.0,
         weights: Weights::default(),
         delta: 0.0,
         mu_c: 0.0,

@@ -16,7 +16,7 @@ use serde_json::json;
 #[derive(Debug, ClapArgs)]
 #[command(
     after_help = "EXAMPLES:\n  gripfast part bracket.stl\n  gripfast part bracket.stl --unit in --density 2.7g/cm3\n  gripfast part bracket.3mf --mass 350g --json\n  gripfast part bracket.stl --plot faces.svg\n\n\
-Reads STL, OBJ, PLY, OFF, 3MF and glTF/GLB, each also as .gz."
+Reads STL, OBJ, PLY, OFF, 3MF and glTF/GLB, each also as .gz; STEP where built with the feature `step`."
 )]
 pub(crate) struct Args {
     /// Part file.

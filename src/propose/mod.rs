@@ -43,9 +43,6 @@ use tree::{Topology, Tree};
 /// Positions per work item: large enough to share what an angle determines, small enough to spread over the threads.
 /// Fixed, because contacts are shared within an item: results must not depend on the chunk size.
 const ITEM: usize = 2048;
-/// A direction with fewer candidates than one for this many triangles does without a tree of its own: to make one takes some 20 ns
-/// for each triangle, and the looser boxes of another one cost some microseconds for each candidate.
-const TRIANGLES_PER_CANDIDATE: usize = 200;
 /// Corners of contact polygons that a chunk may hold, about (16 bytes each): where pads cover finely tessellated outlines,
 /// chunks have fewer candidates.
 const MOST_CORNERS: usize = 4_000_000;
@@ -89,8 +86,6 @@ pub struct Proposer<'a> {
     /// Corners per candidate in the last chunk.
     corners: f64,
     tree: Option<(usize, Arc<Tree>)>,
-    /// The tree in the part's own axes, once a direction with few candidates has asked for it.
-    own_tree: std::sync::OnceLock<Tree>,
 }
 
 /// Where the next chunk starts.
@@ -165,7 +160,6 @@ impl<'a> Proposer<'a> {
             next: Cursor::default(),
             corners: 400.0,
             tree: None,
-            own_tree: std::sync::OnceLock::new(),
         })
     }
 
@@ -235,11 +229,6 @@ impl<'a> Proposer<'a> {
 
     fn new_tree(&self, direction: usize) -> Tree {
         let axes: DMat3 = site::axes(self.directions[direction]);
-        let sites = self.sites.iter().filter(|site| site.direction == direction);
-        let candidates: usize = sites.map(|site| site.positions.len() * site.angles.len()).sum();
-        if candidates.saturating_mul(TRIANGLES_PER_CANDIDATE) < self.part.mesh.triangles.len() {
-            return self.own_tree.get_or_init(|| Tree::new(&self.shape, DMat3::IDENTITY)).turned(axes);
-        }
         Tree::new(&self.shape, axes)
     }
 

@@ -3,8 +3,7 @@
 //! The bodies of a gripper turn about the closing axis only, and pads lie on faces perpendicular to it. Boxes in axes
 //! that follow the closing axis make both exact and cheap: a face under a pad has a box without height, however finely
 //! it is triangulated, and a turned body meets a box by five separating axes instead of fifteen. The tree's shape is
-//! built once per part; per closing direction only vertices and boxes are computed anew. Where a direction has few
-//! candidates even that is too much: there each box that is looked at is put round the one in the part's own axes.
+//! built once per part; per closing direction only vertices and boxes are computed anew.
 
 use std::sync::Arc;
 
@@ -116,9 +115,7 @@ pub(super) struct Tree {
     shape: Arc<Topology>,
     axes_from_part: DMat3,
     /// Smallest and largest coordinates of each node, grown by the rounding to 32 bits.
-    boxes: Arc<Vec<[[f32; 3]; 2]>>,
-    /// Magnitudes of the rotation from the axes of the boxes, where those are not the tree's.
-    loose: Option<DMat3>,
+    boxes: Vec<[[f32; 3]; 2]>,
 }
 
 impl Tree {
@@ -148,15 +145,7 @@ impl Tree {
                 boxes[index] = [low.to_array(), high.to_array()];
             }
         }
-        Self { shape: Arc::clone(shape), axes_from_part, boxes: Arc::new(boxes), loose: None }
-    }
-
-    /// This tree, whose axes must be the part's own, turned to other axes without a look at the triangles: the boxes are those
-    /// round the turned boxes, so that more of them are met, but the triangles met are the same.
-    pub(super) fn turned(&self, axes_from_part: DMat3) -> Self {
-        let columns = [axes_from_part.x_axis, axes_from_part.y_axis, axes_from_part.z_axis].map(DVec3::abs);
-        let loose = DMat3::from_cols(columns[0], columns[1], columns[2]);
-        Self { shape: Arc::clone(&self.shape), axes_from_part, boxes: Arc::clone(&self.boxes), loose: Some(loose) }
+        Self { shape: Arc::clone(shape), axes_from_part, boxes }
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -172,11 +161,7 @@ impl Tree {
     /// Middle and half sizes of a node's box.
     pub(super) fn bounds(&self, node: u32) -> (DVec3, DVec3) {
         let [low, high] = self.boxes[node as usize].map(|corner| DVec3::new(f64::from(corner[0]), f64::from(corner[1]), f64::from(corner[2])));
-        let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
-        match self.loose {
-            None => (middle, half),
-            Some(loose) => (self.axes_from_part * middle, loose * half),
-        }
+        ((low + high) / 2.0, (high - low) / 2.0)
     }
 
     /// A vertex of some triangle under the node.
@@ -207,14 +192,7 @@ mod tests {
         let triangles: Vec<[u32; 3]> = (0..count).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
         let mesh = Mesh { vertices, triangles };
         let shape = Arc::new(Topology::new(&mesh));
-        let axes = DMat3::from_rotation_y(0.4) * DMat3::from_rotation_x(1.1);
-        for tree in [Tree::new(&shape, axes), Tree::new(&shape, DMat3::IDENTITY).turned(axes)] {
-            assert_holds_every_triangle(&tree, count);
-        }
-        assert!(Tree::new(&Arc::new(Topology::new(&Mesh::default())), DMat3::IDENTITY).is_empty());
-    }
-
-    fn assert_holds_every_triangle(tree: &Tree, count: u32) {
+        let tree = Tree::new(&shape, DMat3::from_rotation_y(0.4));
         let mut found = vec![false; count as usize];
         let mut stack = vec![0];
         while let Some(node) = stack.pop() {
@@ -228,5 +206,6 @@ mod tests {
             stack.extend(tree.children(node).into_iter().flatten());
         }
         assert!(found.iter().all(|&found| found));
+        assert!(Tree::new(&Arc::new(Topology::new(&Mesh::default())), DMat3::IDENTITY).is_empty());
     }
 }
