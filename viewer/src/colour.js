@@ -24,6 +24,6 @@ export function frictionScale(values) {
   const sorted = Float32Array.from(values.filter(Number.isFinite)).sort();
   if (sorted.length === 0) return { low: 0, high: 1, at: () => 1 };
   const low = sorted[0];
-  const high = Math.max(sorted[Math.floor((sorted.length - 1) * 0.95)], low * 1.0001 + 1e-9);
+  const high = Math.max(sorted[Math.ceil((sorted.length - 1) * 0.95)], low * 1.0001 + 1e-9);
   return { low, high, at: (mu) => (Number.isFinite(mu) ? (mu - low) / (high - low) : 1) };
 }
