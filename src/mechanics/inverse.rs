@@ -134,7 +134,7 @@ impl<S: Fn(f64) -> Score> Limit<S> {
     fn between(&self, mut low: f64, mut high: f64) -> f64 {
         let (mut below, mut above) = (self.excess(low).unwrap_or(-1.0), self.excess(high));
         let mut stays = 0;
-        while high - low > if above.is_some() { FOUND } else { FOUND_LOST } * high {
+        while high - low > high * above.map_or(FOUND_LOST, |_| FOUND) {
             let share = above.map_or(0.5, |above| below / (below - above));
             let k = low + share.clamp(0.01, 0.99) * (high - low);
             let excess = self.excess(k);
