@@ -42,29 +42,36 @@ fn bracket(more: &[&str]) -> (GripSet, String) {
 
 #[test]
 fn the_load_multiple_is_where_the_pads_friction_or_the_contact_ends() {
-    let (set, out) = bracket(&["--accel", "2g", "--force", "60N"]);
+    let (set, out) = bracket(&["--accel", "2g", "--force", "20N", "--pad-friction", "2"]);
     assert!(out.contains("multiple"), "{out}");
     let friction = set.provenance.settings["pad_friction"].as_f64().unwrap();
+    assert_eq!(friction, 2.0);
     let options = Options { search: Search::Off, ..Options::default() };
-    let mut twisted = 0;
-    for ranked in set.grips.iter().step_by(7) {
+    let (mut slipping, mut twisted) = (0, 0);
+    for ranked in set.grips.iter().step_by(3) {
         let (multiple, needed) = (ranked.load_multiple.unwrap(), ranked.force_needed.unwrap());
-        assert!((multiple * needed / 60.0 - 1.0).abs() < 1e-12);
+        assert!((multiple * needed / 20.0 - 1.0).abs() < 1e-12);
         let pads = Pads::new(&ranked.grip.contact).unwrap();
         let at = |factor: f64| {
             let wrench = Wrench { force: ranked.worst.wrench.force * factor, moment: ranked.worst.wrench.moment * factor };
-            solve_pads(&pads, ranked.grip.width, 60.0, &wrench, &options)
+            solve_pads(&pads, ranked.grip.width, 20.0, &wrench, &options)
         };
-        let (below, above) = (at(multiple * (1.0 - 1e-7)), at(multiple * (1.0 + 1e-7)));
-        assert!(below.status.holds() && below.mu_s.unwrap() <= friction);
-        assert!(!above.status.holds() || above.mu_s.unwrap() > friction, "{}: {multiple}", ranked.grip.id);
-        twisted += usize::from(!above.status.holds());
-        // The safety is its share for friction alone: equal where mu_s grows with the load.
-        if ranked.contact_share == 1.0 && at(multiple * 0.999).contact_area_i == patch_area(&ranked.grip.contact.face_i) && above.status.holds() {
+        let held = |factor: f64| at(factor).status.holds() && at(factor).mu_s.unwrap() <= friction;
+        // Where the contact twists out first, the solver's last per cents are not asked for.
+        let slips = at(multiple * 1.02).status.holds();
+        let sharp = if slips { 1e-7 } else { 0.02 };
+        assert!(held(multiple * (1.0 - sharp)) && !held(multiple * (1.0 + sharp)), "{}: {multiple}", ranked.grip.id);
+        if slips {
+            slipping += 1
+        } else {
+            twisted += 1
+        }
+        // The safety is the friction's share alone: equal where mu_s grows with the load up to there.
+        if at(multiple * (1.0 - sharp)).contact_area_i == patch_area(&ranked.grip.contact.face_i) && slips && ranked.contact_share == 1.0 {
             assert!((multiple / ranked.safety.unwrap() - 1.0).abs() < 1e-6, "{}", ranked.grip.id);
         }
     }
-    assert!(twisted > 0 && twisted < set.grips.len() / 7, "both kinds of end: {twisted}");
+    assert!(slipping > 5 && twisted > 5, "both kinds of end: {slipping} {twisted}");
 }
 
 #[test]

@@ -79,7 +79,7 @@ fn spearman(a: &[f64], b: &[f64]) -> Option<f64> {
     let middle = (a.len() as f64 + 1.0) / 2.0;
     let sum = |f: &dyn Fn(f64, f64) -> f64| a.iter().zip(b).map(|(&x, &y)| f(x - middle, y - middle)).sum::<f64>();
     let (xx, yy, xy) = (sum(&|x, _| x * x), sum(&|_, y| y * y), sum(&|x, y| x * y));
-    (xx > 0.0 && yy > 0.0).then(|| (xy / xx.sqrt() / yy.sqrt()).clamp(-1.0, 1.0))
+    (xx > 0.0 && yy > 0.0).then(|| (xy / (xx * yy).sqrt()).clamp(-1.0, 1.0))
 }
 
 /// Kendall's tau-b, which allows for ties, in `n log n` (Knight 1966: discordant pairs are the exchanges of a merge sort).
@@ -96,7 +96,7 @@ fn kendall(a: &[f64], b: &[f64]) -> Option<f64> {
     let tied_b = tied(&mut second.chunk_by(|x, y| x == y).map(<[_]>::len));
     let (untied_a, untied_b) = (all - tied_a, all - tied_b);
     let difference = all - tied_a - tied_b + tied_both - 2.0 * exchanges;
-    (untied_a > 0.0 && untied_b > 0.0).then(|| (difference / untied_a.sqrt() / untied_b.sqrt()).clamp(-1.0, 1.0))
+    (untied_a > 0.0 && untied_b > 0.0).then(|| (difference / (untied_a * untied_b).sqrt()).clamp(-1.0, 1.0))
 }
 
 /// Sorts and counts the pairs that stood in falling order.
