@@ -223,6 +223,22 @@ fn pages_show_what_the_program_prints() {
 }
 
 #[test]
+fn every_subcommand_has_examples_a_manual_page_and_completions() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = |text: &str| -> Vec<String> { text.split(' ').map(str::to_owned).collect() };
+    assert_eq!(run(&words("man pages"), folder.path()).1, 0);
+    let pages: Vec<_> = std::fs::read_dir(folder.path().join("pages")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert!(pages.len() >= 18, "{pages:?}");
+    for page in &pages {
+        assert!(std::fs::read_to_string(page).unwrap().contains("EXAMPLES"), "{} shows no example", page.display());
+    }
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let (script, exit) = run(&words(&format!("completions {shell}")), folder.path());
+        assert!(exit == 0 && script.iter().any(|line| line.contains("report")), "{shell}");
+    }
+}
+
+#[test]
 fn the_comparison_can_fail() {
     let printed: Vec<String> = ["read", "size 60.0 x 40.0", "rank 1  mu_s 0.02294", "took 3.20 ms"].map(String::from).to_vec();
     let good = ["read", "size 60.0 x 40.0", "rank 1 mu_s 0.02295", "took 9.99 ms"];
