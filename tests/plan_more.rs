@@ -11,7 +11,7 @@ use gripfast::backend::{Backend, ScoreOptions, SeedSet};
 use gripfast::export::Format;
 use gripfast::geometry::patch_area;
 use gripfast::gripper::{self, Gripper};
-use gripfast::mechanics::{self, Options, Pads, Search, solve_pads};
+use gripfast::mechanics::{self, Options, Pads, solve_pads};
 use gripfast::model::{Contact, Grip, Polygon, Ring, Wrench};
 use gripfast::part::{Part, ReadOptions, Unit};
 use gripfast::plan::noise::Noise;
@@ -46,7 +46,6 @@ fn the_load_multiple_is_where_the_pads_friction_or_the_contact_ends() {
     assert!(out.contains("multiple"), "{out}");
     let friction = set.provenance.settings["pad_friction"].as_f64().unwrap();
     assert_eq!(friction, 2.0);
-    let options = Options { search: Search::Off, ..Options::default() };
     let (mut slipping, mut twisted) = (0, 0);
     for ranked in set.grips.iter().step_by(3) {
         let (multiple, needed) = (ranked.load_multiple.unwrap(), ranked.force_needed.unwrap());
@@ -54,7 +53,7 @@ fn the_load_multiple_is_where_the_pads_friction_or_the_contact_ends() {
         let pads = Pads::new(&ranked.grip.contact).unwrap();
         let at = |factor: f64| {
             let wrench = Wrench { force: ranked.worst.wrench.force * factor, moment: ranked.worst.wrench.moment * factor };
-            solve_pads(&pads, ranked.grip.width, 20.0, &wrench, &options)
+            solve_pads(&pads, ranked.grip.width, 20.0, &wrench, &Options::default())
         };
         let held = |factor: f64| at(factor).status.holds() && at(factor).mu_s.unwrap() <= friction;
         // Where the contact twists out first, the solver's last per cents are not asked for.

@@ -16,7 +16,7 @@ use super::{COUPLING_SEARCH, Options, Pads, Search, solve_pads};
 /// leaves of the last per cent). `None` when no force up to
 /// `1e9` times the load's size holds it (or `friction` is not positive).
 ///
-/// Only limit states on the branch from `d = 0` count ([`Search::Off`]), which errs towards more force.
+/// Limit states are those that [`super::solve_pads`] finds; [`Options::search`] counts for nothing.
 pub fn force_needed(pads: &Pads, distance: f64, wrench: &Wrench, friction: f64, options: &Options) -> Option<f64> {
     if friction.is_nan() || friction <= 0.0 {
         return None;
@@ -25,8 +25,13 @@ pub fn force_needed(pads: &Pads, distance: f64, wrench: &Wrench, friction: f64, 
     if size == 0.0 {
         return Some(0.0);
     }
-    let options = Options { search: Search::Off, ..*options };
-    let search = Limit { friction, solve: |k: f64| solve_pads(pads, distance, size / k, wrench, &options) };
+    let solve = |k: f64| {
+        let with = |search: Search| solve_pads(pads, distance, size / k, wrench, &Options { search, ..*options });
+        let score = with(Search::Off);
+        // The path from d = 0 may end before the limit states do.
+        if score.status == Status::TwistedOut { with(Search::WhereNeeded) } else { score }
+    };
+    let search = Limit { friction, solve };
     let start = START.iter().copied().find(|&k| search.holds(k))?;
     // Where the friction coupling is strong, contact that is whole at the limit may separate before it.
     let weak = friction * distance.abs() <= COUPLING_SEARCH * pads.length;
@@ -214,20 +219,20 @@ mod tests {
             let pads = Pads::new(&contact).unwrap();
             let n = |factor: f64| number(index, factor);
             let force = DVec3::new(n(0.754_877), n(0.569_840), n(0.819_172));
-            let wrench = Wrench { force, moment: 0.02 * DVec3::new(n(0.671_043), n(0.549_700), n(0.450_299)) };
-            let (distance, friction) = (0.01 * f64::from(index % 4), 0.1 + 0.2 * f64::from(index % 3));
+            let wrench = Wrench { force, moment: DVec3::new(0.05 * n(0.671_043), 0.05 * n(0.549_700), 0.02 * n(0.450_299)) };
+            let (distance, friction) = (0.01 * f64::from(index % 4), 0.2 + 0.4 * f64::from(index % 3));
             let limit = load_multiple(&pads, distance, 1.0, &wrench, friction, &Options::default());
-            let options = Options { search: Search::Off, ..Options::default() };
-            let at = |multiple: f64| solve_pads(&pads, distance, 1.0 / multiple, &wrench, &options);
+            let at = |multiple: f64| solve_pads(&pads, distance, 1.0 / multiple, &wrench, &Options::default());
             let held = |multiple: f64| at(multiple).status.holds() && at(multiple).mu_s.unwrap() <= friction;
             let slips = at(limit * (1.0 + 1e-8)).status.holds();
-            // Where the contact ends otherwise, nothing is asked of the last two per cent: see [`FOUND_LOST`].
-            let sharp = if slips { 1e-8 } else { 0.02 };
+            // Where the contact ends otherwise, nothing is asked of the last per cents, where the solver finds some equilibria
+            // and misses others: see [`FOUND_LOST`].
+            let (sharp, beyond) = if slips { (1e-8, 1e-8) } else { (0.02, 0.05) };
             for step in 1..300 {
                 let multiple = limit * f64::from(step) / 300.0 * (1.0 - sharp);
                 assert!(held(multiple), "{index}: {multiple} of {limit}");
             }
-            assert!(!held(limit * (1.0 + sharp)), "{index}: {limit}");
+            assert!(!held(limit * (1.0 + beyond)), "{index}: {limit}");
             if slips {
                 by_slip += 1
             } else {
