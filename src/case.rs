@@ -16,7 +16,7 @@ pub struct Case {
     pub id: Option<String>,
     /// Both contact areas [m].
     pub contact: Contact,
-    /// Distance of the faces [m].
+    /// Height of face I over face II [m], negative for a grip from inside.
     pub distance: f64,
     /// Gripping force [N].
     pub force: f64,

@@ -29,7 +29,7 @@ fn cases() -> impl Strategy<Value = Case> {
     let radii = || proptest::collection::vec(0.4..1.2f64, 3..9);
     let small = || -0.25..0.25f64;
     let wrench = [small(), small(), small(), small(), small(), small()];
-    (radii(), radii(), 0.0..6.0f64, small(), small(), 0.0..1.2f64, wrench).prop_map(|(one, two, turn, x, y, distance, w)| Case {
+    (radii(), radii(), 0.0..6.0f64, small(), small(), -0.8..1.2f64, wrench).prop_map(|(one, two, turn, x, y, distance, w)| Case {
         contact: Contact { face_i: patch(&one, turn, DVec2::ZERO), face_ii: patch(&two, -turn, DVec2::new(x, y)) },
         distance,
         force: 1.0,
@@ -88,6 +88,26 @@ proptest! {
         agree(&a, &b)?;
         if let (Status::Ok, Some(Slip::Rotation { sense, .. }), Some(Slip::Rotation { sense: other, .. })) = (a.status, a.slip, b.slip) {
             prop_assert_eq!(sense, -other);
+        }
+    }
+
+    #[test]
+    fn from_inside_with_the_in_plane_load_reversed(case in cases()) {
+        // Friction reverses with the load, and so does its lever with `d`: the pressure knows no difference.
+        let mut inside = case.clone();
+        inside.distance = -case.distance;
+        inside.wrench.force = case.wrench.force * DVec3::new(-1.0, -1.0, 1.0);
+        inside.wrench.moment.z = -case.wrench.moment.z;
+        let (a, b) = (answer(&case), answer(&inside));
+        agree(&a, &b)?;
+        if let (Status::Ok, Some(Slip::Rotation { c, sense }), Some(Slip::Rotation { c: d, sense: other })) = (a.status, a.slip, b.slip) {
+            let (c, d) = (DVec2::from_array(c), DVec2::from_array(d));
+            prop_assert!(sense == -other && c.distance(d) <= 1e-6 * (1.0 + c.length_squared()), "{:?} {:?}", c, d);
+            let (p, q) = (a.pressure.unwrap(), b.pressure.unwrap());
+            let scale = p.a_i0.abs().max(p.a_ii0.abs());
+            for (x, y) in [(p.a_i0, q.a_i0), (p.a_ii0, q.a_ii0), (p.a1, q.a1), (p.a2, q.a2)] {
+                prop_assert!((x - y).abs() <= 1e-7 * scale, "{:?} {:?}", p, q);
+            }
         }
     }
 

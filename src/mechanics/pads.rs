@@ -37,7 +37,8 @@ impl Pads {
         Some(Self { areas, moments, hulls, origin, length })
     }
 
-    /// The load in units of `force` [N] and of this contact's length, its moment about the scaled frame's origin.
+    /// The load in units of `force` [N] and of this contact's length, its moment about the scaled frame's origin;
+    /// `distance` [m] is negative for a grip from inside.
     pub fn load(&self, distance: f64, force: f64, wrench: &Wrench) -> Load {
         let origin = DVec3::new(self.origin.x, self.origin.y, 0.0);
         let f = wrench.force / force;
@@ -89,6 +90,6 @@ pub struct Load {
     pub normal: [f64; 2],
     /// `(M1, M2)`.
     pub moment: [f64; 2],
-    /// `d/2`.
+    /// `d/2`, negative for a grip from inside.
     pub half_distance: f64,
 }

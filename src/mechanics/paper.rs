@@ -108,7 +108,7 @@ pub struct Report {
 /// The paper's method on one case; arguments as [`super::solve`].
 ///
 /// # Errors
-/// As [`super::solve`]: numbers that are not finite, a force that is not positive, a negative distance.
+/// As [`super::solve`]: numbers that are not finite, a force that is not positive.
 pub fn solve(contact: &Contact, distance: f64, force: f64, wrench: &Wrench, options: &Options) -> Result<Report> {
     super::check(contact, distance, force, wrench)?;
     let refused = |status| Report { runs: vec![], published: None, checked: None, score: super::refused(status, 0) };

@@ -90,9 +90,15 @@ impl TwistOut {
 }
 
 /// `Delta_d = sqrt(d^2 + w^2) - d` [m]: how far the jaws must be forced open to twist the part out, for faces `d` apart
-/// and the least lever `w`. Zero for a lever that is not positive.
+/// and the least lever `w`. Zero for a lever that is not positive. For a grip from inside (`d` negative) it is how far
+/// the jaws must be pressed together.
 pub fn delta_d(d: f64, w: f64) -> f64 {
-    if w <= 0.0 { 0.0 } else { w * (w / (d.hypot(w) + d)) }
+    match (w <= 0.0, d < 0.0) {
+        (true, _) => 0.0,
+        (_, true) => d.hypot(w) - d,
+        // The same without cancellation for thin levers.
+        (_, false) => w * (w / (d.hypot(w) + d)),
+    }
 }
 
 /// `alpha = max(0, atan((w - 2 delta)/d) - atan mu_c)` [rad]: the tilt up to which closing jaws right the part.
@@ -141,6 +147,8 @@ mod tests {
         assert_eq!(alpha(1.0, w, 0.6, 0.0), 0.0);
         // Far thinner than wide, and far wider than thin: no cancellation.
         assert!((delta_d(1e9, 1.0) / 5e-10 - 1.0).abs() < 1e-15);
+        // From inside the well starts at -d.
+        assert!((delta_d(-1e9, 1.0) - 2e9).abs() < 1e-6 && (delta_d(-0.75, 1.0) - 2.0).abs() < 1e-15);
     }
 
     #[test]
