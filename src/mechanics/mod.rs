@@ -9,6 +9,7 @@ pub mod paper;
 pub mod pressure;
 pub mod shanno;
 pub mod slip;
+pub mod states;
 pub mod twist_out;
 pub mod wolter;
 
@@ -120,17 +121,14 @@ pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, optio
     let strong = |state: &State| state.mu_over_size * load.size * 2.0 * load.half_distance.abs() > COUPLING_SEARCH;
     let (state, unique) = match branch {
         Some(state) if options.search == Search::Off || !strong(&state) => (state, true),
-        None if options.search == Search::Off => return refused(Status::TwistedOut, solver.evaluations),
-        Some(state) => {
-            let others = solver.search(seed);
-            (state, others.iter().all(|other| equilibrium::same(other, &state)))
-        }
-        None => {
-            let mut all = solver.search(seed);
-            all.sort_by(|a, b| a.mu_over_size.total_cmp(&b.mu_over_size));
-            match all.first() {
-                Some(&state) => (state, all.len() == 1),
-                None => return refused(Status::TwistedOut, solver.evaluations),
+        None if options.search == Search::Off || load.half_distance == 0.0 => return refused(Status::TwistedOut, solver.evaluations),
+        branch => {
+            let found = solver.limit_states(branch.as_slice());
+            match (found.states.as_slice(), found.complete) {
+                ([], true) => return refused(Status::TwistedOut, solver.evaluations),
+                ([], false) => return refused(Status::NotConverged, solver.evaluations),
+                ([only], complete) => (*only, complete),
+                ([least, ..], _) => (solver.from_uncoupled(seed).unwrap_or(*least), false),
             }
         }
     };
@@ -172,7 +170,7 @@ fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, eva
 fn pressed_only(pads: &Pads, force: f64, load: &Load, options: &Options) -> Score {
     let mut scratch = Loops::default();
     let target = glam::DVec2::new(-load.moment[1], load.moment[0]);
-    let Some(q) = pressure::solve(pads, load.normal, target, &mut scratch) else {
+    let Some(q) = pressure::solve(pads, load.normal, target, None, &mut scratch) else {
         return refused(Status::TwistedOut, 0);
     };
     let m = pressure::pressed_moments(pads, &q, &mut scratch);
