@@ -120,7 +120,10 @@ fn look(number: u64, problem: &Problem, score: &gripfast::model::Score, unit: &C
     let kind = match (score.status, strength) {
         (Status::TwistedOut, _) => "refusals".to_owned(),
         (Status::Ambiguous, _) => "ambiguous answers".to_owned(),
-        (_, Some(strength)) => format!("single answers at coupling {}", [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 100.0].iter().find(|bound| strength < **bound).map_or("more".into(), |b| format!("< {b}"))),
+        (_, Some(strength)) => format!(
+            "single answers at coupling {}",
+            [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 100.0].iter().find(|bound| strength < **bound).map_or("more".into(), |b| format!("< {b}"))
+        ),
         _ => "answers without coupling".to_owned(),
     };
     tally.count(format!("scanned {kind}"));
@@ -128,7 +131,13 @@ fn look(number: u64, problem: &Problem, score: &gripfast::model::Score, unit: &C
     let known = score.mu_s.map(|mu| scan.zeros.iter().filter(|zero| (zero.mu / mu - 1.0).abs() < 1e-5).count());
     let others = mus.len() - known.unwrap_or(0).min(mus.len());
     let mut wrong = |name: &str, what: String| {
-        tally.wrong.push(format!("case {number}: {name}: {what}; scan {mus:?} winding {:?} blind {}/{}\n    {score:?}\n    {}", scan.winding, scan.blind, scan.points, unit.json()));
+        tally.wrong.push(format!(
+            "case {number}: {name}: {what}; scan {mus:?} winding {:?} blind {}/{}\n    {score:?}\n    {}",
+            scan.winding,
+            scan.blind,
+            scan.points,
+            unit.json()
+        ));
         *tally.counts.entry(format!("WRONG {name}")).or_default() += 1;
     };
     match score.status {

@@ -55,7 +55,7 @@ pub struct Solver<'a> {
     pub iterations: u32,
 }
 
-/// Residual at which a state counts as a solution.
+/// Residual at which a state counts as a solution, but for rounding.
 pub const TOLERANCE: f64 = 1e-11;
 
 impl<'a> Solver<'a> {
@@ -171,7 +171,16 @@ impl<'a> Solver<'a> {
             let Some((tried, next_jacobian)) = next else { break };
             (at, jacobian) = (tried, next_jacobian);
         }
-        (at.residual.amax() < TOLERANCE && at.mu_over_size > 0.0).then_some(at)
+        (at.residual.amax() < self.tolerance(&at) && at.mu_over_size > 0.0).then_some(at)
+    }
+
+    /// [`TOLERANCE`], or what rounding the pressure's coefficients leaves where that is more: on a contact of relative
+    /// width `e` the pressure is `e` times as large as the coefficients that it is the difference of.
+    fn tolerance(&self, at: &State) -> f64 {
+        let q = at.q();
+        let coefficients = |k: usize| q[k].abs() + q[2].hypot(q[3]) * self.pads.areas[k].radius();
+        let rounding = (0..2).map(|k| coefficients(k) * at.areas[k]).sum::<f64>();
+        TOLERANCE.max(8.0 * f64::EPSILON * rounding * (1.0 + self.load.half_distance.abs() * self.load.size * at.mu_over_size))
     }
 
     /// Shanno's method on half the squared residual, in variables scaled by the Jacobian at the start of each round.
@@ -198,7 +207,7 @@ impl<'a> Solver<'a> {
             }
         }
         let pressed = at.areas[0] > 0.0 && at.areas[1] > 0.0;
-        (pressed && at.residual.amax() < TOLERANCE && at.mu_over_size > 0.0).then_some(at)
+        (pressed && at.residual.amax() < self.tolerance(&at) && at.mu_over_size > 0.0).then_some(at)
     }
 
     /// A state from the contact moment `target` (see [`pressure::reach`]): its pressure, and the slip under it.

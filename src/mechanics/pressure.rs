@@ -66,7 +66,8 @@ pub fn region(pads: &Pads, normal: [f64; 2]) -> Ring {
     let scaled = |k: usize, factor: f64| -> Ring { pads.hulls[k].iter().map(|x| factor * *x).collect() };
     let rings = [scaled(0, normal[0]), scaled(1, -normal[1])];
     // Both from their lowest corner on, of two the left one, from where directions rise from 0 to a whole turn.
-    let first = rings.each_ref().map(|ring| (0..ring.len()).min_by(|&a, &b| ring[a].y.total_cmp(&ring[b].y).then(ring[a].x.total_cmp(&ring[b].x))).unwrap_or(0));
+    let first =
+        rings.each_ref().map(|ring| (0..ring.len()).min_by(|&a, &b| ring[a].y.total_cmp(&ring[b].y).then(ring[a].x.total_cmp(&ring[b].x))).unwrap_or(0));
     let corner = |k: usize, i: usize| rings[k][(first[k] + i) % rings[k].len()];
     let mut done = [0, 0];
     let mut region = Ring::new();

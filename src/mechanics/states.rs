@@ -33,15 +33,19 @@ const CORNERS: usize = 16;
 const RINGS: u32 = 3;
 /// Halvings of a starting cell along each coordinate.
 const HALVINGS: u32 = 6;
-/// The outermost ring, in the coordinate whose fourth power is the distance from the rim: 1e-3 of the way to the middle.
-/// There a contact is down to about 3e-3 of its width; the map hardly changes from there to the rim, where the pressure
+/// The outermost ring, in the coordinate whose fourth power is the distance from the rim: 3e-3 of the way to the middle.
+/// There a contact is down to about 1e-2 of its width; the map hardly changes from there to the rim, where the pressure
 /// is left on an edge or a corner, and Newton's method is started from every point of this ring with a small value.
-const OUTERMOST: f64 = 0.822;
+const OUTERMOST: f64 = 0.77;
 /// A cell holds no zero when its corners' values stay this many times the bend away from zero. Inside a cell a quadratic
 /// map strays by at most half the bend from the values between its corners.
 const BEND: f64 = 0.75;
+/// The same when the signs do not add up at first.
+const BEND_AGAIN: f64 = 3.0;
 /// Value on the outermost ring, in units of force times the pads' length, from which a zero beyond it is sought.
 const BEYOND: f64 = 0.05;
+/// Residual of the slip's equations up to which a point of the map is drawn; the states themselves are solved in full.
+const LOOSE: f64 = 1e-4;
 /// Most points looked at, and most starts of Newton's method.
 const MOST_NODES: usize = 400;
 const MOST_STARTS: usize = 60;
@@ -145,7 +149,7 @@ impl<'s, 'a> Map<'s, 'a> {
         let z = self.solver.state_near(x, near.map(|near| &near.z))?;
         let mut jacobian = Matrix7::zeros();
         let state = self.solver.evaluate(&z, 1.0, Some(&mut jacobian));
-        if state.residual.fixed_rows::<5>(0).amax() > 1e-6 {
+        if state.residual.fixed_rows::<5>(0).amax() > LOOSE {
             return None;
         }
         let g = DVec2::new(state.residual[6], -state.residual[5]);
@@ -165,38 +169,87 @@ impl<'s, 'a> Map<'s, 'a> {
 
     /// Adds the zeros found to `states`; whether their signs add up.
     fn search(&mut self, states: &mut Vec<State>) -> bool {
+        self.cells(BEND, MOST_NODES, states);
+        self.beyond(states);
+        // On slivers the outermost points can be beyond what doubles resolve: then the next ring in.
+        let Some((ring, turns)) = (1..=RINGS).rev().find_map(|ring| Some((ring, self.winding(ring << HALVINGS)?))) else { return false };
+        if self.signs(states, ring) != turns {
+            self.cells(BEND_AGAIN, 2 * MOST_NODES, states);
+        }
+        self.signs(states, ring) == turns
+    }
+
+    /// Goes through the mesh, coarse cells first, so that the budget is spent evenly.
+    fn cells(&mut self, bend: f64, most: usize, states: &mut Vec<State>) {
         let whole: u32 = 1 << HALVINGS;
-        let mut cells = Vec::new();
+        self.starts = 0;
+        let mut cells = std::collections::VecDeque::new();
         for piece in 0..self.pieces.len() as u32 {
             let mut near = self.node(0, 0, None);
             for ring in 0..RINGS {
-                let outer = self.node(piece * whole, (ring + 1) * whole, near.as_ref());
-                near = outer.or(near);
-                cells.push(Cell { rays: [piece * whole, (piece + 1) * whole], rings: [ring * whole, (ring + 1) * whole] });
+                near = self.node(piece * whole, (ring + 1) * whole, near.as_ref()).or(near);
+                cells.push_back(Cell { rays: [piece * whole, (piece + 1) * whole], rings: [ring * whole, (ring + 1) * whole] });
             }
         }
-        // Coarse cells first, so that the budget is spent evenly.
-        let mut queue = std::collections::VecDeque::from(cells);
-        while let Some(cell) = queue.pop_front() {
-            queue.extend(self.settle(cell, states));
-        }
-        let turns = self.winding();
-        self.beyond(states);
-        match turns {
-            Some(turns) => states.iter().map(|state| self.solver.turns(state)).sum::<i32>() == turns,
-            None => false,
+        while let Some(cell) = cells.pop_front() {
+            cells.extend(self.settle(cell, bend, most, states));
         }
     }
 
-    /// Newton's method from a point, unless enough have been tried.
+    /// Signs of the states inside a ring, added up.
+    fn signs(&mut self, states: &[State], ring: u32) -> i32 {
+        let share = 1.0 - (1.0 - OUTERMOST * f64::from(ring) / f64::from(RINGS)).powi(4);
+        let mut sum = 0;
+        for state in states {
+            if self.share(state) < share {
+                sum += self.solver.turns(state);
+            }
+        }
+        sum
+    }
+
+    /// How far out a state's contact moment lies: 0 in the middle, 1 on the rim.
+    fn share(&mut self, state: &State) -> f64 {
+        let moments = pressure::pressed_moments(self.solver.pads, &state.q(), &mut self.scratch);
+        let carried = pressure::stiffness(&moments) * nalgebra::Vector4::from(state.q());
+        let x = DVec2::new(carried[2], carried[3]) - self.middle;
+        let outward = |edge: &[DVec2]| {
+            let normal = -(edge[1] - edge[0]).perp();
+            normal.dot(x) / normal.dot(edge[0]).max(f64::MIN_POSITIVE)
+        };
+        self.pieces.iter().flat_map(|piece| piece.windows(2)).map(outward).fold(0.0, f64::max)
+    }
+
+    /// Newton's method from a point, unless enough have been tried: on all seven equations, and if that gets stuck on
+    /// the map first.
     fn start(&mut self, node: &Node, states: &mut Vec<State>) {
         self.starts += 1;
-        if self.starts <= MOST_STARTS
-            && let Some(state) = self.solver.newton(node.z, 1.0, 15)
+        if self.starts > MOST_STARTS {
+            return;
+        }
+        let direct = self.solver.newton(node.z, 1.0, 15);
+        let found = direct.or_else(|| {
+            let z = self.descend(*node).z;
+            self.solver.newton(z, 1.0, 15)
+        });
+        if let Some(state) = found
             && !states.iter().any(|known| same(known, &state))
         {
             states.push(state);
         }
+    }
+
+    /// Newton's method on the map.
+    fn descend(&mut self, mut at: Node) -> Node {
+        for _ in 0..10 {
+            let step = -(at.slope.inverse() * at.g);
+            let next = [1.0, 0.4, 0.15, 0.05].into_iter().find_map(|t| self.look(at.x + t * step, Some(&at)).filter(|next| next.g.length() < at.g.length()));
+            match next {
+                Some(next) if step.is_finite() => at = next,
+                _ => break,
+            }
+        }
+        at
     }
 
     /// Zeros between the outermost ring and the rim: the value on the ring is small beside them.
@@ -211,7 +264,7 @@ impl<'s, 'a> Map<'s, 'a> {
     }
 
     /// Sets the cell aside, finds its zero, or cuts it.
-    fn settle(&mut self, cell: Cell, states: &mut Vec<State>) -> Vec<Cell> {
+    fn settle(&mut self, cell: Cell, bends: f64, budget: usize, states: &mut Vec<State>) -> Vec<Cell> {
         let [a, b] = cell.rays;
         let [inner, outer] = cell.rings;
         let mut corners: Vec<Node> = Vec::with_capacity(4);
@@ -237,7 +290,7 @@ impl<'s, 'a> Map<'s, 'a> {
         let across = bend(&ends[1][0], &ends[1][1]).max(if inner == 0 { 0.0 } else { bend(&ends[0][0], &ends[0][1]) });
         let along = bend(&ends[0][0], &ends[1][0]).max(bend(&ends[0][1], &ends[1][1]));
         let most = across.max(along);
-        if corners.len() < 3 || distance_from_zero(&corners) > BEND * most {
+        if corners.len() < 3 || distance_from_zero(&corners) > bends * most {
             return Vec::new();
         }
         let size = corners.iter().flat_map(|one| corners.iter().map(|two| one.x.distance(two.x))).fold(0.0, f64::max);
@@ -246,7 +299,7 @@ impl<'s, 'a> Map<'s, 'a> {
         let finest = [b - a == 1, outer - inner == 1];
         let split = [across >= 0.5 * along && !finest[0], along >= 0.5 * across && !finest[1]];
         let split = if split == [false, false] && most > 0.0 { [!finest[0], !finest[1]] } else { split };
-        if straight || split == [false, false] || self.nodes.len() >= MOST_NODES {
+        if straight || split == [false, false] || self.nodes.len() >= budget {
             // At most one zero in a straight cell; in one that cannot be cut any more, what Newton's method makes of it.
             corners.sort_by(|a, b| a.g.length().total_cmp(&b.g.length()));
             let starts = if straight { 1 } else { corners.len() };
@@ -264,10 +317,9 @@ impl<'s, 'a> Map<'s, 'a> {
         halves(cell.rays, split[0]).into_iter().flat_map(|rays| rings.iter().map(move |&rings| Cell { rays, rings })).collect()
     }
 
-    /// Turns of `g` along the outermost ring; `None` where that cannot be told.
-    fn winding(&mut self) -> Option<i32> {
+    /// Turns of `g` along a ring; `None` where that cannot be told.
+    fn winding(&mut self, ring: u32) -> Option<i32> {
         let whole = 1 << HALVINGS;
-        let ring = RINGS * whole;
         let mut turned = 0.0;
         let mut arcs: Vec<[u32; 2]> = (0..self.pieces.len() as u32).map(|piece| [piece * whole, (piece + 1) * whole]).collect();
         while let Some([from, to]) = arcs.pop() {

@@ -105,7 +105,11 @@ fn patch(random: &mut Random) -> Patch {
         }
         6 => {
             let (a, b) = (random.range(0.1, 0.3), 0.5); // a cross
-            plain([(a, -b), (a, -a), (b, -a), (b, a), (a, a), (a, b), (-a, b), (-a, a), (-b, a), (-b, -a), (-a, -a), (-a, -b)].map(|(x, y)| DVec2::new(x, y)).to_vec())
+            plain(
+                [(a, -b), (a, -a), (b, -a), (b, a), (a, a), (a, b), (-a, b), (-a, a), (-b, a), (-b, -a), (-a, -a), (-a, -b)]
+                    .map(|(x, y)| DVec2::new(x, y))
+                    .to_vec(),
+            )
         }
         _ => {
             let (a, b) = (random.range(0.3, 1.5), random.range(0.3, 1.5));

@@ -116,13 +116,7 @@ fn moments(area: &Rings) -> [f64; 6] {
 fn loops(area: &Rings) -> Loops {
     let polygons: Vec<Polygon> = area
         .iter()
-        .map(|ring| {
-            if signed_area(ring) > 0.0 {
-                Polygon { outer: ring.clone(), holes: vec![] }
-            } else {
-                Polygon { outer: vec![], holes: vec![ring.clone()] }
-            }
-        })
+        .map(|ring| if signed_area(ring) > 0.0 { Polygon { outer: ring.clone(), holes: vec![] } } else { Polygon { outer: vec![], holes: vec![ring.clone()] } })
         .collect();
     Loops::new(&polygons)
 }
@@ -172,10 +166,22 @@ impl Problem {
             let p = planes(q);
             let [a, b] = [0, 1].map(|k| moments(&pressed(&self.areas[k], p[k])));
             let k = Matrix4::new(
-                a[0], 0.0, a[1], a[2], //
-                0.0, b[0], -b[1], -b[2], //
-                a[1], -b[1], a[3] + b[3], a[4] + b[4], //
-                a[2], -b[2], a[4] + b[4], a[5] + b[5],
+                a[0],
+                0.0,
+                a[1],
+                a[2], //
+                0.0,
+                b[0],
+                -b[1],
+                -b[2], //
+                a[1],
+                -b[1],
+                a[3] + b[3],
+                a[4] + b[4], //
+                a[2],
+                -b[2],
+                a[4] + b[4],
+                a[5] + b[5],
             );
             let error = k * q - f;
             (0.5 * q.dot(&(k * q)) - f.dot(q), error, k, a[0] > 0.0 && b[0] > 0.0)
@@ -183,7 +189,7 @@ impl Problem {
         let whole = self.areas.each_ref().map(|area| moments(area)[0]);
         let mut q = start.unwrap_or_else(|| Vector4::new(f[0] / whole[0], f[1] / whole[1], 0.0, 0.0));
         let (mut value, mut error, mut k, _) = at(&q);
-        for _ in 0..200 {
+        for _ in 0..80 {
             if error.amax() < 1e-14 {
                 break;
             }
@@ -193,7 +199,7 @@ impl Problem {
             let factor = [0.0, 1e-14, 1e-11, 1e-8, 1e-4].iter().find_map(|lift| (unit + Matrix4::identity() * *lift).cholesky())?;
             let step = -factor.solve(&error.component_mul(&scale)).component_mul(&scale);
             let slope = error.dot(&step);
-            let found = (0..45).map(|i| 0.5f64.powi(i)).find_map(|t| {
+            let found = (0..25).map(|i| 0.5f64.powi(i)).find_map(|t| {
                 let next = at(&(q + t * step));
                 let falls = next.0 <= value + 1e-4 * t * slope || next.1.norm() < 0.3 * error.norm();
                 (next.3 && falls).then_some((q + t * step, next))
@@ -227,7 +233,7 @@ impl Problem {
         let d = (2.0 * (first.0 + w.dot(&v))).sqrt();
         v *= w.dot(&v) / (d * d);
         let (mut value, mut error, mut matrix) = at(&v);
-        for _ in 0..200 {
+        for _ in 0..60 {
             if error.amax() < 1e-13 {
                 break;
             }
@@ -235,7 +241,7 @@ impl Problem {
             let factor = [0.0, 1e-14, 1e-11, 1e-8, 1e-4, 1.0].iter().find_map(|share| (matrix + Matrix3::identity() * (share * lift)).cholesky())?;
             let step = -factor.solve(&error);
             let slope = error.dot(&step);
-            let found = (0..45).map(|i| 0.5f64.powi(i)).find_map(|t| {
+            let found = (0..25).map(|i| 0.5f64.powi(i)).find_map(|t| {
                 let next = at(&(v + t * step));
                 (next.0 <= value + 1e-4 * t * slope || next.1.norm() < 0.3 * error.norm()).then_some((v + t * step, next))
             });
@@ -276,7 +282,7 @@ impl Problem {
     /// Looks at the map on `rays` times `rings` points and polishes what looks like a zero.
     pub(crate) fn scan(&self, rays: usize, rings: usize) -> Scan {
         let ends = self.rays(rays);
-        let share = |j: usize| 1.0 - (1.0 - 0.93 * j as f64 / rings as f64).powi(4);
+        let share = |j: usize| 1.0 - (1.0 - 0.85 * j as f64 / rings as f64).powi(4);
         let (mut blind, mut points) = (0, 1);
         let Some(centre) = self.sample(self.middle, None) else {
             return Scan { zeros: vec![], winding: None, blind: 1, points };
@@ -315,7 +321,9 @@ impl Problem {
             }
         }
         for column in &grid {
-            starts.extend(column[rings].filter(|last| column[rings - 1].is_none_or(|before| last.g.length() < before.g.length())).filter(|last| last.g.length() < 0.05));
+            starts.extend(
+                column[rings].filter(|last| column[rings - 1].is_none_or(|before| last.g.length() < before.g.length())).filter(|last| last.g.length() < 0.05),
+            );
         }
         let mut zeros: Vec<Sample> = Vec::new();
         for start in starts {
@@ -344,10 +352,16 @@ impl Problem {
             if at.g.length() < 1e-11 {
                 break;
             }
-            let room = |x: DVec2| self.rim.iter().zip(self.rim.iter().cycle().skip(1)).map(|(a, b)| {
-                let edge = (*b - *a).normalize();
-                edge.perp_dot(x - *a)
-            }).fold(f64::INFINITY, f64::min);
+            let room = |x: DVec2| {
+                self.rim
+                    .iter()
+                    .zip(self.rim.iter().cycle().skip(1))
+                    .map(|(a, b)| {
+                        let edge = (*b - *a).normalize();
+                        edge.perp_dot(x - *a)
+                    })
+                    .fold(f64::INFINITY, f64::min)
+            };
             let step = 1e-5 * room(at.x).min(0.1);
             if step <= 0.0 {
                 return None;
