@@ -30,7 +30,8 @@ pub(super) fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3]) -> Friction {
         (low, high) = (low.min(s), high.max(s));
     }
     let beside = (height(c) - width).max(-height(c)).max(0.0);
-    let start = (NEAR * width).max(0.5 * beside);
+    // Beside a far centre the first piece, too, is far from it.
+    let start = (NEAR * width).max(0.3 * beside);
     if !(width > 0.0 && start.is_finite()) {
         return Friction::ZERO;
     }
@@ -109,7 +110,7 @@ mod tests {
         // Force along and across an even line load of unit length, slip centre at (s, h) beside it.
         for (s, h) in [(0.3, 0.25), (0.5, 1e-3), (0.2, -0.1)] {
             let root = |x: f64| (x - s).hypot(h);
-            let (across, along) = (root(1.0) - root(0.0), h * (((1.0 - s) / h).asinh() - (-s / h).asinh()));
+            let (across, along) = (root(1.0) - root(0.0), h * (((1.0 - s) / h.abs()).asinh() - (-s / h.abs()).asinh()));
             for width in [1e-5, 1e-6, 1e-7] {
                 let (area, p, place) = strip(width);
                 let [x, y, _] = gradient(&area, place(s, h), p);

@@ -212,7 +212,10 @@ impl<'a> Solver<'a> {
 
     /// A state from the contact moment `target` (see [`pressure::reach`]): its pressure, and the slip under it.
     pub fn state_at(&mut self, target: DVec2, seed: Option<Vector3<f64>>) -> Option<Vector7> {
-        self.state_from(target, seed, None)
+        self.state_from(target, seed, None).or_else(|| {
+            let q = pressure::solve_near_rim(self.pads, self.load.normal, target, &mut self.scratch[0])?;
+            self.state_from(target, seed, Some(q))
+        })
     }
 
     /// As [`Solver::state_at`], from the pressure and slip of the state `near`.

@@ -38,7 +38,8 @@ pub enum Separation {
 /// Whether to look for further solutions where several are possible.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Search {
-    /// Where the coupling is strong ([`COUPLING_SEARCH`]) or the branch from `d = 0` does not reach the load.
+    /// Where the coupling is strong ([`COUPLING_SEARCH`]) or the branch from `d = 0` does not reach the load: the whole
+    /// region of contact moments is looked over ([`states`]).
     #[default]
     WhereNeeded,
     /// Never: only the branch from `d = 0` counts, and a load that it does not reach is refused. For comparing many
@@ -78,6 +79,31 @@ pub fn solve(contact: &Contact, distance: f64, force: f64, wrench: &Wrench, opti
         Some(pads) => solve_pads(&pads, distance, force, wrench, options),
         None => refused(Status::NoContact, 0),
     })
+}
+
+/// Every limit state of a load by rising `mu_s`, arguments as [`solve`]: none for a load that [`solve`] refuses, one for
+/// most, of which the status is [`Status::Ok`]; several, or one that could not be shown to be the only one, are
+/// [`Status::Ambiguous`]. [`solve`] answers with the one on the branch from `d = 0`, where there is one.
+///
+/// # Errors
+/// As [`solve`].
+pub fn limit_states(contact: &Contact, distance: f64, force: f64, wrench: &Wrench, options: &Options) -> Result<Vec<Score>> {
+    check(contact, distance, force, wrench)?;
+    let Some(pads) = Pads::new(contact) else { return Ok(Vec::new()) };
+    let load = pads.load(distance, force, wrench);
+    if load.normal.iter().any(|&n| n <= 0.0) {
+        return Ok(Vec::new());
+    }
+    if load.size == 0.0 {
+        let only = pressed_only(&pads, force, &load, options);
+        return Ok(only.mu_s.map(|_| only).into_iter().collect());
+    }
+    let mut solver = Solver::new(&pads, load, options.refiner);
+    let seed = options.seed.map(|twist| pads.scaled_twist(twist));
+    let known = solver.branch(seed);
+    let found = solver.limit_states(known.as_slice());
+    let unique = found.complete && found.states.len() == 1;
+    Ok(found.states.iter().map(|state| finish(&pads, force, &load, state, unique, solver.evaluations, options)).collect())
 }
 
 fn check(contact: &Contact, distance: f64, force: f64, wrench: &Wrench) -> Result<()> {
@@ -170,7 +196,8 @@ fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, eva
 fn pressed_only(pads: &Pads, force: f64, load: &Load, options: &Options) -> Score {
     let mut scratch = Loops::default();
     let target = glam::DVec2::new(-load.moment[1], load.moment[0]);
-    let Some(q) = pressure::solve(pads, load.normal, target, None, &mut scratch) else {
+    let whole = pressure::solve(pads, load.normal, target, None, &mut scratch);
+    let Some(q) = whole.or_else(|| pressure::solve_near_rim(pads, load.normal, target, &mut scratch)) else {
         return refused(Status::TwistedOut, 0);
     };
     let m = pressure::pressed_moments(pads, &q, &mut scratch);

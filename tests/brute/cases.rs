@@ -92,7 +92,7 @@ fn patch(random: &mut Random) -> Patch {
             vec![Polygon { outer, holes: vec![hole] }]
         }
         4 => {
-            let thin = random.power(-4.0, -0.5);
+            let thin = if random.chance(0.1) { random.power(-4.0, -2.0) } else { random.power(-2.0, -0.5) };
             plain(rectangle(1.0, thin)) // sliver
         }
         5 => {

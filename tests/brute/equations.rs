@@ -10,7 +10,8 @@ use super::{Rings, loops, moments, pressed, rings};
 /// What the equations say of an answer.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Check {
-    /// Largest residual, forces over `Fn`, moments over `Fn sqrt(A)`.
+    /// Largest residual over the largest force in the equations, `Fn` or the load's with its lever; moments over that
+    /// times `sqrt(A)`.
     pub(crate) residual: f64,
     /// What rounding the answer's numbers to doubles may alone change in it: on a small contact the pressure is the small
     /// difference of large coefficients.
@@ -63,6 +64,8 @@ pub(crate) fn check(case: &Case, score: &Score) -> Option<Check> {
     ];
     let coupling = mu * d.abs() / length;
     let residual = residuals.iter().fold(0.0, |most: f64, r| if r.is_nan() { f64::NAN } else { most.max(r.abs()) });
+    // Where the load is far larger than Fn, the equations' own terms are.
     let load = f.truncate().length().max(m.z.abs() / length) / case.force;
-    Some(Check { residual, rounding: 8.0 * rounding * (1.0 + mu + coupling) + 64.0 * f64::EPSILON * load * (1.0 + d.abs() / length), areas, coupling })
+    let largest = 1.0 + load * (1.0 + d.abs() / length);
+    Some(Check { residual: residual / largest, rounding: 16.0 * rounding, areas, coupling })
 }
