@@ -147,7 +147,8 @@ pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, optio
     let strong = |state: &State| state.mu_over_size * load.size * 2.0 * load.half_distance.abs() > COUPLING_SEARCH;
     let (state, unique) = match branch {
         Some(state) if options.search == Search::Off || !strong(&state) => (state, true),
-        None if options.search == Search::Off || load.half_distance == 0.0 => return refused(Status::TwistedOut, solver.evaluations),
+        None if load.half_distance == 0.0 => return refused(out_of_reach(pads, &load), solver.evaluations),
+        None if options.search == Search::Off => return refused(Status::TwistedOut, solver.evaluations),
         branch => {
             let found = solver.limit_states(branch.as_slice());
             match (found.states.as_slice(), found.complete) {
@@ -192,13 +193,20 @@ fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, eva
     }
 }
 
+/// Why no pressure was found without friction's help: there is none, or the contact left is too small for doubles
+/// (below about 1e-6 of the area).
+fn out_of_reach(pads: &Pads, load: &Load) -> Status {
+    let target = glam::DVec2::new(-load.moment[1], load.moment[0]);
+    if pressure::reach(pads, load.normal, target) > 0.0 { Status::NotConverged } else { Status::TwistedOut }
+}
+
 /// No load in the pad plane: only the pressure is asked for, and any friction holds.
 fn pressed_only(pads: &Pads, force: f64, load: &Load, options: &Options) -> Score {
     let mut scratch = Loops::default();
     let target = glam::DVec2::new(-load.moment[1], load.moment[0]);
     let whole = pressure::solve(pads, load.normal, target, None, &mut scratch);
     let Some(q) = whole.or_else(|| pressure::solve_near_rim(pads, load.normal, target, &mut scratch)) else {
-        return refused(Status::TwistedOut, 0);
+        return refused(out_of_reach(pads, load), 0);
     };
     let m = pressure::pressed_moments(pads, &q, &mut scratch);
     let separated = (0..2).any(|k| pressure::separates(&pads.areas[k], face_pressure(&q, k)));
