@@ -32,7 +32,7 @@ pub(super) fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3]) -> Friction {
                 let x = o + s * (a + t * (b - a));
                 let weight = ws * wt * s * cross;
                 let (v1, v2) = (u1 - omega * x.y, u2 + omega * x.x);
-                let inverse = 1.0 / v1.hypot(v2);
+                let inverse = 1.0 / (v1 * v1 + v2 * v2).sqrt();
                 let (t1, t2) = (v1 * inverse, v2 * inverse);
                 let torque = x.x * t2 - x.y * t1;
                 for (m, phi) in [weight, weight * x.x, weight * x.y].into_iter().enumerate() {

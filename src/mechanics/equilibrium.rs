@@ -14,8 +14,8 @@ use super::pressure::{self, face_pressure, separates};
 use super::shanno;
 use super::slip::{self, Field, Refiner};
 
-type Vector7 = SVector<f64, 7>;
-type Matrix7 = SMatrix<f64, 7, 7>;
+pub(super) type Vector7 = SVector<f64, 7>;
+pub(super) type Matrix7 = SMatrix<f64, 7, 7>;
 
 /// A state of the seven unknowns and what the equations say of it.
 #[derive(Debug, Clone, Copy)]
@@ -45,8 +45,8 @@ impl State {
 
 /// Solves one contact pair under one load; keeps its scratch memory and counts its work.
 pub struct Solver<'a> {
-    pads: &'a Pads,
-    load: Load,
+    pub(super) pads: &'a Pads,
+    pub(super) load: Load,
     refiner: Refiner,
     scratch: [Loops; 2],
     /// Evaluations of the friction integrals so far.
@@ -55,7 +55,7 @@ pub struct Solver<'a> {
     pub iterations: u32,
 }
 
-/// Residual at which a state counts as a solution.
+/// Residual at which a state counts as a solution, but for rounding.
 pub const TOLERANCE: f64 = 1e-11;
 
 impl<'a> Solver<'a> {
@@ -65,7 +65,7 @@ impl<'a> Solver<'a> {
     }
 
     /// Residuals and, if wanted, the Jacobian at `z`, the coupling scaled by `coupling` (1: the real one).
-    fn evaluate(&mut self, z: &Vector7, coupling: f64, jacobian: Option<&mut Matrix7>) -> State {
+    pub(super) fn evaluate(&mut self, z: &Vector7, coupling: f64, jacobian: Option<&mut Matrix7>) -> State {
         self.evaluations += 1;
         let v = Vector3::new(z[0], z[1], z[2]);
         let q = [z[3], z[4], z[5], z[6]];
@@ -140,7 +140,7 @@ impl<'a> Solver<'a> {
     }
 
     /// Damped semi-smooth Newton from `z`; `None` when it does not come below [`TOLERANCE`] in `most` steps.
-    fn newton(&mut self, z: Vector7, coupling: f64, most: u32) -> Option<State> {
+    pub(super) fn newton(&mut self, z: Vector7, coupling: f64, most: u32) -> Option<State> {
         let mut jacobian = Matrix7::zeros();
         let mut at = self.evaluate(&z, coupling, Some(&mut jacobian));
         for _ in 0..most {
@@ -171,7 +171,16 @@ impl<'a> Solver<'a> {
             let Some((tried, next_jacobian)) = next else { break };
             (at, jacobian) = (tried, next_jacobian);
         }
-        (at.residual.amax() < TOLERANCE && at.mu_over_size > 0.0).then_some(at)
+        (at.residual.amax() < self.tolerance(&at) && at.mu_over_size > 0.0).then_some(at)
+    }
+
+    /// [`TOLERANCE`], or what rounding the pressure's coefficients leaves where that is more: on a contact of relative
+    /// width `e` the pressure is `e` times as large as the coefficients that it is the difference of.
+    fn tolerance(&self, at: &State) -> f64 {
+        let q = at.q();
+        let coefficients = |k: usize| q[k].abs() + q[2].hypot(q[3]) * self.pads.areas[k].radius();
+        let rounding = (0..2).map(|k| coefficients(k) * at.areas[k]).sum::<f64>();
+        TOLERANCE.max(8.0 * f64::EPSILON * rounding * (1.0 + self.load.half_distance.abs() * self.load.size * at.mu_over_size))
     }
 
     /// Shanno's method on half the squared residual, in variables scaled by the Jacobian at the start of each round.
@@ -198,12 +207,24 @@ impl<'a> Solver<'a> {
             }
         }
         let pressed = at.areas[0] > 0.0 && at.areas[1] > 0.0;
-        (pressed && at.residual.amax() < TOLERANCE && at.mu_over_size > 0.0).then_some(at)
+        (pressed && at.residual.amax() < self.tolerance(&at) && at.mu_over_size > 0.0).then_some(at)
     }
 
     /// A state from the contact moment `target` (see [`pressure::reach`]): its pressure, and the slip under it.
     pub fn state_at(&mut self, target: DVec2, seed: Option<Vector3<f64>>) -> Option<Vector7> {
-        let q = pressure::solve(self.pads, self.load.normal, target, &mut self.scratch[0])?;
+        self.state_from(target, seed, None).or_else(|| {
+            let q = pressure::solve_near_rim(self.pads, self.load.normal, target, &mut self.scratch[0])?;
+            self.state_from(target, seed, Some(q))
+        })
+    }
+
+    /// As [`Solver::state_at`], from the pressure and slip of the state `near`.
+    pub fn state_near(&mut self, target: DVec2, near: Option<&Vector7>) -> Option<Vector7> {
+        self.state_from(target, near.map(|z| Vector3::new(z[0], z[1], z[2])), near.map(|z| [z[3], z[4], z[5], z[6]]))
+    }
+
+    fn state_from(&mut self, target: DVec2, seed: Option<Vector3<f64>>, start: Option<[f64; 4]>) -> Option<Vector7> {
+        let q = pressure::solve(self.pads, self.load.normal, target, start, &mut self.scratch[0])?;
         let p = [face_pressure(&q, 0), face_pressure(&q, 1)];
         for k in 0..2 {
             self.pads.areas[k].clip_into(p[k], &mut self.scratch[k]);
@@ -233,61 +254,53 @@ impl<'a> Solver<'a> {
         polished.or_else(|| self.follow(start))
     }
 
-    /// Follows the branch from coupling 0 to 1 in steps that adapt to its curvature.
+    /// The solution on the branch from `d = 0`, every step of the way checked; `None` as for [`Solver::branch`].
+    pub fn from_uncoupled(&mut self, seed: Option<Vector3<f64>>) -> Option<State> {
+        let start = self.state_at(self.uncoupled_target(), seed)?;
+        self.follow(start)
+    }
+
+    /// Follows the branch from coupling 0 to 1: along its tangent, then Newton's method, in steps short enough that each
+    /// ends close to where the tangent led. `None` where the branch turns back or ends.
     pub fn follow(&mut self, start: Vector7) -> Option<State> {
         let mut at = self.newton(start, 0.0, 25)?;
         let (mut reached, mut step) = (0.0, 0.25);
-        let mut tangent = Vector7::zeros();
         while reached < 1.0 {
-            let next = f64::min(1.0, reached + step);
-            let guess = at.z + (next - reached) * tangent;
-            match self.newton(guess, next, 8).or_else(|| self.newton(at.z, next, 8)) {
-                Some(found) if (found.z - at.z).norm() <= 0.5 * at.z.norm() => {
-                    tangent = (found.z - at.z) / (next - reached);
-                    (at, reached) = (found, next);
-                    step *= 1.7;
-                }
-                _ => {
-                    step /= 2.0;
-                    if step < 1e-3 {
-                        return None;
+            let mut jacobian = Matrix7::zeros();
+            let here = self.evaluate(&at.z, reached, Some(&mut jacobian));
+            if jacobian.determinant() >= 0.0 {
+                return None; // past a turning point, where the sign changes
+            }
+            // The residual is linear in the coupling.
+            let change = (self.evaluate(&at.z, 1.0, None).residual - here.residual) / (1.0 - reached);
+            let tangent = -jacobian.lu().solve(&change)?;
+            loop {
+                let next = f64::min(1.0, reached + step);
+                let moved = (next - reached) * tangent;
+                let close = |found: &State| (found.z - at.z - moved).norm() <= (0.3 * moved.norm()).max(1e-9 * at.z.norm());
+                let short = moved.norm() <= FOLLOW_STEP * at.z.norm();
+                match if short { self.newton(at.z + moved, next, 8) } else { None } {
+                    Some(found) if close(&found) => {
+                        (at, reached) = (found, next);
+                        step *= 2.0;
+                        break;
                     }
+                    _ => step /= 2.0,
+                }
+                if step < 1e-5 {
+                    return None;
                 }
             }
         }
         Some(at)
     }
-
-    /// All solutions that Newton finds from contact moments spread over the whole region that pressing pads can carry.
-    pub fn search(&mut self, seed: Option<Vector3<f64>>) -> Vec<State> {
-        let [m_i, m_ii] = &self.pads.moments;
-        let n = self.load.normal;
-        let middle = DVec2::new(m_i[1], m_i[2]) * (n[0] / m_i[0]) - DVec2::new(m_ii[1], m_ii[2]) * (n[1] / m_ii[0]);
-        let mut found: Vec<State> = Vec::new();
-        let mut targets = vec![middle];
-        for &share in &SEARCH_SHARES {
-            for k in 0..SEARCH_DIRECTIONS {
-                let direction = DVec2::from_angle(std::f64::consts::TAU * (k as f64 + 0.5 * share) / SEARCH_DIRECTIONS as f64);
-                targets.push(middle + share * pressure::reach_along(self.pads, n, middle, direction) * direction);
-            }
-        }
-        for target in targets {
-            let Some(z) = self.state_at(target, seed) else { continue };
-            let Some(state) = self.newton(z, 1.0, 15) else { continue };
-            if !found.iter().any(|known| same(known, &state)) {
-                found.push(state);
-            }
-        }
-        found
-    }
 }
+
+/// Longest step of [`Solver::follow`], relative to the state.
+const FOLLOW_STEP: f64 = 0.3;
 
 /// Rounds of [`Solver::conjugate`], each with a fresh scaling.
 const CONJUGATE_ROUNDS: u32 = 8;
-
-/// Rays and shares of their length at which [`Solver::search`] starts.
-const SEARCH_DIRECTIONS: usize = 10;
-const SEARCH_SHARES: [f64; 4] = [0.3, 0.6, 0.85, 0.97];
 
 /// Whether two states are the same solution.
 pub fn same(a: &State, b: &State) -> bool {

@@ -9,6 +9,7 @@ pub mod paper;
 pub mod pressure;
 pub mod shanno;
 pub mod slip;
+pub mod states;
 pub mod twist_out;
 pub mod wolter;
 
@@ -37,7 +38,8 @@ pub enum Separation {
 /// Whether to look for further solutions where several are possible.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Search {
-    /// Where the coupling is strong ([`COUPLING_SEARCH`]) or the branch from `d = 0` does not reach the load.
+    /// Where the coupling is strong ([`COUPLING_SEARCH`]) or the branch from `d = 0` does not reach the load: the whole
+    /// region of contact moments is looked over ([`states`]).
     #[default]
     WhereNeeded,
     /// Never: only the branch from `d = 0` counts, and a load that it does not reach is refused. For comparing many
@@ -77,6 +79,31 @@ pub fn solve(contact: &Contact, distance: f64, force: f64, wrench: &Wrench, opti
         Some(pads) => solve_pads(&pads, distance, force, wrench, options),
         None => refused(Status::NoContact, 0),
     })
+}
+
+/// Every limit state of a load by rising `mu_s`, arguments as [`solve`]: none for a load that [`solve`] refuses, one for
+/// most, of which the status is [`Status::Ok`]; several, or one that could not be shown to be the only one, are
+/// [`Status::Ambiguous`]. [`solve`] answers with the one on the branch from `d = 0`, where there is one.
+///
+/// # Errors
+/// As [`solve`].
+pub fn limit_states(contact: &Contact, distance: f64, force: f64, wrench: &Wrench, options: &Options) -> Result<Vec<Score>> {
+    check(contact, distance, force, wrench)?;
+    let Some(pads) = Pads::new(contact) else { return Ok(Vec::new()) };
+    let load = pads.load(distance, force, wrench);
+    if load.normal.iter().any(|&n| n <= 0.0) {
+        return Ok(Vec::new());
+    }
+    if load.size == 0.0 {
+        let only = pressed_only(&pads, force, &load, options);
+        return Ok(only.mu_s.map(|_| only).into_iter().collect());
+    }
+    let mut solver = Solver::new(&pads, load, options.refiner);
+    let seed = options.seed.map(|twist| pads.scaled_twist(twist));
+    let known = solver.branch(seed);
+    let found = solver.limit_states(known.as_slice());
+    let unique = found.complete && found.states.len() == 1;
+    Ok(found.states.iter().map(|state| finish(&pads, force, &load, state, unique, solver.evaluations, options)).collect())
 }
 
 fn check(contact: &Contact, distance: f64, force: f64, wrench: &Wrench) -> Result<()> {
@@ -120,17 +147,15 @@ pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, optio
     let strong = |state: &State| state.mu_over_size * load.size * 2.0 * load.half_distance.abs() > COUPLING_SEARCH;
     let (state, unique) = match branch {
         Some(state) if options.search == Search::Off || !strong(&state) => (state, true),
+        None if load.half_distance == 0.0 => return refused(out_of_reach(pads, &load), solver.evaluations),
         None if options.search == Search::Off => return refused(Status::TwistedOut, solver.evaluations),
-        Some(state) => {
-            let others = solver.search(seed);
-            (state, others.iter().all(|other| equilibrium::same(other, &state)))
-        }
-        None => {
-            let mut all = solver.search(seed);
-            all.sort_by(|a, b| a.mu_over_size.total_cmp(&b.mu_over_size));
-            match all.first() {
-                Some(&state) => (state, all.len() == 1),
-                None => return refused(Status::TwistedOut, solver.evaluations),
+        branch => {
+            let found = solver.limit_states(branch.as_slice());
+            match (found.states.as_slice(), found.complete) {
+                ([], true) => return refused(Status::TwistedOut, solver.evaluations),
+                ([], false) => return refused(Status::NotConverged, solver.evaluations),
+                ([only], complete) => (*only, complete),
+                ([least, ..], _) => (solver.from_uncoupled(seed).unwrap_or(*least), false),
             }
         }
     };
@@ -168,12 +193,20 @@ fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, eva
     }
 }
 
+/// Why no pressure was found without friction's help: there is none, or the contact left is too small for doubles
+/// (below about 1e-6 of the area).
+fn out_of_reach(pads: &Pads, load: &Load) -> Status {
+    let target = glam::DVec2::new(-load.moment[1], load.moment[0]);
+    if pressure::reach(pads, load.normal, target) > 0.0 { Status::NotConverged } else { Status::TwistedOut }
+}
+
 /// No load in the pad plane: only the pressure is asked for, and any friction holds.
 fn pressed_only(pads: &Pads, force: f64, load: &Load, options: &Options) -> Score {
     let mut scratch = Loops::default();
     let target = glam::DVec2::new(-load.moment[1], load.moment[0]);
-    let Some(q) = pressure::solve(pads, load.normal, target, &mut scratch) else {
-        return refused(Status::TwistedOut, 0);
+    let whole = pressure::solve(pads, load.normal, target, None, &mut scratch);
+    let Some(q) = whole.or_else(|| pressure::solve_near_rim(pads, load.normal, target, &mut scratch)) else {
+        return refused(out_of_reach(pads, load), 0);
     };
     let m = pressure::pressed_moments(pads, &q, &mut scratch);
     let separated = (0..2).any(|k| pressure::separates(&pads.areas[k], face_pressure(&q, k)));

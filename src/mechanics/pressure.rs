@@ -5,6 +5,7 @@ use glam::DVec2;
 use nalgebra::{Matrix4, Vector4};
 
 use crate::contact::{Loops, moments};
+use crate::model::Ring;
 
 use super::pads::Pads;
 
@@ -60,12 +61,26 @@ pub fn reach(pads: &Pads, normal: [f64; 2], target: DVec2) -> f64 {
     region_edges(pads, normal).map(|(e, support)| support - e.dot(target)).fold(f64::INFINITY, f64::min)
 }
 
-/// How far from `from` the region of [`reach`] extends along the unit vector `direction`.
-pub fn reach_along(pads: &Pads, normal: [f64; 2], from: DVec2, direction: DVec2) -> f64 {
-    region_edges(pads, normal)
-        .filter(|(e, _)| e.dot(direction) > 0.0)
-        .map(|(e, support)| (support - e.dot(from)) / e.dot(direction))
-        .fold(f64::INFINITY, f64::min)
+/// Corners of the region of [`reach`], counter-clockwise: the hulls' edges one after the other by their direction.
+pub fn region(pads: &Pads, normal: [f64; 2]) -> Ring {
+    let scaled = |k: usize, factor: f64| -> Ring { pads.hulls[k].iter().map(|x| factor * *x).collect() };
+    let rings = [scaled(0, normal[0]), scaled(1, -normal[1])];
+    // Both from their lowest corner on, of two the left one, from where directions rise from 0 to a whole turn.
+    let first =
+        rings.each_ref().map(|ring| (0..ring.len()).min_by(|&a, &b| ring[a].y.total_cmp(&ring[b].y).then(ring[a].x.total_cmp(&ring[b].x))).unwrap_or(0));
+    let corner = |k: usize, i: usize| rings[k][(first[k] + i) % rings[k].len()];
+    let mut done = [0, 0];
+    let mut region = Ring::new();
+    while done[0] < rings[0].len() || done[1] < rings[1].len() {
+        region.push(corner(0, done[0]) + corner(1, done[1]));
+        let [one, two] = [0, 1].map(|k| corner(k, done[k] + 1) - corner(k, done[k]));
+        let turn = one.perp_dot(two);
+        let (first_done, second_done) = (done[0] == rings[0].len(), done[1] == rings[1].len());
+        // Parallel edges are taken together.
+        done[0] += usize::from(!first_done && (second_done || turn >= 0.0));
+        done[1] += usize::from(!second_done && (first_done || turn <= 0.0));
+    }
+    region
 }
 
 /// Outward normals of the region's edges with the region's support in that direction.
@@ -88,22 +103,23 @@ fn region_edges(pads: &Pads, normal: [f64; 2]) -> impl Iterator<Item = (DVec2, f
     all.filter(|e| *e != DVec2::ZERO).map(move |e| (e, support(e)))
 }
 
-/// The pressure `q = (a_i0, a_ii0, a1, a2)` that carries the normal forces and the contact moment `target`; `None`
-/// outside [`reach`] or at its very rim, where the iteration ends unresolved.
+/// The pressure `q = (a_i0, a_ii0, a1, a2)` that carries the normal forces and the contact moment `target`, from a
+/// `start` or from uniform pressure; `None` outside [`reach`] or at its very rim, where the iteration ends unresolved.
 ///
 /// It minimises the convex `1/2 sum int p^2 - f . q` by Newton's method; each step is one solve on the areas cut at the
 /// current zero-pressure lines (paper 3.6), damped so that the function falls.
-pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, scratch: &mut Loops) -> Option<[f64; 4]> {
+pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, start: Option<[f64; 4]>, scratch: &mut Loops) -> Option<[f64; 4]> {
     if reach(pads, normal, target) <= 0.0 {
         return None;
     }
     let load = Vector4::new(normal[0], normal[1], target.x, target.y);
-    let mut q = Vector4::new(normal[0] / pads.moments[0][0], normal[1] / pads.moments[1][0], 0.0, 0.0);
-    let mut k = stiffness(&pads.moments);
+    let uniform = [normal[0] / pads.moments[0][0], normal[1] / pads.moments[1][0], 0.0, 0.0];
+    let mut q = Vector4::from(start.unwrap_or(uniform));
+    let mut k = stiffness(&pressed_moments(pads, &q.into(), scratch));
     let mut error = k * q - load;
     let scale = load.amax();
     let mut value = 0.5 * q.dot(&(k * q)) - load.dot(&q);
-    for _ in 0..300 {
+    for _ in 0..100 {
         if error.amax() <= 1e-15 * scale {
             break;
         }
@@ -118,7 +134,7 @@ pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, scratch: &mut Loops) 
         let slope = error.dot(&step);
         let mut t = 1.0;
         let mut moved = false;
-        for _ in 0..50 {
+        for _ in 0..25 {
             let tried = q + t * step;
             let m = pressed_moments(pads, &tried.into(), scratch);
             let stiff = stiffness(&m);
@@ -137,5 +153,26 @@ pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, scratch: &mut Loops) 
             break;
         }
     }
-    (error.amax() <= 1e-9 * scale).then(|| q.into())
+    // On a contact of relative width `e` the iteration ends at `1e-16/e`.
+    let m = pressed_moments(pads, &q.into(), scratch);
+    let rounding = (0..2).map(|k| (q[k].abs() + q[2].hypot(q[3]) * pads.areas[k].radius()) * m[k][0]).sum::<f64>();
+    (error.amax() <= (1e-9 * scale).max(8.0 * f64::EPSILON * rounding)).then(|| q.into())
+}
+
+/// [`solve`] for a contact moment close to the rim, where Newton's method from afar gets lost: from the middle of the
+/// region towards it in steps that leave a quarter of the way each, every one from the pressure before.
+pub fn solve_near_rim(pads: &Pads, normal: [f64; 2], target: DVec2, scratch: &mut Loops) -> Option<[f64; 4]> {
+    let left = reach(pads, normal, target);
+    if left <= 0.0 {
+        return None;
+    }
+    let rim = region(pads, normal);
+    let middle = rim.iter().sum::<DVec2>() / rim.len() as f64;
+    let mut q = None;
+    let mut away = 0.25;
+    while away * middle.distance(target) > 0.5 * left {
+        q = Some(solve(pads, normal, target.lerp(middle, away), q, scratch)?);
+        away *= 0.25;
+    }
+    solve(pads, normal, target, q, scratch)
 }

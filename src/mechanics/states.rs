@@ -1,0 +1,369 @@
+//! All limit states of a load, found by looking at the whole region of contact moments.
+//!
+//! A contact moment `X = int_I x p_I - int_II x p_II` in the convex region `N_I conv A_I - N_II conv A_II` fixes the
+//! pressure, that the slip, and (6)(7) then leave over `g(X) = X - X_0 - (d/2) mu (T_I - T_II)`, with `X_0` the moment
+//! that the load asks for without friction. Limit states are the zeros of this continuous map of the plane. Its
+//! derivative is known too, so a cell of the region is set aside when the values at its corners stay farther from zero
+//! than the map's bend over the cell could carry it, and cut smaller otherwise. The signs of the zeros found must add up
+//! to the turns of `g` along the region's rim, which no zero inside can escape.
+
+use glam::{DMat2, DVec2};
+use nalgebra::SMatrix;
+use rustc_hash::FxHashMap;
+
+use crate::contact::Loops;
+
+use super::equilibrium::{Matrix7, Solver, State, Vector7, same};
+use super::pressure;
+
+/// What [`Solver::limit_states`] found.
+#[derive(Debug, Clone, Default)]
+pub struct LimitStates {
+    /// Distinct limit states by rising `mu`.
+    pub states: Vec<State>,
+    /// Whether the signs of the states add up to the map's turns along the rim; if not, there is another one.
+    pub complete: bool,
+}
+
+/// Pieces of the rim at the start: at least.
+const PIECES: usize = 8;
+/// Corners of the rim up to which each gets a ray of its own.
+const CORNERS: usize = 16;
+/// Rings at the start.
+const RINGS: u32 = 3;
+/// Halvings of a starting cell along each coordinate.
+const HALVINGS: u32 = 6;
+/// The outermost ring, in the coordinate whose fourth power is the distance from the rim: 3e-3 of the way to the middle.
+/// There a contact is down to about 1e-2 of its width; the map hardly changes from there to the rim, where the pressure
+/// is left on an edge or a corner, and Newton's method is started from every point of this ring with a small value.
+const OUTERMOST: f64 = 0.77;
+/// A cell holds no zero when its corners' values stay this many times the bend away from zero. Inside a cell a quadratic
+/// map strays by at most half the bend from the values between its corners.
+const BEND: f64 = 0.75;
+/// The same when the signs do not add up at first.
+const BEND_AGAIN: f64 = 3.0;
+/// Value on the outermost ring, in units of force times the pads' length, from which a zero beyond it is sought.
+const BEYOND: f64 = 0.05;
+/// Residual of the slip's equations up to which a point of the map is drawn; the states themselves are solved in full.
+const LOOSE: f64 = 1e-4;
+/// Most points looked at, and most starts of Newton's method.
+const MOST_NODES: usize = 400;
+const MOST_STARTS: usize = 60;
+
+/// A point of the map.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    x: DVec2,
+    g: DVec2,
+    /// Derivative of `g`.
+    slope: DMat2,
+    z: Vector7,
+}
+
+/// A cell of the mesh between two rays and two rings, in units of the finest mesh.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    rays: [u32; 2],
+    rings: [u32; 2],
+}
+
+/// The map on the mesh: rays to the rim by rings about the middle.
+struct Map<'s, 'a> {
+    solver: &'s mut Solver<'a>,
+    middle: DVec2,
+    /// The rim relative to the middle, cut into pieces; each piece goes through several corners when there are many.
+    pieces: Vec<Vec<DVec2>>,
+    nodes: FxHashMap<(u32, u32), Option<Node>>,
+    starts: usize,
+    scratch: Loops,
+}
+
+impl Solver<'_> {
+    /// Looks for every limit state, `known` ones among them.
+    pub fn limit_states(&mut self, known: &[State]) -> LimitStates {
+        let mut states = known.to_vec();
+        let complete = match Map::new(self) {
+            Some(mut map) => map.search(&mut states),
+            None => false,
+        };
+        states.sort_by(|a, b| a.mu_over_size.total_cmp(&b.mu_over_size));
+        LimitStates { states, complete }
+    }
+
+    /// `1` or `-1`: how often `g` turns about the state.
+    fn turns(&mut self, state: &State) -> i32 {
+        let mut jacobian = Matrix7::zeros();
+        self.evaluate(&state.z, 1.0, Some(&mut jacobian));
+        // Without coupling the Jacobian's determinant is negative and the map is the identity but for a constant.
+        if jacobian.determinant() < 0.0 { 1 } else { -1 }
+    }
+}
+
+impl<'s, 'a> Map<'s, 'a> {
+    fn new(solver: &'s mut Solver<'a>) -> Option<Self> {
+        let rim = pressure::region(solver.pads, solver.load.normal);
+        if rim.len() < 3 {
+            return None;
+        }
+        let middle = rim.iter().sum::<DVec2>() / rim.len() as f64;
+        let corner = |i: usize| rim[i % rim.len()] - middle;
+        let mut pieces = Vec::new();
+        if rim.len() > CORNERS {
+            let many = rim.len().div_ceil(CORNERS);
+            pieces.extend((0..rim.len()).step_by(many).map(|i| (i..=(i + many).min(rim.len())).map(corner).collect()));
+        } else {
+            let cuts = PIECES.div_ceil(rim.len());
+            for i in 0..rim.len() {
+                let at = |cut: usize| corner(i).lerp(corner(i + 1), cut as f64 / cuts as f64);
+                pieces.extend((0..cuts).map(|cut| vec![at(cut), at(cut + 1)]));
+            }
+        }
+        Some(Self { solver, middle, pieces, nodes: FxHashMap::default(), starts: 0, scratch: Loops::default() })
+    }
+
+    /// Contact moment of a mesh point.
+    fn place(&self, ray: u32, ring: u32) -> DVec2 {
+        let whole = 1 << HALVINGS;
+        let piece = &self.pieces[(ray / whole) as usize % self.pieces.len()];
+        let along = f64::from(ray % whole) / f64::from(whole) * (piece.len() - 1) as f64;
+        let corner = (along as usize).min(piece.len() - 2);
+        let end = piece[corner].lerp(piece[corner + 1], along - corner as f64);
+        let s = OUTERMOST * f64::from(ring) / f64::from(RINGS * whole);
+        self.middle + (1.0 - (1.0 - s).powi(4)) * end
+    }
+
+    /// The map at a mesh point; `near`: a neighbour whose pressure and slip are close.
+    fn node(&mut self, ray: u32, ring: u32, near: Option<&Node>) -> Option<Node> {
+        let round = self.pieces.len() as u32 * (1 << HALVINGS);
+        let key = if ring == 0 { (0, 0) } else { (ray % round, ring) };
+        if let Some(known) = self.nodes.get(&key) {
+            return *known;
+        }
+        let x = self.place(key.0, key.1);
+        let node = self.look(x, near).or_else(|| near.and_then(|_| self.look(x, None)));
+        self.nodes.insert(key, node);
+        node
+    }
+
+    fn look(&mut self, x: DVec2, near: Option<&Node>) -> Option<Node> {
+        let z = self.solver.state_near(x, near.map(|near| &near.z))?;
+        let mut jacobian = Matrix7::zeros();
+        let state = self.solver.evaluate(&z, 1.0, Some(&mut jacobian));
+        if state.residual.fixed_rows::<5>(0).amax() > LOOSE {
+            return None;
+        }
+        let g = DVec2::new(state.residual[6], -state.residual[5]);
+        // Moving along the states of given contact moment: the first five equations stay, X moves.
+        let moments = pressure::pressed_moments(self.solver.pads, &state.q(), &mut self.scratch);
+        let mut along = jacobian;
+        along.fixed_view_mut::<2, 7>(5, 0).fill(0.0);
+        along.fixed_view_mut::<2, 4>(5, 3).copy_from(&pressure::stiffness(&moments).fixed_view::<2, 4>(2, 0));
+        let mut unit = SMatrix::<f64, 7, 2>::zeros();
+        unit[(5, 0)] = 1.0;
+        unit[(6, 1)] = 1.0;
+        let moved = along.lu().solve(&unit)?;
+        let change = jacobian.fixed_view::<2, 7>(5, 0) * moved;
+        let slope = DMat2::from_cols(DVec2::new(change[(1, 0)], -change[(0, 0)]), DVec2::new(change[(1, 1)], -change[(0, 1)]));
+        (g.is_finite() && slope.is_finite()).then_some(Node { x, g, slope, z })
+    }
+
+    /// Adds the zeros found to `states`; whether their signs add up.
+    fn search(&mut self, states: &mut Vec<State>) -> bool {
+        self.cells(BEND, MOST_NODES, states);
+        self.beyond(states);
+        // On slivers the outermost points can be beyond what doubles resolve: then the next ring in.
+        let Some((ring, turns)) = (1..=RINGS).rev().find_map(|ring| Some((ring, self.winding(ring << HALVINGS)?))) else { return false };
+        if self.signs(states, ring) != turns {
+            self.cells(BEND_AGAIN, 2 * MOST_NODES, states);
+        }
+        self.signs(states, ring) == turns
+    }
+
+    /// Goes through the mesh, coarse cells first, so that the budget is spent evenly.
+    fn cells(&mut self, bend: f64, most: usize, states: &mut Vec<State>) {
+        let whole: u32 = 1 << HALVINGS;
+        self.starts = 0;
+        let mut cells = std::collections::VecDeque::new();
+        for piece in 0..self.pieces.len() as u32 {
+            let mut near = self.node(0, 0, None);
+            for ring in 0..RINGS {
+                near = self.node(piece * whole, (ring + 1) * whole, near.as_ref()).or(near);
+                cells.push_back(Cell { rays: [piece * whole, (piece + 1) * whole], rings: [ring * whole, (ring + 1) * whole] });
+            }
+        }
+        while let Some(cell) = cells.pop_front() {
+            cells.extend(self.settle(cell, bend, most, states));
+        }
+    }
+
+    /// Signs of the states inside a ring, added up.
+    fn signs(&mut self, states: &[State], ring: u32) -> i32 {
+        let share = 1.0 - (1.0 - OUTERMOST * f64::from(ring) / f64::from(RINGS)).powi(4);
+        let mut sum = 0;
+        for state in states {
+            if self.share(state) < share {
+                sum += self.solver.turns(state);
+            }
+        }
+        sum
+    }
+
+    /// How far out a state's contact moment lies: 0 in the middle, 1 on the rim.
+    fn share(&mut self, state: &State) -> f64 {
+        let moments = pressure::pressed_moments(self.solver.pads, &state.q(), &mut self.scratch);
+        let carried = pressure::stiffness(&moments) * nalgebra::Vector4::from(state.q());
+        let x = DVec2::new(carried[2], carried[3]) - self.middle;
+        let outward = |edge: &[DVec2]| {
+            let normal = -(edge[1] - edge[0]).perp();
+            normal.dot(x) / normal.dot(edge[0]).max(f64::MIN_POSITIVE)
+        };
+        self.pieces.iter().flat_map(|piece| piece.windows(2)).map(outward).fold(0.0, f64::max)
+    }
+
+    /// Newton's method from a point, unless enough have been tried: on all seven equations, and if that gets stuck on
+    /// the map first.
+    fn start(&mut self, node: &Node, states: &mut Vec<State>) {
+        self.starts += 1;
+        if self.starts > MOST_STARTS {
+            return;
+        }
+        let direct = self.solver.newton(node.z, 1.0, 15);
+        let found = direct.or_else(|| {
+            let z = self.descend(*node).z;
+            self.solver.newton(z, 1.0, 15)
+        });
+        if let Some(state) = found
+            && !states.iter().any(|known| same(known, &state))
+        {
+            states.push(state);
+        }
+    }
+
+    /// Newton's method on the map.
+    fn descend(&mut self, mut at: Node) -> Node {
+        for _ in 0..10 {
+            let step = -(at.slope.inverse() * at.g);
+            let next = [1.0, 0.4, 0.15, 0.05].into_iter().find_map(|t| self.look(at.x + t * step, Some(&at)).filter(|next| next.g.length() < at.g.length()));
+            match next {
+                Some(next) if step.is_finite() => at = next,
+                _ => break,
+            }
+        }
+        at
+    }
+
+    /// Zeros between the outermost ring and the rim: the value on the ring is small beside them.
+    fn beyond(&mut self, states: &mut Vec<State>) {
+        let ring = RINGS << HALVINGS;
+        let mut near: Vec<Node> = self.nodes.iter().filter(|(key, _)| key.1 == ring).filter_map(|(_, node)| *node).collect();
+        near.retain(|node| node.g.length() < BEYOND);
+        near.sort_by(|a, b| a.g.length().total_cmp(&b.g.length()));
+        for node in near.iter().take(8) {
+            self.start(node, states);
+        }
+    }
+
+    /// Sets the cell aside, finds its zero, or cuts it.
+    fn settle(&mut self, cell: Cell, bends: f64, budget: usize, states: &mut Vec<State>) -> Vec<Cell> {
+        let [a, b] = cell.rays;
+        let [inner, outer] = cell.rings;
+        let mut corners: Vec<Node> = Vec::with_capacity(4);
+        let mut ends = [[None; 2]; 2];
+        for (i, ring) in [inner, outer].into_iter().enumerate() {
+            for (j, ray) in [a, b].into_iter().enumerate() {
+                let near = corners.last().copied();
+                ends[i][j] = self.node(ray, ring, near.as_ref());
+                if !(ring == 0 && j == 1) {
+                    corners.extend(ends[i][j]);
+                }
+            }
+        }
+        // How far a corner's value is from what its neighbours' slopes say.
+        let bend = |one: &Option<Node>, two: &Option<Node>| match (one, two) {
+            (Some(one), Some(two)) => {
+                let step = two.x - one.x;
+                (two.g - one.g - one.slope * step).length().max((two.g - one.g - two.slope * step).length())
+            }
+            // A corner whose slip could not be found: judged by the others.
+            _ => 0.0,
+        };
+        let across = bend(&ends[1][0], &ends[1][1]).max(if inner == 0 { 0.0 } else { bend(&ends[0][0], &ends[0][1]) });
+        let along = bend(&ends[0][0], &ends[1][0]).max(bend(&ends[0][1], &ends[1][1]));
+        let most = across.max(along);
+        if corners.len() < 3 || distance_from_zero(&corners) > bends * most {
+            return Vec::new();
+        }
+        let size = corners.iter().flat_map(|one| corners.iter().map(|two| one.x.distance(two.x))).fold(0.0, f64::max);
+        let stiff = corners.iter().map(|corner| least_stretch(corner.slope)).fold(f64::INFINITY, f64::min);
+        let straight = most <= 0.2 * stiff * size && corners.windows(2).all(|pair| pair[0].slope.determinant() * pair[1].slope.determinant() > 0.0);
+        let finest = [b - a == 1, outer - inner == 1];
+        let split = [across >= 0.5 * along && !finest[0], along >= 0.5 * across && !finest[1]];
+        let split = if split == [false, false] && most > 0.0 { [!finest[0], !finest[1]] } else { split };
+        if straight || split == [false, false] || self.nodes.len() >= budget {
+            // At most one zero in a straight cell; in one that cannot be cut any more, what Newton's method makes of it.
+            corners.sort_by(|a, b| a.g.length().total_cmp(&b.g.length()));
+            let starts = if straight { 1 } else { corners.len() };
+            for corner in corners.iter().take(starts) {
+                let reach = (corner.slope.inverse() * corner.g).length();
+                if straight && reach > 2.0 * size {
+                    continue;
+                }
+                self.start(corner, states);
+            }
+            return Vec::new();
+        }
+        let halves = |[low, high]: [u32; 2], cut: bool| if cut { vec![[low, (low + high) / 2], [(low + high) / 2, high]] } else { vec![[low, high]] };
+        let rings = halves(cell.rings, split[1]);
+        halves(cell.rays, split[0]).into_iter().flat_map(|rays| rings.iter().map(move |&rings| Cell { rays, rings })).collect()
+    }
+
+    /// Turns of `g` along a ring; `None` where that cannot be told.
+    fn winding(&mut self, ring: u32) -> Option<i32> {
+        let whole = 1 << HALVINGS;
+        let mut turned = 0.0;
+        let mut arcs: Vec<[u32; 2]> = (0..self.pieces.len() as u32).map(|piece| [piece * whole, (piece + 1) * whole]).collect();
+        while let Some([from, to]) = arcs.pop() {
+            let one = self.node(from, ring, None)?;
+            let two = self.node(to, ring, Some(&one))?;
+            let turn = one.g.angle_to(two.g);
+            let step = two.x - one.x;
+            let bent = (two.g - one.g - one.slope * step).length().max((two.g - one.g - two.slope * step).length());
+            let short = turn.abs() < 1.0 || bent < 0.5 * one.g.length().min(two.g.length());
+            if short && turn.abs() < 3.0 {
+                turned += turn;
+            } else if to - from > 1 {
+                arcs.extend([[from, (from + to) / 2], [(from + to) / 2, to]]);
+            } else {
+                return None;
+            }
+        }
+        Some((turned / std::f64::consts::TAU).round() as i32)
+    }
+}
+
+/// Distance of zero from the hull of the values.
+fn distance_from_zero(corners: &[Node]) -> f64 {
+    let g: Vec<DVec2> = corners.iter().map(|corner| corner.g).collect();
+    let mut least = f64::INFINITY;
+    for i in 0..g.len() {
+        for j in 0..i {
+            let edge = g[j] - g[i];
+            let t = (-g[i].dot(edge) / edge.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            least = least.min((g[i] + t * edge).length());
+            for k in 0..j {
+                let turns = [g[i].perp_dot(g[j]), g[j].perp_dot(g[k]), g[k].perp_dot(g[i])];
+                if turns.iter().all(|turn| *turn >= 0.0) || turns.iter().all(|turn| *turn <= 0.0) {
+                    return 0.0;
+                }
+            }
+        }
+    }
+    least
+}
+
+/// The smaller singular value.
+fn least_stretch(matrix: DMat2) -> f64 {
+    let (sum, product) = (matrix.x_axis.length_squared() + matrix.y_axis.length_squared(), matrix.determinant().abs());
+    let large = (sum / 2.0 + ((sum / 2.0).powi(2) - product * product).max(0.0).sqrt()).sqrt();
+    product / large.max(f64::MIN_POSITIVE)
+}
