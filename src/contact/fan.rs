@@ -15,7 +15,7 @@
 
 use glam::DVec2;
 
-use super::lanes::{Block, LANES, Lane, total, widest};
+use super::lanes::{Block, LANES, total, widest};
 use super::{Friction, Loops};
 
 /// Below this distance of the line from the slip centre (in the pad's length scale) an edge contributes nothing: every
@@ -23,6 +23,7 @@ use super::{Friction, Loops};
 const H_MIN: f64 = 1e-140;
 
 /// Sums over the edges, all relative to the slip centre.
+#[derive(Debug, PartialEq)]
 struct Sums {
     e: [f64; 2],
     /// `int r e e` = `int y e`: 11, 12, 22.
@@ -174,6 +175,18 @@ fn assemble(sums: &Sums, c: DVec2, omega: f64) -> Friction {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Polygon;
+
+    #[test]
+    fn vectors_of_any_width_give_the_same_bits() {
+        let outer = (0..7).map(|i| (1.0 + 0.3 * f64::from(i % 3)) * DVec2::from_angle(f64::from(i) * 0.9)).collect();
+        let area = Loops::new(&[Polygon { outer, holes: Vec::new() }]);
+        for i in 0..200 {
+            let c = 0.01 * f64::from(i) * DVec2::from_angle(f64::from(i));
+            let centre = Centre { c, p: [1.0, 0.3, -0.2] };
+            assert_eq!(sums(area.blocks(), centre), sums_of(area.blocks(), centre));
+        }
+    }
 
     #[test]
     fn the_logarithm_is_right_to_its_last_bit_or_so() {

@@ -155,7 +155,8 @@ fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, eva
     };
     Score {
         status,
-        mu_s: Some(state.mu_over_size * load.size),
+        // Where the residual leaves more room than the certificate, the certificate knows better.
+        mu_s: Some((state.mu_over_size * load.size).max(bounds.lower).min(bounds.upper)),
         slip: Some(pads.slip(state.twist())),
         pressure: Some(pads.pressure(q, force)),
         contact_area_i: state.areas[0] * unit,

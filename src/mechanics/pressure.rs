@@ -113,7 +113,7 @@ pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, scratch: &mut Loops) 
     }
     let mut q = Vector4::new(normal[0] / pads.moments[0][0], normal[1] / pads.moments[1][0], 0.0, 0.0);
     let mut m = pads.moments;
-    let mut k = stiffness(&m);
+    let k = stiffness(&m);
     let mut error = k * q - load;
     let scale = load.amax();
     let mut value = 0.5 * q.dot(&(k * q)) - load.dot(&q);
@@ -134,7 +134,7 @@ pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, scratch: &mut Loops) 
             if tried_m[0][0] > 0.0 && tried_m[1][0] > 0.0 && (tried_value <= value + 1e-4 * t * slope || tried_error.norm() < 0.5 * error.norm()) {
                 moved = tried_error.norm() < error.norm() || error.amax() > 1e-10 * scale;
                 if moved {
-                    (q, m, k, error, value) = (tried, tried_m, stiff, tried_error, tried_value);
+                    (q, m, error, value) = (tried, tried_m, tried_error, tried_value);
                 }
                 break;
             }

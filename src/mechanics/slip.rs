@@ -269,3 +269,59 @@ pub fn certificate(w: Vector3<f64>, v: Vector3<f64>, support: &Support, rotation
     let upper = lower + third.abs() + rest.x.hypot(rest.y) / normal;
     Bounds { lower, upper: if upper >= lower { upper } else { f64::INFINITY } }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Polygon;
+
+    fn area() -> Loops {
+        let outer = [(-1.0, -0.6), (0.9, -0.8), (0.7, 0.5), (0.1, 0.2), (-0.8, 0.9)].map(|(x, y)| DVec2::new(x, y)).to_vec();
+        Loops::new(&[Polygon { outer, holes: Vec::new() }])
+    }
+
+    fn support(field: &Field<'_>, v: Vector3<f64>) -> Support {
+        let m = moments(field.area);
+        let normal = field.p[0] * m[0] + field.p[1] * m[1] + field.p[2] * m[2];
+        Support { gradient: dissipation(&[*field], v).gradient, normal, centre: first_moment(&m, field.p) / normal }
+    }
+
+    /// Loads of all kinds, the last ones near and at a translation.
+    fn loads(field: &Field<'_>) -> Vec<Vector3<f64>> {
+        let centre = support(field, Vector3::x()).centre;
+        let push = |lever: f64| Vector3::new(0.6, -0.8, centre.perp_dot(DVec2::new(0.6, -0.8)) + lever);
+        let turning = (0..40).map(|i| Vector3::new((0.7 * f64::from(i)).sin(), (1.3 * f64::from(i)).cos(), (0.4 * f64::from(i)).sin()));
+        turning.chain([1e-2, 1e-5, -1e-9, 0.0].map(push)).collect()
+    }
+
+    #[test]
+    fn the_certificate_holds_at_any_twist_and_is_tight_at_the_solution() {
+        let area = area();
+        let field = Field { area: &area, p: [1.0, 0.4, -0.3] };
+        let rotation = |v| dissipation(&[field], v).gradient;
+        for w in loads(&field) {
+            let exact = solve(&[field], w, None, Refiner::Newton);
+            let tight = certificate(w, exact.twist, &support(&field, exact.twist), rotation);
+            assert!((tight.lower / exact.mu - 1.0).abs() < 1e-13 && (tight.upper / exact.mu - 1.0).abs() < 1e-11, "{w:?} {exact:?} {tight:?}");
+            for turn in [1e-3, 0.1, 0.5] {
+                let v = exact.twist + turn * exact.twist.norm() * Vector3::new(0.5, 0.7, -0.5);
+                let Bounds { lower, upper } = certificate(w, v, &support(&field, v), rotation);
+                assert!(lower <= exact.mu * (1.0 + 1e-13) && exact.mu <= upper * (1.0 + 1e-13), "{w:?} {turn}: {lower} {} {upper}", exact.mu);
+            }
+        }
+    }
+
+    #[test]
+    fn the_step_without_an_evaluation_leaves_no_error() {
+        let area = area();
+        let field = Field { area: &area, p: [1.0, 0.4, -0.3] };
+        for w in loads(&field) {
+            let found = solve(&[field], w, None, Refiner::Newton);
+            let at = dissipation(&[field], found.twist);
+            let residual = (at.value * at.gradient - w).amax() / w.amax();
+            assert!(residual < 1e-11 && (at.value / found.mu - 1.0).abs() < 1e-11, "{w:?} {found:?} {residual:e}");
+            // The maximum of (w.v)/D(v) is flat: the value is right to the square of the twist's error.
+            assert!((w.dot(&found.twist) / at.value / found.mu - 1.0).abs() < 1e-14, "{w:?} {found:?}");
+        }
+    }
+}
