@@ -154,7 +154,8 @@ fn score_one(problem: &Problem<'_>, pads: Option<&Pads>, seeds: &[Seed], options
     bounded.sort_by(|&a, &b| seeds[b].upper.total_cmp(&seeds[a].upper).then(a.cmp(&b)));
     let mut slips: Vec<(usize, f64)> = Vec::new();
     // Ties with the largest are solved too, so that the first of them is found.
-    let exact = pads.is_some_and(exactly_congruent);
+    // Congruent to rounding, not only to the single precision of the part's file.
+    let exact = pads.is_some_and(|pads| pads.congruent);
     let margin = if exact { 2.0 * TIE } else { F32_TOLERANCE };
     for load in bounded {
         if seeds[load].upper < largest * (1.0 - margin) {
@@ -183,12 +184,6 @@ fn score_one(problem: &Problem<'_>, pads: Option<&Pads>, seeds: &[Seed], options
     }
     solved.sort_by_key(|(load, _)| *load);
     Scored { solved: solved.len(), compared, worst: settle(worst(solved.into_iter())), all: Vec::new() }
-}
-
-/// Whether faces that count as congruent are so to rounding, not only to the single precision of the part's file.
-fn exactly_congruent(pads: &Pads) -> bool {
-    let [i, ii] = pads.moments;
-    i.iter().zip(ii).all(|(a, b)| (a - b).abs() <= 1e-12 * i[0].max(i[3] + i[5]))
 }
 
 /// `mu_s` of congruent faces in full contact: their summed pressure is constant.

@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 
+use super::lanes::{Block, LANES, total, widest};
 use crate::model::Polygon;
 
 /// The boundary loops of a contact area: outer loops counter-clockwise, holes clockwise. All integrals are sums over
@@ -11,8 +12,11 @@ pub struct Loops {
     points: Vec<DVec2>,
     /// End index of each loop in `points`.
     ends: Vec<usize>,
+    /// The edges again, as the sums over them want them.
+    blocks: Vec<Block>,
     middle: DVec2,
     radius: f64,
+    moments: [f64; 6],
 }
 
 impl Loops {
@@ -88,6 +92,17 @@ impl Loops {
         self.radius
     }
 
+    /// Edges side by side.
+    pub(super) fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    /// See [`super::moments`].
+    pub(super) fn moments(&self) -> [f64; 6] {
+        self.moments
+    }
+
+    /// Everything that follows from the points.
     fn measure(&mut self) {
         let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
         for &point in &self.points {
@@ -96,6 +111,23 @@ impl Loops {
         }
         self.middle = if self.points.is_empty() { DVec2::ZERO } else { (low + high) / 2.0 };
         self.radius = self.points.iter().map(|point| point.distance_squared(self.middle)).fold(0.0, f64::max).sqrt();
+        self.blocks.clear();
+        self.blocks.reserve(self.points.len().div_ceil(LANES));
+        let (mut count, mut start) = (0, 0);
+        for &end in &self.ends {
+            let mut a = self.points[end - 1];
+            for &b in &self.points[start..end] {
+                let lane = count % LANES;
+                if lane == 0 {
+                    self.blocks.push(Block::at(b));
+                }
+                let block = &mut self.blocks[count / LANES];
+                (block.ax[lane], block.ay[lane], block.bx[lane], block.by[lane]) = (a.x, a.y, b.x, b.y);
+                (a, count) = (b, count + 1);
+            }
+            start = end;
+        }
+        self.moments = moments(&mut self.blocks, self.middle);
     }
 
     /// Writes into `out` the part of the area where `p0 + p1 x1 + p2 x2 >= 0` (equations (19)(20)): each loop cut by
@@ -103,6 +135,8 @@ impl Loops {
     pub fn clip_into(&self, p: [f64; 3], out: &mut Self) {
         out.points.clear();
         out.ends.clear();
+        // A convex loop gets at most one point more.
+        out.points.reserve(self.points.len() + 2);
         let value = |x: DVec2| p[0] + p[1] * x.x + p[2] * x.y;
         for ring in self.rings() {
             let start = out.points.len();
@@ -126,4 +160,39 @@ impl Loops {
         }
         out.measure();
     }
+}
+
+widest! {
+    /// Measures the edges; [`super::moments`] of the area within them. `o` is one of its points.
+    fn moments(edges: &mut [Block], o: DVec2) -> [f64; 6] = moments_of
+}
+
+#[inline(always)]
+fn moments_of(edges: &mut [Block], o: DVec2) -> [f64; 6] {
+    let mut lanes = [[0.0; LANES]; 6];
+    for edge in edges {
+        edge.measure();
+        for i in 0..LANES {
+            let (ax, ay) = (edge.ax[i] - o.x, edge.ay[i] - o.y);
+            let (bx, by) = (edge.bx[i] - o.x, edge.by[i] - o.y);
+            let cross = ax * by - ay * bx;
+            lanes[0][i] += cross;
+            lanes[1][i] += cross * (ax + bx);
+            lanes[2][i] += cross * (ay + by);
+            lanes[3][i] += cross * (ax * ax + ax * bx + bx * bx);
+            lanes[4][i] += cross * (2.0 * (ax * ay + bx * by) + (ax * by + bx * ay));
+            lanes[5][i] += cross * (ay * ay + ay * by + by * by);
+        }
+    }
+    // About a point of the area, then moved: a sliver far from the origin keeps its relative accuracy.
+    let sums = lanes.each_ref().map(total);
+    let m = [sums[0] / 2.0, sums[1] / 6.0, sums[2] / 6.0, sums[3] / 12.0, sums[4] / 24.0, sums[5] / 12.0];
+    [
+        m[0],
+        m[1] + o.x * m[0],
+        m[2] + o.y * m[0],
+        m[3] + 2.0 * o.x * m[1] + o.x * o.x * m[0],
+        m[4] + o.x * m[2] + o.y * m[1] + o.x * o.y * m[0],
+        m[5] + 2.0 * o.y * m[2] + o.y * o.y * m[0],
+    ]
 }

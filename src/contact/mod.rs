@@ -11,6 +11,7 @@
 
 mod fan;
 mod far;
+mod lanes;
 mod loops;
 mod thin;
 
@@ -35,9 +36,9 @@ impl Friction {
     }
 }
 
-/// Slip centres farther from the area's middle than this many circumradii use quadrature in twist form.
-/// The fan loses one digit per decade of the distance in `int e`, two in `int r`, three in the moments; the
-/// 8 x 8 Gauss rule is at rounding level from here on.
+/// Slip centres farther from the area's middle than this many circumradii use quadrature along the edges in twist form.
+/// The fan loses one digit per decade of the distance in `int e`, two in `int r`, three in the moments; few Gauss points
+/// are at rounding level from here on.
 pub const FAR: f64 = 3.0;
 
 /// Friction integrals of `area` under `twist`, with the Hessian for the pressure `p` (paper 3.5; equations (3)-(7)).
@@ -60,34 +61,14 @@ fn whole(area: &Loops, twist: [f64; 3], p: [f64; 3]) -> Friction {
 
 fn is_far(area: &Loops, twist: [f64; 3]) -> bool {
     let [u1, u2, omega] = twist;
-    let (middle, radius) = (area.middle(), area.radius());
-    let speed = (u1 - omega * middle.y).hypot(u2 + omega * middle.x);
-    speed > FAR * omega.abs() * radius
+    let (middle, reach) = (area.middle(), FAR * omega * area.radius());
+    let (v1, v2) = (u1 - omega * middle.y, u2 + omega * middle.x);
+    v1 * v1 + v2 * v2 > reach * reach
 }
 
 /// `(int 1, int x1, int x2, int x1^2, int x1 x2, int x2^2)` over the area.
 pub fn moments(area: &Loops) -> [f64; 6] {
-    // About a point of the area, then moved: a sliver far from the origin keeps its relative accuracy.
-    let o = area.middle();
-    let mut m = [0.0; 6];
-    for (a, b) in area.edges() {
-        let (a, b) = (a - o, b - o);
-        let cross = a.perp_dot(b);
-        m[0] += cross / 2.0;
-        m[1] += cross * (a.x + b.x) / 6.0;
-        m[2] += cross * (a.y + b.y) / 6.0;
-        m[3] += cross * (a.x * a.x + a.x * b.x + b.x * b.x) / 12.0;
-        m[4] += cross * (2.0 * a.x * a.y + a.x * b.y + b.x * a.y + 2.0 * b.x * b.y) / 24.0;
-        m[5] += cross * (a.y * a.y + a.y * b.y + b.y * b.y) / 12.0;
-    }
-    [
-        m[0],
-        m[1] + o.x * m[0],
-        m[2] + o.y * m[0],
-        m[3] + 2.0 * o.x * m[1] + o.x * o.x * m[0],
-        m[4] + o.x * m[2] + o.y * m[1] + o.x * o.y * m[0],
-        m[5] + 2.0 * o.y * m[2] + o.y * o.y * m[0],
-    ]
+    area.moments()
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use crate::contact::{Loops, friction, moments};
 use super::pads::{Load, Pads};
 use super::pressure::{self, face_pressure, separates};
 use super::shanno;
-use super::slip::{self, Field, Refiner};
+use super::slip::{self, Field, Refiner, Support};
 
 pub(super) type Vector7 = SVector<f64, 7>;
 pub(super) type Matrix7 = SMatrix<f64, 7, 7>;
@@ -29,6 +29,8 @@ pub struct State {
     pub mu_over_size: f64,
     /// Areas left in contact, scaled.
     pub areas: [f64; 2],
+    /// What the friction can do at this twist.
+    pub friction: Support,
 }
 
 impl State {
@@ -93,7 +95,8 @@ impl<'a> Solver<'a> {
         let g = gradients[0] + gradients[1];
         let d = g.dot(&v);
         let lever = coupling * self.load.half_distance * self.load.size;
-        let carried = pressure::stiffness(&m) * nalgebra::Vector4::new(q[0], q[1], q[2], q[3]);
+        let k = pressure::stiffness(&m);
+        let carried = k * nalgebra::Vector4::new(q[0], q[1], q[2], q[3]);
         let difference = gradients[0] - gradients[1];
         let slip = self.load.direction - d * g;
         let [m1, m2] = self.load.moment;
@@ -118,7 +121,6 @@ impl<'a> Solver<'a> {
                 jacobian[(5, j)] = lever_row(1, g[j], dh[(1, j)]);
                 jacobian[(6, j)] = -lever_row(0, g[j], dh[(0, j)]);
             }
-            let k = pressure::stiffness(&m);
             for j in 0..4 {
                 let (sum, minus) = match j {
                     0 => (by_pressure[0][0], by_pressure[0][0]),
@@ -136,31 +138,34 @@ impl<'a> Solver<'a> {
                 jacobian[(6, 3 + j)] = -lever_row(0, dd, minus.x) + k[(2, j)];
             }
         }
-        State { z: *z, residual, mu_over_size: d, areas: [m[0][0], m[1][0]] }
+        let (first_i, first_ii) = (pressure::first_moment(&m[0], face_pressure(&q, 0)), pressure::first_moment(&m[1], face_pressure(&q, 1)));
+        let normal = carried[0] + carried[1];
+        let friction = Support { gradient: g, normal, centre: (first_i + first_ii) / normal };
+        State { z: *z, residual, mu_over_size: d, areas: [m[0][0], m[1][0]], friction }
     }
 
     /// Damped semi-smooth Newton from `z`; `None` when it does not come below [`TOLERANCE`] in `most` steps.
     pub(super) fn newton(&mut self, z: Vector7, coupling: f64, most: u32) -> Option<State> {
-        let mut jacobian = Matrix7::zeros();
-        let mut at = self.evaluate(&z, coupling, Some(&mut jacobian));
+        let mut jacobians = [Matrix7::zeros(), Matrix7::zeros()];
+        let mut current = 0;
+        let mut at = self.evaluate(&z, coupling, Some(&mut jacobians[0]));
         for _ in 0..most {
             let error = at.residual.amax();
             if !error.is_finite() {
                 return None;
             }
-            if error < 1e-15 {
+            if error < ROUNDING {
                 break;
             }
             self.iterations += 1;
-            let step = -jacobian.lu().solve(&at.residual)?;
+            let step = -solve_newton(&jacobians[current], &at.residual)?;
             let mut t = 1.0;
             let mut next = None;
             for _ in 0..8 {
-                let mut next_jacobian = Matrix7::zeros();
-                let tried = self.evaluate(&(at.z + t * step), coupling, Some(&mut next_jacobian));
+                let tried = self.evaluate(&(at.z + t * step), coupling, Some(&mut jacobians[1 - current]));
                 let pressed = tried.areas[0] > 0.0 && tried.areas[1] > 0.0;
                 if pressed && tried.residual.norm() <= (1.0 - 0.1 * t) * at.residual.norm() {
-                    next = Some((tried, next_jacobian));
+                    next = Some(tried);
                     break;
                 }
                 if error < TOLERANCE {
@@ -168,8 +173,8 @@ impl<'a> Solver<'a> {
                 }
                 t *= 0.4;
             }
-            let Some((tried, next_jacobian)) = next else { break };
-            (at, jacobian) = (tried, next_jacobian);
+            let Some(tried) = next else { break };
+            (at, current) = (tried, 1 - current);
         }
         (at.residual.amax() < self.tolerance(&at) && at.mu_over_size > 0.0).then_some(at)
     }
@@ -243,9 +248,43 @@ impl<'a> Solver<'a> {
         DVec2::new(-m2, m1)
     }
 
+    /// Newton's method on all seven equations from the pressure `q` without coupling and a rough slip under it. Only for a
+    /// coupling so weak that there is one solution: whichever way it was reached, it is the one on the branch from `d = 0`.
+    fn direct(&mut self, q: [f64; 4], seed: Option<Vector3<f64>>) -> Option<State> {
+        let p = [face_pressure(&q, 0), face_pressure(&q, 1)];
+        let parted = [0, 1].map(|k| separates(&self.pads.areas[k], p[k]));
+        let w = self.load.direction;
+        let v = if self.pads.congruent && parted == [false; 2] {
+            // The summed pressure is constant: the slip does not depend on the rest.
+            let level = [p[0][0] + p[1][0], 0.0, 0.0];
+            let slip = slip::solve(&[Field { area: &self.pads.areas[0], p: level }], w, seed, Refiner::Newton);
+            self.evaluations += slip.evaluations;
+            self.iterations += slip.iterations;
+            slip.twist
+        } else {
+            for k in 0..2 {
+                if parted[k] {
+                    self.pads.areas[k].clip_into(p[k], &mut self.scratch[k]);
+                }
+            }
+            let fields = [0, 1].map(|k| Field { area: if parted[k] { &self.scratch[k] } else { &self.pads.areas[k] }, p: p[k] });
+            self.evaluations += 1;
+            slip::approach(&fields, w, seed)
+        };
+        let state = self.newton(Vector7::from([v.x, v.y, v.z, q[0], q[1], q[2], q[3]]), 1.0, 25)?;
+        let coupling = state.mu_over_size * self.load.size * 2.0 * self.load.half_distance.abs();
+        (coupling <= super::COUPLING_SEARCH).then_some(state)
+    }
+
     /// The solution on the branch that starts at `d = 0` without coupling; `None` when that branch does not exist, or
     /// ends before the real `d`.
     pub fn branch(&mut self, seed: Option<Vector3<f64>>) -> Option<State> {
+        if self.refiner == Refiner::Newton {
+            let q = pressure::solve(self.pads, self.load.normal, self.uncoupled_target(), &mut self.scratch[0])?;
+            if let Some(state) = self.direct(q, seed) {
+                return Some(state);
+            }
+        }
         let start = self.state_at(self.uncoupled_target(), seed)?;
         let polished = match self.refiner {
             Refiner::Newton => self.newton(start, 1.0, 25),
@@ -298,6 +337,45 @@ impl<'a> Solver<'a> {
 
 /// Longest step of [`Solver::follow`], relative to the state.
 const FOLLOW_STEP: f64 = 0.3;
+/// Residual at rounding level: no further step is taken.
+const ROUNDING: f64 = 1e-14;
+
+/// Solves `jacobian x = rhs`; `None` where it is singular. The rows of the normal forces know the pressure alone and give
+/// the offsets from its slopes, so that five unknowns are left for elimination with pivoting.
+fn solve_newton(jacobian: &Matrix7, rhs: &Vector7) -> Option<Vector7> {
+    let j = |row: usize, column: usize| jacobian[(row, column)];
+    // offset_k = base_k + slope_k . (a1, a2)
+    let offset = [(3, 3), (4, 4)].map(|(row, column)| {
+        let inverse = 1.0 / j(row, column);
+        [rhs[row] * inverse, -j(row, 5) * inverse, -j(row, 6) * inverse]
+    });
+    let mut rows: [[f64; 6]; 5] = [0, 1, 2, 5, 6].map(|row| {
+        let fill = |k: usize| j(row, 3) * offset[0][k] + j(row, 4) * offset[1][k];
+        [j(row, 0), j(row, 1), j(row, 2), j(row, 5) + fill(1), j(row, 6) + fill(2), rhs[row] - fill(0)]
+    });
+    for step in 0..5 {
+        let pivot = (step..5).max_by(|&a, &b| rows[a][step].abs().total_cmp(&rows[b][step].abs()))?;
+        rows.swap(step, pivot);
+        let lead = rows[step];
+        if lead[step] == 0.0 {
+            return None;
+        }
+        let inverse = 1.0 / lead[step];
+        for row in &mut rows[step + 1..] {
+            let factor = row[step] * inverse;
+            for column in step + 1..6 {
+                row[column] -= factor * lead[column];
+            }
+        }
+    }
+    let mut x = [0.0; 5];
+    for i in (0..5).rev() {
+        let known: f64 = (i + 1..5).map(|k| rows[i][k] * x[k]).sum();
+        x[i] = (rows[i][5] - known) / rows[i][i];
+    }
+    let at = |[base, by1, by2]: [f64; 3]| base + by1 * x[3] + by2 * x[4];
+    Some(Vector7::from([x[0], x[1], x[2], at(offset[0]), at(offset[1]), x[3], x[4]]))
+}
 
 /// Rounds of [`Solver::conjugate`], each with a fresh scaling.
 const CONJUGATE_ROUNDS: u32 = 8;

@@ -166,12 +166,14 @@ pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, optio
 fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, evaluations: u32, options: &Options) -> Score {
     let q = state.q();
     let separated = (0..2).any(|k| pressure::separates(&pads.areas[k], face_pressure(&q, k)));
-    let mut clipped = [Loops::default(), Loops::default()];
-    for (k, area) in clipped.iter_mut().enumerate() {
-        pads.areas[k].clip_into(face_pressure(&q, k), area);
-    }
-    let fields = [0, 1].map(|k| Field { area: &clipped[k], p: face_pressure(&q, k) });
-    let bounds = slip::certificate(&fields, load.direction * load.size, state.twist());
+    let rotation = |v| {
+        let mut clipped = [Loops::default(), Loops::default()];
+        for k in 0..2 {
+            pads.areas[k].clip_into(face_pressure(&q, k), &mut clipped[k]);
+        }
+        slip::dissipation(&[0, 1].map(|k| Field { area: &clipped[k], p: face_pressure(&q, k) }), v).gradient
+    };
+    let bounds = slip::certificate(load.direction * load.size, state.twist(), &state.friction, rotation);
     let r = state.residual;
     let slip_residual = Vector3::new(r[0], r[1], r[2]).amax() * load.size;
     let unit = pads.length * pads.length;
@@ -182,14 +184,15 @@ fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, eva
     };
     Score {
         status,
-        mu_s: Some(state.mu_over_size * load.size),
+        // Where the residual leaves more room than the certificate, the certificate knows better.
+        mu_s: Some((state.mu_over_size * load.size).max(bounds.lower).min(bounds.upper)),
         slip: Some(pads.slip(state.twist())),
         pressure: Some(pads.pressure(q, force)),
         contact_area_i: state.areas[0] * unit,
         contact_area_ii: state.areas[1] * unit,
         residual: slip_residual.max(r.fixed_rows::<4>(3).amax()),
         bounds: Some(bounds),
-        evaluations: evaluations + 4,
+        evaluations,
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::contact::{Loops, moments};
-use crate::geometry::hull::convex_hull;
+use crate::geometry::hull::{convex_hull, support};
 use crate::model::{Contact, Pressure, Slip, Wrench};
 
 /// Both contact areas in units of `length`, about `origin`.
@@ -15,6 +15,10 @@ pub struct Pads {
     pub moments: [[f64; 6]; 2],
     /// Their convex hulls, counter-clockwise, scaled.
     pub hulls: [Vec<DVec2>; 2],
+    /// Outward normals of the edges of `conv A_I - conv A_II` with the supports of the two terms in that direction, scaled.
+    pub supports: Vec<(DVec2, [f64; 2])>,
+    /// Whether the areas agree in their moments, as two that are the same do.
+    pub congruent: bool,
     /// Middle of the areas in the grip frame [m]: the scaled frame's origin.
     pub origin: DVec2,
     /// Square root of the mean area [m]: the scaled frame's unit.
@@ -34,7 +38,14 @@ impl Pads {
         let areas = [&contact.face_i, &contact.face_ii].map(|patch| Loops::mapped(patch, |point| (point - origin) / length));
         let moments = [moments(&areas[0]), moments(&areas[1])];
         let hulls = [convex_hull(areas[0].points()), convex_hull(areas[1].points())];
-        Some(Self { areas, moments, hulls, origin, length })
+        let normals = |hull: &[DVec2], sign: f64| -> Vec<DVec2> {
+            let edge = |i: usize| hull[(i + 1) % hull.len()] - hull[i];
+            (0..hull.len()).map(|i| sign * -edge(i).perp().normalize_or_zero()).collect()
+        };
+        let all = normals(&hulls[0], 1.0).into_iter().chain(normals(&hulls[1], -1.0)).filter(|e| *e != DVec2::ZERO);
+        let supports = all.map(|e| (e, [support(&hulls[0], e), support(&hulls[1], -e)])).collect();
+        let congruent = moments[0].iter().zip(moments[1]).all(|(a, b)| (a - b).abs() <= 1e-12 * moments[0][0].max(moments[0][3] + moments[0][5]));
+        Some(Self { areas, moments, hulls, supports, congruent, origin, length })
     }
 
     /// The load in units of `force` [N] and of this contact's length, its moment about the scaled frame's origin;

@@ -32,6 +32,11 @@ pub fn pressed_moments(pads: &Pads, q: &[f64; 4], scratch: &mut Loops) -> [[f64;
     })
 }
 
+/// `int p x` over an area with these moments.
+pub fn first_moment(m: &[f64; 6], p: [f64; 3]) -> DVec2 {
+    DVec2::new(p[0] * m[1] + p[1] * m[3] + p[2] * m[4], p[0] * m[2] + p[1] * m[4] + p[2] * m[5])
+}
+
 /// Stiffness: `(N_I, N_II, X1, X2) = K q` with `X = int_I x p_I - int_II x p_II`.
 pub fn stiffness(m: &[[f64; 6]; 2]) -> Matrix4<f64> {
     let [a, b] = m;
@@ -85,22 +90,27 @@ pub fn region(pads: &Pads, normal: [f64; 2]) -> Ring {
 
 /// Outward normals of the region's edges with the region's support in that direction.
 fn region_edges(pads: &Pads, normal: [f64; 2]) -> impl Iterator<Item = (DVec2, f64)> {
-    let [hull_i, hull_ii] = &pads.hulls;
-    let support = move |e: DVec2| {
-        let i = hull_i.iter().map(|x| e.dot(*x)).fold(f64::NEG_INFINITY, f64::max);
-        let ii = hull_ii.iter().map(|x| -e.dot(*x)).fold(f64::NEG_INFINITY, f64::max);
-        normal[0] * i + normal[1] * ii
-    };
-    let normals = |hull: &'_ [DVec2], sign: f64| {
-        (0..hull.len())
-            .map(|i| {
-                let edge = hull[(i + 1) % hull.len()] - hull[i];
-                sign * DVec2::new(edge.y, -edge.x).normalize_or_zero()
-            })
-            .collect::<Vec<_>>()
-    };
-    let all = normals(hull_i, 1.0).into_iter().chain(normals(hull_ii, -1.0));
-    all.filter(|e| *e != DVec2::ZERO).map(move |e| (e, support(e)))
+    pads.supports.iter().map(move |&(e, [i, ii])| (e, normal[0] * i + normal[1] * ii))
+}
+
+/// Solves `K q = load` for the stiffness of [`stiffness`], of which `lift` times the diagonal is added to the part that
+/// tilts the pressure; `None` where that part is not positive definite.
+fn solve_stiffness(m: &[[f64; 6]; 2], load: &Vector4<f64>, lift: f64) -> Option<Vector4<f64>> {
+    let [a, b] = m;
+    // The offsets follow from the normal forces; what is left are the second moments about the centroids.
+    let (a1, a2, b1, b2) = (a[1] / a[0], a[2] / a[0], b[1] / b[0], b[2] / b[0]);
+    let s11 = (a[3] + b[3]) * (1.0 + lift) - a1 * a[1] - b1 * b[1];
+    let s12 = a[4] + b[4] - a1 * a[2] - b1 * b[2];
+    let s22 = (a[5] + b[5]) * (1.0 + lift) - a2 * a[2] - b2 * b[2];
+    let (x1, x2) = (load[2] - a1 * load[0] + b1 * load[1], load[3] - a2 * load[0] + b2 * load[1]);
+    let l = s12 / s11;
+    let d = s22 - l * s12;
+    if !(s11 > 0.0 && d > 0.0) {
+        return None;
+    }
+    let tilt2 = (x2 - l * x1) / d;
+    let tilt1 = x1 / s11 - l * tilt2;
+    Some(Vector4::new(load[0] / a[0] - a1 * tilt1 - a2 * tilt2, load[1] / b[0] + b1 * tilt1 + b2 * tilt2, tilt1, tilt2))
 }
 
 /// The pressure `q = (a_i0, a_ii0, a1, a2)` that carries the normal forces and the contact moment `target`, from a
@@ -109,13 +119,19 @@ fn region_edges(pads: &Pads, normal: [f64; 2]) -> impl Iterator<Item = (DVec2, f
 /// It minimises the convex `1/2 sum int p^2 - f . q` by Newton's method; each step is one solve on the areas cut at the
 /// current zero-pressure lines (paper 3.6), damped so that the function falls.
 pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, start: Option<[f64; 4]>, scratch: &mut Loops) -> Option<[f64; 4]> {
+    let load = Vector4::new(normal[0], normal[1], target.x, target.y);
+    if let Some(q) = whole(pads, &load) {
+        return Some(q);
+    }
     if reach(pads, normal, target) <= 0.0 {
         return None;
     }
-    let load = Vector4::new(normal[0], normal[1], target.x, target.y);
-    let uniform = [normal[0] / pads.moments[0][0], normal[1] / pads.moments[1][0], 0.0, 0.0];
-    let mut q = Vector4::from(start.unwrap_or(uniform));
-    let mut k = stiffness(&pressed_moments(pads, &q.into(), scratch));
+    let (q, mut m) = match start {
+        Some(q) => (q, pressed_moments(pads, &q, scratch)),
+        None => ([normal[0] / pads.moments[0][0], normal[1] / pads.moments[1][0], 0.0, 0.0], pads.moments),
+    };
+    let mut q = Vector4::from(q);
+    let k = stiffness(&m);
     let mut error = k * q - load;
     let scale = load.amax();
     let mut value = 0.5 * q.dot(&(k * q)) - load.dot(&q);
@@ -123,27 +139,20 @@ pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, start: Option<[f64; 4
         if error.amax() <= 1e-15 * scale {
             break;
         }
-        let mut matrix = k;
-        for lift in [0.0, 1e-14, 1e-10, 1e-6] {
-            matrix = k + Matrix4::from_diagonal(&k.diagonal()) * lift + Matrix4::identity() * (lift * 1e-3);
-            if matrix.cholesky().is_some() {
-                break;
-            }
-        }
-        let step = -matrix.cholesky()?.solve(&error);
+        let step = -[0.0, 1e-14, 1e-10, 1e-6].into_iter().find_map(|lift| solve_stiffness(&m, &error, lift))?;
         let slope = error.dot(&step);
         let mut t = 1.0;
         let mut moved = false;
         for _ in 0..25 {
             let tried = q + t * step;
-            let m = pressed_moments(pads, &tried.into(), scratch);
-            let stiff = stiffness(&m);
+            let tried_m = pressed_moments(pads, &tried.into(), scratch);
+            let stiff = stiffness(&tried_m);
             let tried_error = stiff * tried - load;
             let tried_value = 0.5 * tried.dot(&(stiff * tried)) - load.dot(&tried);
-            if m[0][0] > 0.0 && m[1][0] > 0.0 && (tried_value <= value + 1e-4 * t * slope || tried_error.norm() < 0.5 * error.norm()) {
+            if tried_m[0][0] > 0.0 && tried_m[1][0] > 0.0 && (tried_value <= value + 1e-4 * t * slope || tried_error.norm() < 0.5 * error.norm()) {
                 moved = tried_error.norm() < error.norm() || error.amax() > 1e-10 * scale;
                 if moved {
-                    (q, k, error, value) = (tried, stiff, tried_error, tried_value);
+                    (q, m, error, value) = (tried, tried_m, tried_error, tried_value);
                 }
                 break;
             }
@@ -154,7 +163,6 @@ pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, start: Option<[f64; 4
         }
     }
     // On a contact of relative width `e` the iteration ends at `1e-16/e`.
-    let m = pressed_moments(pads, &q.into(), scratch);
     let rounding = (0..2).map(|k| (q[k].abs() + q[2].hypot(q[3]) * pads.areas[k].radius()) * m[k][0]).sum::<f64>();
     (error.amax() <= (1e-9 * scale).max(8.0 * f64::EPSILON * rounding)).then(|| q.into())
 }
@@ -175,4 +183,12 @@ pub fn solve_near_rim(pads: &Pads, normal: [f64; 2], target: DVec2, scratch: &mu
         away *= 0.25;
     }
     solve(pads, normal, target, q, scratch)
+}
+
+/// The pressure that carries `load` on the whole areas, if it presses everywhere.
+fn whole(pads: &Pads, load: &Vector4<f64>) -> Option<[f64; 4]> {
+    let q: [f64; 4] = solve_stiffness(&pads.moments, load, 0.0)?.into();
+    let error = stiffness(&pads.moments) * Vector4::from(q) - load;
+    let pressed = (0..2).all(|k| !separates(&pads.areas[k], face_pressure(&q, k)));
+    (pressed && error.amax() <= 1e-14 * load.amax()).then_some(q)
 }

@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::contact::{Friction, Loops, friction, moments};
 use crate::model::Bounds;
 
+use super::pressure::first_moment;
 use super::shanno;
 
 /// An area with its pressure `p0 + p1 x1 + p2 x2`, not negative on the area.
@@ -53,7 +54,8 @@ pub struct Solution {
     pub twist: Vector3<f64>,
     /// Smallest friction coefficient.
     pub mu: f64,
-    /// Largest component of `D grad D - w` over `|w|`.
+    /// Largest component of `D grad D - w` over that of `w`. The last step is not evaluated where the rate of convergence
+    /// tells what is left; then this is what it tells.
     pub residual: f64,
     /// Evaluations of the integrals.
     pub evaluations: u32,
@@ -75,37 +77,67 @@ pub enum Refiner {
 /// Below this residual, relative to the load, a solution is at rounding level.
 const CONVERGED: f64 = 2e-15;
 
-/// A twist from the ellipsoid approximation of the limit surface: the start where no seed is known.
+/// Below this residual one more Newton step, taken without an evaluation after it, leaves no error in `mu` that can be
+/// seen: `mu` follows to third order, and the convergence is quadratic.
+const LAST_STEP: f64 = 1e-6;
+
+/// Residual that the rate of convergence must promise for that step.
+const PROMISED: f64 = 1e-12;
+
+/// A twist from an ellipsoid as the limit surface, its radius for the mix of force and moment at hand: the start where no
+/// seed is known.
 pub fn ellipsoid_start(fields: &[Field<'_>], w: Vector3<f64>) -> Vector3<f64> {
-    let (mut load, mut first, mut polar, mut area) = (0.0, DVec2::ZERO, 0.0, 0.0);
+    let (mut normal, mut first) = (0.0, DVec2::ZERO);
+    let (mut q11, mut q12, mut q22, mut area) = (0.0, 0.0, 0.0, 0.0);
     for Field { area: loops, p } in fields {
         let m = moments(loops);
-        load += p[0] * m[0] + p[1] * m[1] + p[2] * m[2];
-        first += DVec2::new(p[0] * m[1] + p[1] * m[3] + p[2] * m[4], p[0] * m[2] + p[1] * m[4] + p[2] * m[5]);
+        normal += p[0] * m[0] + p[1] * m[1] + p[2] * m[2];
+        first += first_moment(&m, *p);
         let middle = DVec2::new(m[1], m[2]) / m[0];
-        polar += m[3] + m[5] - m[0] * middle.length_squared();
+        q11 += m[3] - middle.x * m[1];
+        q12 += m[4] - middle.x * m[2];
+        q22 += m[5] - middle.y * m[2];
         area += m[0];
     }
-    let centre = first / load;
-    let radius_squared = 0.85 * polar / area;
+    let centre = first / normal;
     let force = DVec2::new(w.x, w.y);
-    let omega = (w.z - centre.perp_dot(force)) / radius_squared;
+    let moment = w.z - centre.perp_dot(force);
+    // What resists a rotation is the mean distance, and near a translation the mean square of the extent along it.
+    let turning = MEAN_DISTANCE * (q11 + q22) / area;
+    let size = force.length_squared();
+    let share = size / (size + moment * moment / turning);
+    let along = if size > 0.0 { (q11 * force.x * force.x + 2.0 * q12 * force.x * force.y + q22 * force.y * force.y) / (size * area) } else { 0.0 };
+    let radius_squared = turning + share * share * (along - turning);
+    let omega = moment / radius_squared;
     Vector3::new(w.x + omega * centre.y, w.y - omega * centre.x, omega)
 }
+
+/// Square of the mean distance from the centroid over the mean square distance: 8/9 for a disc, 3/4 for a thin bar.
+const MEAN_DISTANCE: f64 = 0.85;
 
 /// Solves the slip problem for the in-plane load `w = (F1, F2, M3)`, not zero, from `start` or, without one, from the
 /// ellipsoid approximation.
 pub fn solve(fields: &[Field<'_>], w: Vector3<f64>, start: Option<Vector3<f64>>, refiner: Refiner) -> Solution {
+    let (start, at_start) = begin(fields, w, start);
+    match refiner {
+        Refiner::Newton => newton(fields, w, start, at_start),
+        Refiner::Shanno => conjugate(fields, w, start, at_start),
+    }
+}
+
+/// A twist near that of [`solve`], for one evaluation: the start and one Newton step.
+pub fn approach(fields: &[Field<'_>], w: Vector3<f64>, start: Option<Vector3<f64>>) -> Vector3<f64> {
+    let (start, at) = begin(fields, w, start);
+    start - newton_step(at.gradient * at.gradient.transpose() + at.value * at.hessian, at.value * at.gradient - w)
+}
+
+/// The minimum of `D^2/2 - w.v` along the ray of the start, and `D` there.
+fn begin(fields: &[Field<'_>], w: Vector3<f64>, start: Option<Vector3<f64>>) -> (Vector3<f64>, Dissipation) {
     let start = start.filter(|v| w.dot(v) > 0.0).unwrap_or_else(|| ellipsoid_start(fields, w));
     let start = start / start.norm();
     let first = dissipation(fields, start);
-    // The exact minimum along the ray of the start.
     let scale = w.dot(&start) / (first.value * first.value);
-    let at_start = Dissipation { value: first.value * scale, gradient: first.gradient, hessian: first.hessian / scale };
-    match refiner {
-        Refiner::Newton => newton(fields, w, start * scale, at_start),
-        Refiner::Shanno => conjugate(fields, w, start * scale, at_start),
-    }
+    (start * scale, Dissipation { value: first.value * scale, gradient: first.gradient, hessian: first.hessian / scale })
 }
 
 fn newton(fields: &[Field<'_>], w: Vector3<f64>, mut v: Vector3<f64>, mut at: Dissipation) -> Solution {
@@ -113,12 +145,21 @@ fn newton(fields: &[Field<'_>], w: Vector3<f64>, mut v: Vector3<f64>, mut at: Di
     let mut evaluations = 1;
     let mut iterations = 0;
     let mut error = at.value * at.gradient - w;
+    let mut before = f64::INFINITY;
     while error.amax() > CONVERGED * scale && iterations < 60 {
         iterations += 1;
         let matrix = at.gradient * at.gradient.transpose() + at.value * at.hessian;
         let step = -newton_step(matrix, error);
         let slope = error.dot(&step);
         let value = at.value * at.value / 2.0 - w.dot(&v);
+        let size = error.amax() / scale;
+        let promised = size * (size / before).powi(2);
+        if size < LAST_STEP && promised < PROMISED {
+            // At the minimum the function is -mu^2/2; the step takes it half the slope down.
+            let mu = (-2.0 * value - slope).sqrt();
+            return Solution { twist: v + step, mu, residual: promised, evaluations, iterations };
+        }
+        before = size;
         let mut t = 1.0;
         let mut improved = false;
         for _ in 0..40 {
@@ -149,12 +190,31 @@ fn newton_step(matrix: Matrix3<f64>, rhs: Vector3<f64>) -> Vector3<f64> {
     let mut lift = 0.0;
     let trace = matrix.trace();
     for _ in 0..8 {
-        if let Some(factor) = (matrix + Matrix3::identity() * (lift * trace)).cholesky() {
-            return factor.solve(&rhs);
+        if let Some(step) = solve_definite(&matrix, lift * trace, &rhs) {
+            return step;
         }
         lift = if lift == 0.0 { 1e-15 } else { lift * 100.0 };
     }
     rhs / trace
+}
+
+/// Solves with `matrix + lift I` by `L D L^T`; `None` unless it is positive definite.
+fn solve_definite(matrix: &Matrix3<f64>, lift: f64, rhs: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let m = |i: usize, j: usize| matrix[(i, j)];
+    let d1 = m(0, 0) + lift;
+    let (l21, l31) = (m(1, 0) / d1, m(2, 0) / d1);
+    let d2 = m(1, 1) + lift - l21 * m(1, 0);
+    let l32 = (m(2, 1) - l31 * m(1, 0)) / d2;
+    let d3 = m(2, 2) + lift - l31 * m(2, 0) - l32 * l32 * d2;
+    if !(d1 > 0.0 && d2 > 0.0 && d3 > 0.0) {
+        return None;
+    }
+    let y1 = rhs.x;
+    let y2 = rhs.y - l21 * y1;
+    let y3 = rhs.z - l31 * y1 - l32 * y2;
+    let x3 = y3 / d3;
+    let x2 = y2 / d2 - l32 * x3;
+    Some(Vector3::new(y1 / d1 - l21 * x2 - l31 * x3, x2, x3))
 }
 
 /// Shanno's method on the same convex function, in variables in which its Hessian at the start is the identity.
@@ -175,33 +235,93 @@ fn conjugate(fields: &[Field<'_>], w: Vector3<f64>, start: Vector3<f64>, at: Dis
     Solution { twist, mu: end.value, residual, evaluations: run.evaluations + 2, iterations: run.iterations }
 }
 
-/// Relative size of the twist's turns from which the upper bound is made; the bound's gap is about its square.
-const CERTIFICATE_TURN: f64 = 1e-5;
+/// A wrench that the friction can give with `mu = 1`, and where the pressure acts.
+#[derive(Debug, Clone, Copy)]
+pub struct Support {
+    /// The wrench: the gradient of the dissipation at a twist.
+    pub gradient: Vector3<f64>,
+    /// Normal force of both faces together.
+    pub normal: f64,
+    /// The point where it acts.
+    pub centre: DVec2,
+}
 
-/// Lower and upper bound on `mu_s` for this pressure, from the twist `v` and three twists around it.
+/// Moment of a support about the pressure's centre, over the normal force and in lengths of the scaled frame, from which
+/// on it serves for the certificate. Below, the slip is nearly a translation and a rotation is evaluated beside it.
+const CERTIFYING_MOMENT: f64 = 1e-2;
+
+/// Lower and upper bound on `mu_s` for a pressure, from the twist `v` and the `support` there; `rotation` gives the
+/// gradient of the dissipation at another twist.
 ///
-/// Lower: `(w.v)/D(v)`. Upper: the gradients of `D` are points of the limit surface's supports, so if
-/// `w = sum alpha_k grad D(v_k)` with `alpha_k >= 0`, then `mu_s <= sum alpha_k`; infinite where the three do not
-/// enclose the load.
-pub fn certificate(fields: &[Field<'_>], w: Vector3<f64>, v: Vector3<f64>) -> Bounds {
-    let lower = w.dot(&v) / dissipation(fields, v).value;
-    let axis = v.iamin();
-    let mut helper = Vector3::zeros();
-    helper[axis] = 1.0;
-    let b1 = v.cross(&helper).normalize() * v.norm();
-    let b2 = v.cross(&b1) / v.norm();
-    let mut upper = f64::INFINITY;
-    for turn in [CERTIFICATE_TURN, 1e2 * CERTIFICATE_TURN] {
-        let supports = Matrix3::from_columns(&[0.0, 1.0, 2.0].map(|k| {
-            let (s, c) = (std::f64::consts::TAU * k / 3.0).sin_cos();
-            dissipation(fields, v + turn * (c * b1 + s * b2)).gradient
-        }));
-        if let Some(alpha) = supports.lu().solve(&w)
-            && alpha.iter().all(|&a| a >= 0.0)
-        {
-            upper = upper.min(alpha.sum());
-            break;
+/// Lower: `(w.v)/D(v)`, `D = v . gradient`. Upper: the wrenches that unit friction can give are a convex set, symmetric
+/// about zero, and the support is one of them. What `w` has beyond `lower` times the support is next to nothing at a
+/// solution; it is made up of two more, that of a translation and the support again or that of a rotation. The sizes of
+/// the coefficients add up.
+pub fn certificate(w: Vector3<f64>, v: Vector3<f64>, support: &Support, rotation: impl FnOnce(Vector3<f64>) -> Vector3<f64>) -> Bounds {
+    let Support { gradient, normal, centre } = *support;
+    let lower = w.dot(&v) / gradient.dot(&v);
+    // The moment about the pressure's centre, which translations leave alone.
+    let about = |g: &Vector3<f64>| g.z - centre.perp_dot(DVec2::new(g.x, g.y));
+    let turning = if about(&gradient).abs() < CERTIFYING_MOMENT * normal { rotation(Vector3::new(centre.y, -centre.x, 1.0)) } else { gradient };
+    let left = w - lower * gradient;
+    let third = about(&left) / about(&turning);
+    let rest = left - third * turning;
+    let upper = lower + third.abs() + rest.x.hypot(rest.y) / normal;
+    Bounds { lower, upper: if upper >= lower { upper } else { f64::INFINITY } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Polygon;
+
+    fn area() -> Loops {
+        let outer = [(-1.0, -0.6), (0.9, -0.8), (0.7, 0.5), (0.1, 0.2), (-0.8, 0.9)].map(|(x, y)| DVec2::new(x, y)).to_vec();
+        Loops::new(&[Polygon { outer, holes: Vec::new() }])
+    }
+
+    fn support(field: &Field<'_>, v: Vector3<f64>) -> Support {
+        let m = moments(field.area);
+        let normal = field.p[0] * m[0] + field.p[1] * m[1] + field.p[2] * m[2];
+        Support { gradient: dissipation(&[*field], v).gradient, normal, centre: first_moment(&m, field.p) / normal }
+    }
+
+    /// Loads of all kinds, the last ones near and at a translation.
+    fn loads(field: &Field<'_>) -> Vec<Vector3<f64>> {
+        let centre = support(field, Vector3::x()).centre;
+        let push = |lever: f64| Vector3::new(0.6, -0.8, centre.perp_dot(DVec2::new(0.6, -0.8)) + lever);
+        let turning = (0..40).map(|i| Vector3::new((0.7 * f64::from(i)).sin(), (1.3 * f64::from(i)).cos(), (0.4 * f64::from(i)).sin()));
+        turning.chain([1e-2, 1e-5, -1e-9, 0.0].map(push)).collect()
+    }
+
+    #[test]
+    fn the_certificate_holds_at_any_twist_and_is_tight_at_the_solution() {
+        let area = area();
+        let field = Field { area: &area, p: [1.0, 0.4, -0.3] };
+        let rotation = |v| dissipation(&[field], v).gradient;
+        for w in loads(&field) {
+            let exact = solve(&[field], w, None, Refiner::Newton);
+            let tight = certificate(w, exact.twist, &support(&field, exact.twist), rotation);
+            assert!((tight.lower / exact.mu - 1.0).abs() < 1e-13 && (tight.upper / exact.mu - 1.0).abs() < 1e-11, "{w:?} {exact:?} {tight:?}");
+            for turn in [1e-3, 0.1, 0.5] {
+                let v = exact.twist + turn * exact.twist.norm() * Vector3::new(0.5, 0.7, -0.5);
+                let Bounds { lower, upper } = certificate(w, v, &support(&field, v), rotation);
+                assert!(lower <= exact.mu * (1.0 + 1e-13) && exact.mu <= upper * (1.0 + 1e-13), "{w:?} {turn}: {lower} {} {upper}", exact.mu);
+            }
         }
     }
-    Bounds { lower, upper: upper.max(lower) }
+
+    #[test]
+    fn the_step_without_an_evaluation_leaves_no_error() {
+        let area = area();
+        let field = Field { area: &area, p: [1.0, 0.4, -0.3] };
+        for w in loads(&field) {
+            let found = solve(&[field], w, None, Refiner::Newton);
+            let at = dissipation(&[field], found.twist);
+            let residual = (at.value * at.gradient - w).amax() / w.amax();
+            assert!(residual < 1e-11 && (at.value / found.mu - 1.0).abs() < 1e-11, "{w:?} {found:?} {residual:e}");
+            // The maximum of (w.v)/D(v) is flat: the value is right to the square of the twist's error.
+            assert!((w.dot(&found.twist) / at.value / found.mu - 1.0).abs() < 1e-14, "{w:?} {found:?}");
+        }
+    }
 }
