@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use clap::{Args as ClapArgs, ValueEnum};
 use comfy_table::{CellAlignment, Table, presets};
-use gripfast::backend::{Polish, ScoreOptions};
+use gripfast::backend::{Best, Polish, ScoreOptions};
 use gripfast::error::{Error, Result};
 use gripfast::gripper::{self, Gripper};
 use gripfast::load::LoadSet;
@@ -83,7 +83,7 @@ pub(crate) struct Args {
     /// Pads that separate under a load: solve with the contact left, or discard the grip as the paper does.
     #[arg(long, value_enum, default_value = "solve", help_heading = "Scoring")]
     separation: SeparationArg,
-    /// Which loads get the final f64 solution: those that can be the worst, or all (kept in the result).
+    /// What gets the final f64 solution: the loads that can be a grip's worst; the same, and only for grips that can be among the best ones kept; or all loads (kept in the result).
     #[arg(long, value_enum, default_value = "worst", help_heading = "Scoring")]
     polish: PolishArg,
     /// Minimiser that polishes the final answers.
@@ -99,9 +99,9 @@ pub(crate) struct Args {
     /// Print grips that differ in place, face pair and approach.
     #[arg(long, help_heading = "Output")]
     diverse: bool,
-    /// Best grips to keep in the result file.
-    #[arg(long, default_value_t = 10_000, help_heading = "Output")]
-    keep: usize,
+    /// Best grips to keep in the result file [default: 10000; with --polish top as many as --top prints].
+    #[arg(long, value_name = "N", help_heading = "Output")]
+    keep: Option<usize>,
     /// Result file (JSON).
     #[arg(long, short, help_heading = "Output")]
     output: Option<PathBuf>,
@@ -122,7 +122,19 @@ pub(crate) struct Args {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum PolishArg {
     Worst,
+    Top,
     All,
+}
+
+/// Grips kept in the result file where `--keep` is not given.
+const KEEP: usize = 10_000;
+
+impl Args {
+    /// How many of the best grips are kept. A choice of grips that differ needs more than it shows.
+    fn kept(&self) -> usize {
+        let few = self.polish == PolishArg::Top && !self.diverse;
+        self.keep.unwrap_or(if few { 0 } else { KEEP }).max(self.top).max(1)
+    }
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
@@ -158,6 +170,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             refiner: args.refiner.into(),
         },
     };
+    if args.polish == PolishArg::Top && settings.weights.k1 < 0.0 {
+        return Err(Error::input("--polish top", "needs a score that falls with mu_s, and --k1 is negative", "use --polish worst").into());
+    }
     let seeds = args.backend.seed_set()?;
 
     let part = Part::read(&args.part, &ReadOptions { unit: args.unit })?;
@@ -181,11 +196,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let stop = stop_on_interrupt();
     let bar = progress(proposer.candidates(), args.quiet);
-    let assessor = Assessor { loads: &cases, mass, settings: &settings, backend: &selection.backend, seeds: &seeds };
+    let best = (args.polish == PolishArg::Top).then(|| Mutex::new(Best::new(args.kept())));
+    let assessor = Assessor { loads: &cases, mass, settings: &settings, backend: &selection.backend, seeds: &seeds, best };
     let mut collector = Collector::default();
-    let mut complete = true;
+    let (mut complete, mut outranked) = (true, 0);
     for chunk in proposer.by_ref() {
-        collector.add(assessor.assess(chunk.grips)?, args.keep.max(args.top), settings.weights);
+        let proposed = chunk.grips.len();
+        let assessed = assessor.assess(chunk.grips)?;
+        outranked += (proposed - assessed.len()) as u64;
+        collector.add(assessed, args.kept(), settings.weights);
         bar.inc(chunk.candidates);
         bar.set_message(format!("{} grips", collector.ranked()));
         if stop.load(Ordering::Relaxed) {
@@ -202,11 +221,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let ranking = collector.finish(
         mass.centre_of_mass,
         (high - low).length(),
-        &rank::Options { weights: settings.weights, keep_flips: args.candidates.flips(), top: Some(args.keep.max(args.top)), ..rank::Options::default() },
+        &rank::Options { weights: settings.weights, keep_flips: args.candidates.flips(), top: Some(args.kept()), ..rank::Options::default() },
     );
     let mut rejections = proposer.tally().rejections.clone();
     for (reason, count) in &ranking.rejections {
         *rejections.entry(reason.clone()).or_default() += count;
+    }
+    if outranked > 0 {
+        rejections.insert(OUTRANKED.to_owned(), outranked);
     }
     let mut grips = ranking.grips;
     assessor.finish(&mut grips);
@@ -217,7 +239,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             gripfast: env!("CARGO_PKG_VERSION").into(),
             command: std::env::args().collect(),
             backend: selection.backend.name(),
-            settings: describe(&settings, &propose, &gripper, seeds.len(), complete),
+            settings: describe(&settings, &args, &propose, &gripper, seeds.len(), complete),
         },
         part: PartSummary {
             file: args.part.display().to_string(),
@@ -323,7 +345,14 @@ fn progress(total: u64, quiet: bool) -> ProgressBar {
     bar
 }
 
-fn describe(settings: &Settings, propose: &ProposeOptions, gripper: &Gripper, seeds: usize, complete: bool) -> BTreeMap<String, serde_json::Value> {
+fn describe(
+    settings: &Settings,
+    args: &Args,
+    propose: &ProposeOptions,
+    gripper: &Gripper,
+    seeds: usize,
+    complete: bool,
+) -> BTreeMap<String, serde_json::Value> {
     let mut all: BTreeMap<String, serde_json::Value> =
         CandidateArgs::settings(propose, gripper).into_iter().map(|(name, value)| (name.to_string(), value)).collect();
     all.extend([
@@ -335,12 +364,15 @@ fn describe(settings: &Settings, propose: &ProposeOptions, gripper: &Gripper, se
         ("pad_friction".to_string(), settings.pad_friction.into()),
         ("separation".to_string(), format!("{:?}", settings.score.separation).to_lowercase().into()),
         ("refiner".to_string(), format!("{:?}", settings.score.refiner).to_lowercase().into()),
-        ("polish".to_string(), format!("{:?}", settings.score.polish).to_lowercase().into()),
+        ("polish".to_string(), format!("{:?}", args.polish).to_lowercase().into()),
         ("seeds".to_string(), seeds.into()),
         ("complete".to_string(), complete.into()),
     ]);
     all
 }
+
+/// Among the rejections in the summary: grips left unsolved because they cannot be among the best ones asked for.
+const OUTRANKED: &str = "outranked";
 
 /// The table a user reads.
 fn print(out: &mut impl Write, set: &GripSet, args: &Args, gripper: &Gripper, force: f64) -> anyhow::Result<()> {
@@ -368,8 +400,11 @@ fn print(out: &mut impl Write, set: &GripSet, args: &Args, gripper: &Gripper, fo
         set.summary.candidates,
         set.summary.ranked
     )?;
-    if !set.summary.rejections.is_empty() {
-        let mut reasons: Vec<_> = set.summary.rejections.iter().collect();
+    if let Some(outranked) = set.summary.rejections.get(OUTRANKED) {
+        writeln!(out, "{outranked} more were not solved: their bounds put them behind the best {}", args.kept())?;
+    }
+    let mut reasons: Vec<_> = set.summary.rejections.iter().filter(|(reason, _)| *reason != OUTRANKED).collect();
+    if !reasons.is_empty() {
         reasons.sort_by(|a, b| b.1.cmp(a.1));
         writeln!(out, "rejected: {}", reasons.iter().map(|(reason, count)| format!("{count} {}", reason.replace('_', " "))).collect::<Vec<_>>().join(", "))?;
     }
