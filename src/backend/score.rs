@@ -50,7 +50,7 @@ pub struct Scored {
     /// twisting out ([`TwistOut::margin`]); else the load with the largest `mu_s`. The first of those that tie. `None`
     /// without loads, and for a grip that is `outranked`.
     pub worst: Option<(usize, Score)>,
-    /// Answers of all loads under [`Polish::All`], else empty.
+    /// Answers of all loads under [`Polish::All`], mostly without [`Score::bounds`]; else empty.
     pub all: Vec<Score>,
     /// Loads for which the seven equations were solved.
     pub solved: usize,
