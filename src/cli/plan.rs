@@ -24,7 +24,7 @@ use gripfast::results::{self, GripSet, PartSummary, Provenance, RankedGrip, Summ
 use gripfast::units::Quantity;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::backend::BackendArgs;
+use super::backend::{self, BackendArgs};
 use super::candidates::CandidateArgs;
 use super::solve::{RefinerArg, SeparationArg};
 use super::why;
@@ -138,9 +138,7 @@ impl Args {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    if let Some(threads) = args.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
-    }
+    backend::use_threads(args.threads)?;
     let note = |text: &str| {
         if !args.quiet {
             eprintln!("{text}");

@@ -215,7 +215,7 @@ fn a_record_that_was_not_written_is_an_error() {
     let wrenches: Vec<Wrench> = (0..130).map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 }).collect();
     let batch = Batch { problems: vec![Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches }] };
     let job = Job::new(&batch, &set).unwrap();
-    let mut run = |forget: bool| {
+    let run = |forget: bool| {
         let mut answers = vec![super::super::not_searched(SeedStatus::NoContact); job.loads];
         let mut plans = job.plans(gpu.limits(), &mut answers).into_iter();
         let next = || {
