@@ -4,7 +4,7 @@
 @group(0) @binding(0) var<storage, read> contacts: array<ContactHeader>;
 @group(0) @binding(1) var<storage, read> edges: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> twists: array<vec4<f32>>;
-@group(0) @binding(3) var<storage, read_write> basis_out: array<f32>;
+@group(0) @binding(3) var<storage, read_write> basis_out: array<vec4<f32>>;
 @group(0) @binding(4) var<uniform> gauss: array<vec4<f32>, GAUSS_POINTS>;
 
 // Rows: weights 1, x1, x2; in each g1, g2, torque.
@@ -120,7 +120,7 @@ fn basis(first: u32, end: u32, radius: f32, v: vec3<f32>) -> Basis {
     return basis_far(first, end, v);
 }
 
-// One invocation per twist and contact; the array is [contact][face][component][twist].
+// One invocation per twist and contact; the array is [contact][face][twist][weight].
 @compute @workgroup_size(BASIS_GROUP)
 fn fill_basis(@builtin(global_invocation_id) id: vec3<u32>) {
     let count = arrayLength(&twists);
@@ -132,16 +132,11 @@ fn fill_basis(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var face = 0u; face < header.faces; face++) {
         let first = select(header.edges_ii, header.edges_i, face == 0u);
         let end = select(header.edges_end, header.edges_ii, face == 0u);
-        let g = basis(first, end, header.radius, twists[k].xyz);
-        let out = header.basis + face * BASIS * count + k;
-        basis_out[out] = g.one.x;
-        basis_out[out + count] = g.one.y;
-        basis_out[out + 2u * count] = g.one.z;
-        basis_out[out + 3u * count] = g.x1.x;
-        basis_out[out + 4u * count] = g.x1.y;
-        basis_out[out + 5u * count] = g.x1.z;
-        basis_out[out + 6u * count] = g.x2.x;
-        basis_out[out + 7u * count] = g.x2.y;
-        basis_out[out + 8u * count] = g.x2.z;
+        let v = twists[k].xyz;
+        let g = basis(first, end, header.radius, v);
+        let out = header.basis + (face * count + k) * BASIS;
+        basis_out[out] = vec4(g.one, dot(v, g.one));
+        basis_out[out + 1u] = vec4(g.x1, dot(v, g.x1));
+        basis_out[out + 2u] = vec4(g.x2, dot(v, g.x2));
     }
 }

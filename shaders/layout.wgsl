@@ -11,6 +11,7 @@ override COUPLING_MARGIN: f32;
 override COUPLED_SHARE: f32;
 override LEAST_VARIATION: f32;
 override TILT_LIMIT: f32;
+override LEAST_DISSIPATION: f32;
 override DEGENERATE: f32;
 override OUT_OF_RANGE: f32;
 override BOUNDED: u32;
@@ -19,7 +20,7 @@ override COUPLED: u32;
 // Dispatches are two-dimensional: a workgroup's number is x + GRID y.
 override GRID: u32;
 
-const BASIS = 9u;
+const BASIS = 3u;
 const RING = 6u;
 const GAUSS_POINTS = 6u;
 const NEGATED = 0x80000000u;

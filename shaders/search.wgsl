@@ -6,7 +6,7 @@
 @group(0) @binding(1) var<storage, read> edges: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> twists: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> rings: array<u32>;
-@group(0) @binding(4) var<storage, read> basis: array<f32>;
+@group(0) @binding(4) var<storage, read> basis: array<vec4<f32>>;
 @group(0) @binding(5) var<storage, read> loads: array<LoadRecord>;
 @group(0) @binding(6) var<storage, read> groups: array<GroupRecord>;
 @group(0) @binding(7) var<storage, read_write> seeds: array<SeedRecord>;
@@ -23,23 +23,22 @@ struct Planes {
     full: bool,
 }
 
-fn component(header: ContactHeader, face: u32, index: u32, twist: u32) -> f32 {
-    return basis[header.basis + (face * BASIS + index) * arrayLength(&twists) + twist];
+// Gradient at a twist on a face for the weight 1, x1 or x2, and its product with the twist.
+fn gradient(header: ContactHeader, face: u32, weight: u32, twist: u32) -> vec4<f32> {
+    return basis[header.basis + (face * arrayLength(&twists) + twist) * BASIS + weight];
 }
 
 fn free_share(header: ContactHeader, mean_i: f32, mean_ii: f32, slope: vec2<f32>) -> f32 {
-    var share = 1.0;
-    for (var i = header.edges_i; i < header.edges_end; i++) {
-        let on_i = i < header.edges_ii;
-        let centroid = select(header.centroid_ii, header.centroid_i, on_i);
-        let mean = select(mean_ii, mean_i, on_i);
-        let sign = select(-1.0, 1.0, on_i);
-        let drop = -sign * (slope.x * (edges[i].x - centroid.x) + slope.y * (edges[i].y - centroid.y));
-        if drop * share > mean {
-            share = mean / drop;
-        }
+    var drop_i = 0.0;
+    for (var i = header.edges_i; i < header.edges_ii; i++) {
+        drop_i = max(drop_i, -dot(slope, edges[i].xy - header.centroid_i));
     }
-    return share;
+    var drop_ii = 0.0;
+    for (var i = header.edges_ii; i < header.edges_end; i++) {
+        drop_ii = max(drop_ii, dot(slope, edges[i].xy - header.centroid_ii));
+    }
+    // Exactly 1 where nothing lifts: a quotient of equal numbers need not be.
+    return min(select(1.0, mean_i / drop_i, drop_i > mean_i), select(1.0, mean_ii / drop_ii, drop_ii > mean_ii));
 }
 
 fn planes(header: ContactHeader, load: LoadRecord) -> Planes {
@@ -54,34 +53,30 @@ fn planes(header: ContactHeader, load: LoadRecord) -> Planes {
     let cii = header.centroid_ii;
     let k = header.compliance;
     let right = vec2(-load.m2, load.m1) - n_i * ci + n_ii * cii;
-    let full = vec2(k.x * right.x + k.y * right.y, k.y * right.x + k.z * right.y);
-    var share = free_share(header, mean_i, mean_ii, full);
+    let whole = vec2(k.x * right.x + k.y * right.y, k.y * right.x + k.z * right.y);
+    var share = free_share(header, mean_i, mean_ii, whole);
     let full_contact = share >= 1.0;
     if !full_contact {
         share = TILT_LIMIT * share;
     }
-    let slope = share * full;
+    let slope = share * whole;
     return Planes(mean_i - slope.x * ci.x - slope.y * ci.y, mean_ii + slope.x * cii.x + slope.y * cii.y, slope, full_contact);
-}
-
-fn support_component(header: ContactHeader, p: Planes, twist: u32, m: u32) -> f32 {
-    if header.faces == 1u {
-        return (p.at_i + p.at_ii) * component(header, 0u, m, twist);
-    }
-    return p.at_i * component(header, 0u, m, twist)
-        + p.at_ii * component(header, 1u, m, twist)
-        + p.slope.x * (component(header, 0u, 3u + m, twist) - component(header, 1u, 3u + m, twist))
-        + p.slope.y * (component(header, 0u, 6u + m, twist) - component(header, 1u, 6u + m, twist));
 }
 
 fn sign_of(entry: u32) -> f32 {
     return select(1.0, -1.0, (entry & NEGATED) != 0u);
 }
 
+// Gradient of the dissipation at the twist of a ring entry.
 fn support(header: ContactHeader, p: Planes, entry: u32) -> vec3<f32> {
     let twist = entry & ~NEGATED;
-    return sign_of(entry)
-        * vec3(support_component(header, p, twist, 0u), support_component(header, p, twist, 1u), support_component(header, p, twist, 2u));
+    let one = gradient(header, 0u, 0u, twist).xyz;
+    if header.faces == 1u {
+        return sign_of(entry) * ((p.at_i + p.at_ii) * one);
+    }
+    let x1 = gradient(header, 0u, 1u, twist).xyz - gradient(header, 1u, 1u, twist).xyz;
+    let x2 = gradient(header, 0u, 2u, twist).xyz - gradient(header, 1u, 2u, twist).xyz;
+    return sign_of(entry) * (p.at_i * one + p.at_ii * gradient(header, 1u, 0u, twist).xyz + p.slope.x * x1 + p.slope.y * x2);
 }
 
 fn full_contact(header: ContactHeader, load: LoadRecord, mu: f32, g0: vec2<f32>, g1: vec2<f32>, g2: vec2<f32>) -> bool {
@@ -135,21 +130,26 @@ fn coupled_share(header: ContactHeader, load: LoadRecord, p: Planes, upper: f32)
     let square = q.x * z1 * z1 + q.y * z2 * z2 + q.w * z3 * z3 + header.variation_slope.y * z4 * z4;
     let mixed = z1 * (q.z * z2 + r.x * z3 + r.y * z4) + z2 * (r.z * z3 + r.w * z4) + header.variation_slope.x * z3 * z4;
     let variation = sqrt(max(square + 2.0 * mixed, 0.0)) + LEAST_VARIATION;
-    var steepest = 0.0;
+    var far = 0.0;
+    var pressure = 1.0;
     for (var i = header.edges_i; i < header.edges_end; i++) {
         let on_i = i < header.edges_ii;
         let along = p.slope.x * edges[i].x + p.slope.y * edges[i].y;
         let offset = edges[i].xy - select(header.centroid_ii, header.centroid_i, on_i);
-        let pressure = select(p.at_ii - along, p.at_i + along, on_i);
+        let here = select(p.at_ii - along, p.at_i + along, on_i);
         let least = CONTACT_MARGIN * select(abs(p.at_ii), abs(p.at_i), on_i);
-        if pressure <= least {
+        if !(here > least) {
             return -1.0;
         }
-        steepest = max(steepest, (offset.x * offset.x + offset.y * offset.y) / (pressure * pressure));
+        let distance = offset.x * offset.x + offset.y * offset.y;
+        if distance * pressure > far * here * here {
+            far = distance;
+            pressure = here * here;
+        }
     }
     let reach = 0.5 * header.softness * abs(load.distance) * mu;
     let c = 1.0 - reach * header.spread;
-    let b = reach * variation * sqrt(steepest);
+    let b = reach * variation * sqrt(far / pressure);
     if c <= 0.0 || c * c <= 4.0 * b {
         return -1.0;
     }
@@ -157,60 +157,56 @@ fn coupled_share(header: ContactHeader, load: LoadRecord, p: Planes, upper: f32)
     return select(-1.0, share, share <= COUPLED_SHARE);
 }
 
-fn twist_of(entry: u32) -> vec3<f32> {
-    return sign_of(entry) * twists[entry & ~NEGATED].xyz;
-}
-
-fn mix_component(header: ContactHeader, triangle: vec3<u32>, share: vec3<f32>, index: u32) -> f32 {
-    return sign_of(triangle.x) * share.x * component(header, 0u, index, triangle.x & ~NEGATED)
-        + sign_of(triangle.y) * share.y * component(header, 0u, index, triangle.y & ~NEGATED)
-        + sign_of(triangle.z) * share.z * component(header, 0u, index, triangle.z & ~NEGATED);
-}
-
-fn finish(header: ContactHeader, load: LoadRecord, p: Planes, best_twist: u32, value: f32) -> SeedRecord {
-    let w = load.wrench;
-    var best = best_twist;
-    if dot(w, twist_of(best)) < 0.0 {
-        best = best ^ NEGATED;
-    }
-    let flip = best & NEGATED;
-    let ring = RING * (best & ~NEGATED);
+// Bound and interpolated twist from the triangles round the best twist. In each triangle w = a ga + b gb + c gc by
+// Cramer's rule; two of its numerators are products with ga x w.
+fn finish(header: ContactHeader, load: LoadRecord, p: Planes, best: u32, value: f32) -> SeedRecord {
+    let own = twists[best].xyz;
+    let sense = select(1.0, -1.0, dot(load.wrench, own) < 0.0);
+    let w = sense * load.wrench;
+    let ring = RING * best;
     let ga = support(header, p, best);
+    let u = cross(ga, w);
     var upper = LARGEST;
     var triangle = vec3(best);
-    var share = vec3(1.0, 0.0, 0.0);
-    var here = rings[ring] ^ flip;
+    var share = vec3(0.0);
+    var here = rings[ring];
     var gb = support(header, p, here);
     for (var i = 0u; i < RING; i++) {
-        let next = rings[ring + (i + 1u) % RING] ^ flip;
+        let next = rings[ring + (i + 1u) % RING];
         let gc = support(header, p, next);
         let normal = cross(gb, gc);
         let det = dot(ga, normal);
         if abs(det) > DEGENERATE {
-            let shares = vec3(dot(w, normal), dot(w, cross(gc, ga)), dot(w, cross(ga, gb))) / det;
-            let total = abs(shares.x) + abs(shares.y) + abs(shares.z);
-            if total < upper {
+            let numerators = select(1.0, -1.0, det < 0.0) * vec3(dot(w, normal), dot(u, gc), -dot(u, gb));
+            let sum = abs(numerators.x) + abs(numerators.y) + abs(numerators.z);
+            let total = sum / abs(det);
+            if total < upper && sum > 0.0 {
                 upper = total;
                 triangle = vec3(best, here, next);
-                share = shares / total;
+                share = numerators / sum;
             }
         }
         here = next;
         gb = gc;
     }
-    var twist = share.x * twist_of(triangle.x) + share.y * twist_of(triangle.y) + share.z * twist_of(triangle.z);
+    share = sense * share * vec3(1.0, sign_of(triangle.y), sign_of(triangle.z));
+    triangle = triangle & vec3(~NEGATED);
+    var twist = share.x * twists[triangle.x].xyz + share.y * twists[triangle.y].xyz + share.z * twists[triangle.z].xyz;
     let length = sqrt(dot(twist, twist));
     if length > 0.5 {
         twist = twist / length;
     } else {
-        twist = twist_of(best);
+        twist = sense * own;
     }
     var status = UNBOUNDED;
     if header.faces == 1u && upper < LARGEST {
-        let g0 = vec2(mix_component(header, triangle, share, 0u), mix_component(header, triangle, share, 1u));
-        let g1 = vec2(mix_component(header, triangle, share, 3u), mix_component(header, triangle, share, 4u));
-        let g2 = vec2(mix_component(header, triangle, share, 6u), mix_component(header, triangle, share, 7u));
-        if full_contact(header, load, load.scale * upper, g0, g1, g2) {
+        var g: array<vec2<f32>, 3>;
+        for (var weight = 0u; weight < 3u; weight++) {
+            g[weight] = share.x * gradient(header, 0u, weight, triangle.x).xy
+                + share.y * gradient(header, 0u, weight, triangle.y).xy
+                + share.z * gradient(header, 0u, weight, triangle.z).xy;
+        }
+        if full_contact(header, load, load.scale * upper, g[0], g[1], g[2]) {
             status = BOUNDED;
         }
     }
@@ -223,15 +219,7 @@ fn finish(header: ContactHeader, load: LoadRecord, p: Planes, best_twist: u32, v
             upper = upper / (1.0 - coupled);
         }
     }
-    return SeedRecord(twist, lower, upper, status, best & ~NEGATED, 0u);
-}
-
-// Product of a twist with its part of the gradient basis: the dissipation's part for one face and weight.
-fn part(header: ContactHeader, face: u32, weight: u32, k: u32) -> f32 {
-    let v = twists[k];
-    return v.x * component(header, face, 3u * weight, k)
-        + v.y * component(header, face, 3u * weight + 1u, k)
-        + v.z * component(header, face, 3u * weight + 2u, k);
+    return SeedRecord(twist, lower, upper, status, best, 0u);
 }
 
 @compute @workgroup_size(GROUP)
@@ -249,21 +237,23 @@ fn search(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
     let count = arrayLength(&twists);
     let congruent = header.faces == 1u;
     let mean = 2.0 / header.area_i;
+    // The best quotient value / least: power over dissipation, compared without a division for each.
     var best = 0u;
     var value = -1.0;
+    var least = 1.0;
     for (var first = 0u; first < count; first += GROUP) {
         let k = first + lane;
         if k < count {
-            let one = part(header, 0u, 0u, k);
+            let one = gradient(header, 0u, 0u, k).w;
             if congruent {
                 tile_twist[lane] = twists[k] / (mean * one);
             } else {
                 tile_twist[lane] = twists[k];
                 tile_parts[lane] = vec4(
                     one,
-                    part(header, 1u, 0u, k),
-                    part(header, 0u, 1u, k) - part(header, 1u, 1u, k),
-                    part(header, 0u, 2u, k) - part(header, 1u, 2u, k),
+                    gradient(header, 1u, 0u, k).w,
+                    gradient(header, 0u, 1u, k).w - gradient(header, 1u, 1u, k).w,
+                    gradient(header, 0u, 2u, k).w - gradient(header, 1u, 2u, k).w,
                 );
             }
         }
@@ -279,9 +269,11 @@ fn search(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
             }
         } else {
             for (var j = 0u; j < tile; j++) {
-                let mu = abs(dot(w, tile_twist[j].xyz)) / dot(pressure, tile_parts[j]);
-                if mu > value {
-                    value = mu;
+                let power = abs(dot(w, tile_twist[j].xyz));
+                let d = max(dot(pressure, tile_parts[j]), LEAST_DISSIPATION);
+                if power * least > value * d {
+                    value = power;
+                    least = d;
                     best = first + j;
                 }
             }
@@ -289,6 +281,6 @@ fn search(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
         workgroupBarrier();
     }
     if wanted {
-        seeds[index] = finish(header, load, p, best, value);
+        seeds[index] = finish(header, load, p, best, value / least);
     }
 }

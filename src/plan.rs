@@ -7,12 +7,13 @@ pub mod compare;
 pub mod noise;
 
 use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
 
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::backend::{Backend, Batch, Problem, ScoreOptions, Scored, SeedSet};
+use crate::backend::{Backend, Batch, Best, Problem, ScoreOptions, Scored, SeedSet};
 use crate::error::Result;
 use crate::geometry::patch_area;
 use crate::load::wrench_in_grip;
@@ -53,6 +54,8 @@ pub struct Assessor<'a> {
     pub backend: &'a Backend,
     /// The twists tried.
     pub seeds: &'a SeedSet,
+    /// Where only the best grips are wanted: the merits so far. `k1` must not be negative then.
+    pub best: Option<Mutex<Best>>,
 }
 
 /// Loads of one call of the backend: bounds the memory whatever the number of grips and loads.
@@ -60,7 +63,7 @@ const LOADS_AT_ONCE: usize = 1 << 20;
 
 impl Assessor<'_> {
     /// Scores every grip under its worst load, in order. The answers depend neither on the number of threads nor on the
-    /// backend.
+    /// backend. With [`Assessor::best`] the grips whose bounds show that they cannot be among the best are left out.
     ///
     /// # Errors
     /// As [`Backend::score`].
@@ -82,9 +85,26 @@ impl Assessor<'_> {
         let problems = grips.iter().zip(&wrenches);
         let problems = problems.map(|(grip, wrenches)| Problem { contact: &grip.contact, distance: grip.distance(), force: self.settings.force, wrenches });
         let batch = Batch { problems: problems.collect() };
-        let scored = self.backend.score(&batch, self.seeds, &self.settings.score)?;
-        let jobs = grips.into_par_iter().zip(wrenches.par_iter()).zip(scored);
+        let scored = match &self.best {
+            None => self.backend.score(&batch, self.seeds, &self.settings.score)?,
+            Some(best) => {
+                let alphas: Vec<f64> = grips.par_iter().map(|grip| self.alpha(grip, &TwistOut::new(&grip.contact)).0).collect();
+                let merit = |index: usize, mu: f64| self.settings.weights.score(mu, alphas[index]);
+                let mut best = best.lock().unwrap_or_else(PoisonError::into_inner);
+                self.backend.score_best(&batch, self.seeds, &self.settings.score, &mut best, &merit)?
+            }
+        };
+        let jobs = grips.into_par_iter().zip(wrenches.par_iter()).zip(scored).filter(|(_, scored)| !scored.outranked);
         Ok(jobs.map(|((grip, wrenches), scored)| self.measure(grip, wrenches, &scored)).collect())
+    }
+
+    /// Alpha [rad] and the least lever [m].
+    ///
+    /// The width counts for grips from inside too: jaws that push outwards right a part up to `asin w/d`, which is more than
+    /// `atan w/d`.
+    fn alpha(&self, grip: &Grip, lever: &TwistOut) -> (f64, f64) {
+        let least = lever.least_lever().map_or(0.0, |lever| lever.width);
+        (twist_out::alpha(grip.width, least, self.settings.delta, self.settings.mu_c), least)
     }
 
     /// A grip's numbers from its worst load; what takes more solving is left to [`Assessor::finish`].
@@ -92,14 +112,13 @@ impl Assessor<'_> {
         let (load, score) = scored.worst.unwrap_or((0, refused(Status::NoContact, 0)));
         let wrench = wrenches.get(load).copied().unwrap_or_default();
         let lever = TwistOut::new(&grip.contact);
-        let least = lever.least_lever().map_or(0.0, |lever| lever.width);
+        let (alpha, least) = self.alpha(&grip, &lever);
         let share = |left: f64, patch: &Patch| left / patch_area(patch);
         let contact_share = share(score.contact_area_i, &grip.contact.face_i).min(share(score.contact_area_ii, &grip.contact.face_ii));
         RankedGrip {
             rank: 0,
             score: None,
-            // The width for grips from inside too: jaws that push outwards right a part up to `asin w/d`, which is more than `atan w/d`.
-            alpha: twist_out::alpha(grip.width, least, self.settings.delta, self.settings.mu_c),
+            alpha,
             delta_d: twist_out::delta_d(grip.width, least),
             contact_share,
             twist_margin: lever.margin(self.settings.force, &wrench),
@@ -138,16 +157,24 @@ impl Assessor<'_> {
     }
 }
 
+/// Among the rejections of a run: grips left unsolved because their bounds put them behind the best ones kept.
+pub const OUTRANKED: &str = "outranked";
+
+/// Scores closer than this share may tie in the ranking ([`rank::TIE`], neighbour by neighbour).
+const CLOSE: f64 = 1e-6;
+
 /// Collects scored grips chunk by chunk, keeping the best.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Collector {
     kept: Vec<RankedGrip>,
+    /// Number of kept grips at which the next cut is worth it.
+    full: usize,
     ranked: u64,
     rejections: BTreeMap<String, u64>,
 }
 
 impl Collector {
-    /// Takes a chunk; afterwards at most `2 keep` grips and the chunk are held.
+    /// Takes a chunk; afterwards at most `2 keep` grips, those that tie with them, and the chunk are held.
     pub fn add(&mut self, grips: Vec<RankedGrip>, keep: usize, weights: Weights) {
         for mut grip in grips {
             match grip.worst.mu_s.filter(|_| grip.worst.status.holds()) {
@@ -160,11 +187,27 @@ impl Collector {
                 None => *self.rejections.entry(rank::status_name(grip.worst.status)).or_default() += 1,
             }
         }
-        if self.kept.len() > keep.saturating_mul(2) {
+        if self.kept.len() > keep.saturating_mul(2).max(self.full) {
             let value = |grip: &RankedGrip| grip.score.unwrap_or(f64::INFINITY);
             self.kept.sort_by(|a, b| value(b).total_cmp(&value(a)).then(a.grip.id.cmp(&b.grip.id)));
-            self.kept.truncate(keep);
+            // Those that tie with the last one stay: the ranking orders ties by id, and all of them must be there.
+            let last = self.kept.get(keep.max(1) - 1).map_or(f64::NEG_INFINITY, value);
+            let least = if last.is_finite() { last - CLOSE * last.abs() } else { last };
+            self.kept.truncate(self.kept.partition_point(|grip| value(grip) >= least));
+            self.full = 2 * self.kept.len();
         }
+    }
+
+    /// Counts grips of a chunk that were left unsolved because they cannot be among the best.
+    pub fn outrank(&mut self, grips: u64) {
+        if grips > 0 {
+            *self.rejections.entry(OUTRANKED.to_owned()).or_default() += grips;
+        }
+    }
+
+    /// Scores of the best grips so far, infinite where no friction is needed.
+    pub fn scores(&self) -> impl Iterator<Item = f64> {
+        self.kept.iter().map(|grip| grip.score.unwrap_or(f64::INFINITY))
     }
 
     /// Grips ranked so far.

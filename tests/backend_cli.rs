@@ -149,3 +149,32 @@ fn devices_and_bench_write_json() {
     assert_eq!(results.len(), 7 * if devices.is_empty() { 1 } else { 2 });
     assert!(results.iter().all(|row| row["loads_per_second"].as_f64().unwrap() > 0.0), "{report}");
 }
+
+/// `--polish top` prints the table of `--polish worst` and says how many grips it left out.
+#[test]
+fn polish_top_gives_the_same_best_grips() {
+    let bracket = concat!(env!("CARGO_MANIFEST_DIR"), "/data/parts/l_bracket.stl");
+    let plan = |more: &[&str]| {
+        let common =
+            ["plan", bracket, "--gripper", "robotiq-2f85", "--mass", "350g", "--backend", "cpu", "--loads", "ball:60", "--spacing", "4mm", "--json", "-q"];
+        let arguments: Vec<&str> = common.iter().chain(more).copied().collect();
+        let set: Value = serde_json::from_str(&run(&arguments, "", 0).0).unwrap();
+        set
+    };
+    let numbers = |set: &Value| set["grips"].as_array().unwrap().iter().take(7).cloned().collect::<Vec<_>>();
+    let whole = plan(&["--top", "7"]);
+    let held = whole["grips"].as_array().unwrap().len() as u64;
+    for threads in ["1", "3"] {
+        let best = plan(&["--top", "7", "--polish", "top", "--threads", threads]);
+        assert_eq!(numbers(&best), numbers(&whole));
+        assert_eq!(best["grips"].as_array().unwrap().len(), 7);
+        let (solved, left) = (best["summary"]["ranked"].as_u64().unwrap(), best["summary"]["rejections"]["outranked"].as_u64().unwrap());
+        assert!(solved + left == held && left > held / 2, "{solved} and {left} of {held}");
+    }
+    // Enough kept for a choice of grips that differ, and a word in the table.
+    let common = ["plan", bracket, "--gripper", "robotiq-2f85", "--mass", "350g", "--backend", "cpu", "--loads", "ball:60", "--spacing", "4mm", "-q"];
+    let with = |more: &[&'static str]| [common.as_slice(), more].concat();
+    assert_eq!(run(&with(&["--diverse", "--polish", "top"]), "", 0).0, run(&with(&["--diverse"]), "", 0).0);
+    assert!(run(&with(&["--polish", "top"]), "", 0).0.contains("more were not solved"));
+    assert!(run(&with(&["--polish", "top", "--k1=-1"]), "", 2).1.contains("--polish worst"));
+}

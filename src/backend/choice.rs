@@ -56,7 +56,8 @@ fn open(choice: Choice, adapter: Option<&str>) -> Result<Selection> {
     match super::Gpu::open(adapter, choice == Choice::Gpu) {
         Ok(gpu) => {
             let software = if gpu.is_software() { " (software: right answers, no speed)" } else { "" };
-            let why = if choice == Choice::Gpu { "asked for" } else { "auto, found" };
+            let named = adapter.is_some() || named_in_environment();
+            let why = if choice == Choice::Gpu || named { "asked for" } else { "auto, found" };
             Ok(Selection { reason: format!("gpu: {why} {}{software}", gpu.name()), backend: Backend::Gpu(Box::new(gpu)) })
         }
         Err(Error::Backend(why)) if choice == Choice::Auto && adapter.is_none() && !named_in_environment() => {

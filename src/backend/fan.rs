@@ -4,10 +4,10 @@
 //! where `v(x) = (u1 - omega x2, u2 + omega x1)`. Pressure times these is the gradient of the dissipation; pressure
 //! times these times the twist is the dissipation itself (it is homogeneous of degree one).
 
-use super::layout::{BASIS, EdgeRecord, GAUSS, NEAR_LIMIT, ON_LINE, SERIES_LIMIT};
+use super::layout::{EdgeRecord, GAUSS, NEAR_LIMIT, ON_LINE, SERIES_LIMIT};
 
 /// Integrals of weights `1, x1, x2` by components `g1, g2, torque`.
-pub(crate) type Basis = [f32; BASIS];
+pub(crate) type Basis = [f32; 9];
 
 /// `asinh(s2/|h|) - asinh(s1/|h|)` of an edge at distance `h` from the apex, from `s1` to `s2` along it.
 pub(crate) fn edge_log(h: f32, l: f32, s1: f32, s2: f32, r1: f32, r2: f32) -> f32 {
@@ -77,42 +77,48 @@ pub(crate) fn basis_near(edges: &[EdgeRecord], v: [f32; 3]) -> Basis {
 }
 
 /// The basis from Gauss points on the triangles (origin, A, B), the integrand in twist form: regular for translations.
-pub(crate) fn basis_far(edges: &[EdgeRecord], v: [f32; 3]) -> Basis {
-    let mut total = [0.0_f32; BASIS];
+/// Takes the components of `LANES` twists and gives the nine numbers of each, side by side.
+#[inline(always)]
+pub(crate) fn basis_far<const LANES: usize>(edges: &[EdgeRecord], v: &[[f32; LANES]; 3]) -> [[f32; LANES]; 9] {
+    let mut total = [[0.0_f32; LANES]; 9];
     for edge in edges {
         // One sum per edge: with all edges in one, rounding grows with the number of points.
-        let mut sum = [0.0_f32; BASIS];
+        let mut sum = [[0.0_f32; LANES]; 9];
         let twice_area = edge[0] * edge[3] - edge[1] * edge[2];
         for across in GAUSS {
             let (px, py) = (edge[0] + across[0] * (edge[2] - edge[0]), edge[1] + across[0] * (edge[3] - edge[1]));
             for along in GAUSS {
                 let (x1, x2) = (along[0] * px, along[0] * py);
-                let (v1, v2) = (v[0] - v[2] * x2, v[1] + v[2] * x1);
-                let weight = twice_area * across[1] * along[1] * along[0] / (v1 * v1 + v2 * v2).sqrt();
-                let (g1, g2) = (weight * v1, weight * v2);
-                let torque = x1 * g2 - x2 * g1;
-                sum[0] += g1;
-                sum[1] += g2;
-                sum[2] += torque;
-                sum[3] += x1 * g1;
-                sum[4] += x1 * g2;
-                sum[5] += x1 * torque;
-                sum[6] += x2 * g1;
-                sum[7] += x2 * g2;
-                sum[8] += x2 * torque;
+                let area = twice_area * across[1] * along[1] * along[0];
+                for lane in 0..LANES {
+                    let (v1, v2) = (v[0][lane] - v[2][lane] * x2, v[1][lane] + v[2][lane] * x1);
+                    let weight = area / (v1 * v1 + v2 * v2).sqrt();
+                    let (g1, g2) = (weight * v1, weight * v2);
+                    let torque = x1 * g2 - x2 * g1;
+                    sum[0][lane] += g1;
+                    sum[1][lane] += g2;
+                    sum[2][lane] += torque;
+                    sum[3][lane] += x1 * g1;
+                    sum[4][lane] += x1 * g2;
+                    sum[5][lane] += x1 * torque;
+                    sum[6][lane] += x2 * g1;
+                    sum[7][lane] += x2 * g2;
+                    sum[8][lane] += x2 * torque;
+                }
             }
         }
         for (total, sum) in total.iter_mut().zip(sum) {
-            *total += sum;
+            for lane in 0..LANES {
+                total[lane] += sum[lane];
+            }
         }
     }
     total
 }
 
-/// The basis at any twist of one face whose vertices lie within `radius` of the origin.
-pub(crate) fn basis(edges: &[EdgeRecord], radius: f32, v: [f32; 3]) -> Basis {
-    let near = v[0] * v[0] + v[1] * v[1] <= NEAR_LIMIT * NEAR_LIMIT * radius * radius * v[2] * v[2];
-    if near { basis_near(edges, v) } else { basis_far(edges, v) }
+/// Whether the closed forms serve a face whose vertices lie within `radius` of the origin.
+pub(crate) fn is_near(radius: f32, v: [f32; 3]) -> bool {
+    v[0] * v[0] + v[1] * v[1] <= NEAR_LIMIT * NEAR_LIMIT * radius * radius * v[2] * v[2]
 }
 
 #[cfg(test)]
@@ -126,6 +132,14 @@ mod tests {
 
     fn ring(points: &[(f64, f64)]) -> Vec<DVec2> {
         points.iter().map(|&(x, y)| DVec2::new(x, y)).collect()
+    }
+
+    fn far(edges: &[EdgeRecord], v: [f32; 3]) -> Basis {
+        basis_far(edges, &v.map(|x| [x])).map(|[x]| x)
+    }
+
+    fn basis(edges: &[EdgeRecord], radius: f32, v: [f32; 3]) -> Basis {
+        if is_near(radius, v) { basis_near(edges, v) } else { far(edges, v) }
     }
 
     /// A scaled contact face in both precisions.
@@ -210,7 +224,7 @@ mod tests {
             for kappa in [0.5, 1.0, 1.25, 1.5, 1.75, 2.0, 3.0, 10.0] {
                 let twists = || (0..200).map(|i| about(glam::Vec2::from_angle(i as f32 * 0.7) * kappa * face.radius));
                 let near = worst(&face, |v| basis_near(&face.edges, v), twists());
-                let far = worst(&face, |v| basis_far(&face.edges, v), twists());
+                let far = worst(&face, |v| far(&face.edges, v), twists());
                 println!("{:8} {kappa:5}: near {:.1e} {:.1e} {:.1e}  far {:.1e} {:.1e} {:.1e}", face.name, near[0], near[1], near[2], far[0], far[1], far[2]);
                 if kappa == NEAR_LIMIT {
                     assert_small(face.name, near);

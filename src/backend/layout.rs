@@ -12,8 +12,9 @@ pub const GROUP: usize = 64;
 /// Workgroup size of the basis kernel: consecutive twists of one contact.
 pub const BASIS_GROUP: usize = 64;
 
-/// Numbers per face and twist: weights `1, x1, x2` by components `g1, g2, torque`.
-pub const BASIS: usize = 9;
+/// Vectors of four numbers per face and twist: weights `1, x1, x2`; in each the components `g1, g2, torque` and their
+/// product with the twist.
+pub const BASIS: usize = 3;
 
 /// Slip centres nearer than this many circumradii from the origin use the fan's closed forms; the others Gauss points.
 /// The fan loses digits with that distance; six Gauss points per direction are at rounding level from 1.5 on
@@ -39,6 +40,10 @@ pub const LEAST_VARIATION: f32 = 4e-3;
 
 /// Share by which a tilt that would lift a pad is shortened beyond the point of first separation (seeds only).
 pub const TILT_LIMIT: f32 = 0.98;
+
+/// The dissipation of a unit twist is not taken for less than this (it is of order one; rounding can make that of a
+/// sliver negative).
+pub const LEAST_DISSIPATION: f32 = 1e-6;
 
 /// Triangles whose three supports span less than this volume give no bound.
 pub const DEGENERATE: f32 = 1e-12;
@@ -79,7 +84,7 @@ pub struct ContactHeader {
     pub edges_ii: u32,
     /// End of face II's edges.
     pub edges_end: u32,
-    /// First number of this contact in the basis array.
+    /// First vector of this contact in the basis array.
     pub basis: u32,
     /// 1: the faces are congruent and only face I is integrated; 2: both are.
     pub faces: u32,

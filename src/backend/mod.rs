@@ -1,7 +1,7 @@
 //! The seed stage on processor or GPU: for every load the best slip twist of a fixed set, with bounds on `mu_s`.
 //!
 //! The gradient of the dissipation at a twist depends on the contact polygons alone, linearly in the pressure. It is
-//! computed once per distinct contact and twist ([`layout::BASIS`] numbers per face); what is left per load is a small
+//! computed once per distinct contact and twist (nine numbers per face); what is left per load is a small
 //! product and a maximum. The supports of the triangles round the best twist give an upper bound: `w` is a combination
 //! of three gradients, and the sum of its coefficients' magnitudes bounds `mu_s`, because `D` is a norm.
 //!
@@ -20,6 +20,8 @@ mod prepare;
 mod score;
 mod search;
 mod seeds;
+mod table;
+mod top;
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -30,8 +32,9 @@ use rayon::prelude::*;
 pub use gpu::{ADAPTER_VARIABLE, AdapterSummary, Gpu, list as list_adapters};
 
 pub use choice::{Choice, Selection, select};
-pub use score::{Polish, ScoreOptions, Scored, worst};
+pub use score::{Polish, ScoreOptions, Scored};
 pub use seeds::{NEGATED, RING, SeedSet};
+pub use top::Best;
 
 use crate::error::{Error, Result};
 use crate::model::{Contact, Wrench};
@@ -91,6 +94,9 @@ pub struct Seed {
     pub lower: f64,
     /// `mu_s` is at most this (infinite without bounds).
     pub upper: f64,
+    /// `mu_s` is about this: the best twist's value for the pressure without friction coupling, shortened to full
+    /// contact. Not a bound; zero where nothing was searched.
+    pub estimate: f64,
 }
 
 /// Where seeds are computed.
@@ -103,7 +109,7 @@ pub enum Backend {
     Gpu(Box<Gpu>),
 }
 
-/// Most loads, contacts and basis numbers of one chunk.
+/// Most loads, contacts, edges and basis vectors of one chunk.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits {
     pub(crate) loads: usize,
@@ -115,7 +121,7 @@ pub(crate) struct Limits {
 impl Limits {
     /// On the processor a chunk is one task: small enough for the second-level cache, large enough that computing a
     /// contact's basis anew for each is lost in it.
-    const CPU: Self = Self { loads: 1 << 13, contacts: 64, edges: 1 << 14, basis: 1 << 20 };
+    const CPU: Self = Self { loads: 1 << 13, contacts: 64, edges: 1 << 14, basis: 1 << 18 };
 }
 
 /// Consecutive loads of one problem, and the places of their answers.

@@ -186,11 +186,11 @@ impl Prepared {
         let omega = omega / self.unit;
         let twist = [u1 + omega * self.origin.y, u2 - omega * self.origin.x, omega];
         if status == SeedStatus::Unbounded {
-            return Ok(Seed { status, twist, lower: 0.0, upper: f64::INFINITY });
+            return Ok(Seed { status, twist, lower: 0.0, upper: f64::INFINITY, estimate: scale * f64::from(record.lower) });
         }
         let lower = scale * f64::from(record.lower) * (1.0 - F32_TOLERANCE);
         let upper = scale * f64::from(record.upper) * (1.0 + F32_TOLERANCE);
-        Ok(Seed { status, twist, lower, upper })
+        Ok(Seed { status, twist, lower, upper, estimate: lower })
     }
 }
 
@@ -201,7 +201,7 @@ pub(crate) struct Chunk {
     pub(crate) edges: Vec<EdgeRecord>,
     pub(crate) loads: Vec<LoadRecord>,
     pub(crate) groups: Vec<GroupRecord>,
-    /// Length of the basis array in numbers.
+    /// Length of the basis array in vectors of four numbers.
     pub(crate) basis: usize,
 }
 
@@ -231,12 +231,12 @@ impl Chunk {
     }
 }
 
-/// Numbers that the basis of a contact takes.
+/// Vectors that the basis of a contact takes.
 pub(crate) fn basis_length(header: &ContactHeader, twists: usize) -> usize {
     header.faces as usize * super::layout::BASIS * twists
 }
 
 /// The answer for a load that is not searched.
 pub(crate) fn not_searched(status: SeedStatus) -> Seed {
-    Seed { status, twist: [0.0; 3], lower: 0.0, upper: f64::INFINITY }
+    Seed { status, twist: [0.0; 3], lower: 0.0, upper: f64::INFINITY, estimate: 0.0 }
 }

@@ -1,13 +1,17 @@
 //! From seeds to final answers: the bounds decide which loads can be the worst, and only those are solved in f64.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
+use glam::DVec2;
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{Backend, Batch, F32_TOLERANCE, Problem, Seed, SeedSet, SeedStatus};
 use crate::error::Result;
 use crate::mechanics::slip::{self, Field};
+use crate::mechanics::twist_out::TwistOut;
 use crate::mechanics::{Options, Pads, Refiner, Search, Separation, refused, solve_pads};
 use crate::model::{Contact, Score, Status};
 
@@ -42,15 +46,18 @@ pub struct ScoreOptions {
 /// The answer for one grip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scored {
-    /// Index of the worst load and its answer: the first load without a usable `mu_s`, else the largest `mu_s`; `None`
-    /// without loads.
+    /// Index of the worst load and its answer. Of loads without a usable `mu_s` the one with the least margin against
+    /// twisting out ([`TwistOut::margin`]); else the load with the largest `mu_s`. The first of those that tie. `None`
+    /// without loads, and for a grip that is `outranked`.
     pub worst: Option<(usize, Score)>,
-    /// Answers of all loads under [`Polish::All`], else empty.
+    /// Answers of all loads under [`Polish::All`], mostly without [`Score::bounds`]; else empty.
     pub all: Vec<Score>,
     /// Loads for which the seven equations were solved.
     pub solved: usize,
     /// Loads for which the slip problem alone was solved, to tell which is the worst.
     pub compared: usize,
+    /// Not solved to the end: it cannot be among the best ([`Backend::score_best`]).
+    pub outranked: bool,
 }
 
 impl Backend {
@@ -60,130 +67,260 @@ impl Backend {
     /// # Errors
     /// As [`Backend::seed`].
     pub fn score(&self, batch: &Batch<'_>, seeds: &SeedSet, options: &ScoreOptions) -> Result<Vec<Scored>> {
+        self.by_blocks(batch, seeds, |block, found| {
+            let problems = &batch.problems[block];
+            let pads = DistinctPads::new(problems);
+            pads.cases(problems, &found, options).into_par_iter().map(|case| case.score(None)).collect()
+        })
+    }
+
+    /// Seeds one block of the batch after another. While a block is seeded, the one before is solved.
+    pub(super) fn by_blocks(
+        &self,
+        batch: &Batch<'_>,
+        seeds: &SeedSet,
+        mut solve: impl FnMut(Range<usize>, Vec<Seed>) -> Vec<Scored> + Send,
+    ) -> Result<Vec<Scored>> {
         let mut scored = Vec::with_capacity(batch.problems.len());
-        let mut waiting: Option<(&[Problem<'_>], Vec<Seed>)> = None;
+        let mut waiting: Option<(Range<usize>, Vec<Seed>)> = None;
         for block in blocks(&batch.problems) {
-            let batch = Batch { problems: block.to_vec() };
-            // While a block is seeded, the one before is solved.
-            let (found, before) = rayon::join(|| self.seed(&batch, seeds), || waiting.take().map(|(block, seeds)| solve_block(block, &seeds, options)));
+            let part = Batch { problems: batch.problems[block.clone()].to_vec() };
+            let (found, before) = rayon::join(|| self.seed(&part, seeds), || waiting.take().map(|(block, seeds)| solve(block, seeds)));
             scored.extend(before.into_iter().flatten());
             waiting = Some((block, found?));
         }
         if let Some((block, seeds)) = waiting {
-            scored.extend(solve_block(block, &seeds, options));
+            scored.extend(solve(block, seeds));
         }
         Ok(scored)
     }
 }
 
 /// Cuts the problems so that each block has at most [`BLOCK`] loads (or one problem).
-fn blocks<'a, 'b>(problems: &'a [Problem<'b>]) -> Vec<&'a [Problem<'b>]> {
+fn blocks(problems: &[Problem<'_>]) -> Vec<Range<usize>> {
     let (mut blocks, mut start, mut loads) = (Vec::new(), 0, 0);
     for (index, problem) in problems.iter().enumerate() {
         if index > start && loads + problem.wrenches.len() > BLOCK {
-            blocks.push(&problems[start..index]);
+            blocks.push(start..index);
             (start, loads) = (index, 0);
         }
         loads += problem.wrenches.len();
     }
     if start < problems.len() {
-        blocks.push(&problems[start..]);
+        blocks.push(start..problems.len());
     }
     blocks
 }
 
-fn solve_block(problems: &[Problem<'_>], seeds: &[Seed], options: &ScoreOptions) -> Vec<Scored> {
-    let mut index_of: HashMap<*const Contact, usize> = HashMap::new();
-    let mut distinct: Vec<&Contact> = Vec::new();
-    let mut jobs = Vec::with_capacity(problems.len());
-    let mut rest = seeds;
-    for problem in problems {
-        let slot = *index_of.entry(Arc::as_ptr(problem.contact)).or_insert_with(|| {
-            distinct.push(problem.contact);
-            distinct.len() - 1
-        });
-        let (mine, others) = rest.split_at(problem.wrenches.len());
-        jobs.push((problem, slot, mine));
-        rest = others;
-    }
-    let pads: Vec<Option<Pads>> = distinct.into_par_iter().map(Pads::new).collect();
-    jobs.into_par_iter().map(|(problem, slot, seeds)| score_one(problem, pads[slot].as_ref(), seeds, options)).collect()
+/// The distinct contacts of some problems, ready to be solved.
+pub(super) struct DistinctPads {
+    pads: Vec<Option<Pads>>,
+    /// Which of them each problem has.
+    slots: Vec<usize>,
 }
 
-fn score_one(problem: &Problem<'_>, pads: Option<&Pads>, seeds: &[Seed], options: &ScoreOptions) -> Scored {
-    let full = |load: usize, search: Search| {
-        let seed = matches!(seeds[load].status, SeedStatus::Bounded | SeedStatus::Coupled | SeedStatus::Unbounded).then_some(seeds[load].twist);
-        let options = Options { separation: options.separation, refiner: options.refiner, seed, search };
-        match pads {
-            Some(pads) => solve_pads(pads, problem.distance, problem.force, &problem.wrenches[load], &options),
+impl DistinctPads {
+    pub(super) fn new(problems: &[Problem<'_>]) -> Self {
+        let mut index_of: HashMap<*const Contact, usize> = HashMap::new();
+        let mut distinct: Vec<&Contact> = Vec::new();
+        let mut slots = Vec::with_capacity(problems.len());
+        for problem in problems {
+            slots.push(*index_of.entry(Arc::as_ptr(problem.contact)).or_insert_with(|| {
+                distinct.push(problem.contact);
+                distinct.len() - 1
+            }));
+        }
+        Self { pads: distinct.into_par_iter().map(Pads::new).collect(), slots }
+    }
+
+    /// Each problem with its contact and its part of the `seeds`.
+    pub(super) fn cases<'a>(&'a self, problems: &'a [Problem<'a>], seeds: &'a [Seed], options: &'a ScoreOptions) -> Vec<Case<'a>> {
+        let mut rest = seeds;
+        let ready = problems.iter().zip(&self.slots).map(|(problem, &slot)| {
+            let (seeds, others) = rest.split_at(problem.wrenches.len());
+            rest = others;
+            Case { problem, pads: self.pads[slot].as_ref(), seeds, options }
+        });
+        ready.collect()
+    }
+}
+
+/// One grip with the seeds of its loads.
+#[derive(Clone, Copy)]
+pub(super) struct Case<'a> {
+    problem: &'a Problem<'a>,
+    pads: Option<&'a Pads>,
+    seeds: &'a [Seed],
+    options: &'a ScoreOptions,
+}
+
+impl Case<'_> {
+    /// Nothing less than this is the `mu_s` of the grip's worst load, if all its loads are held.
+    pub(super) fn lower(&self) -> f64 {
+        (0..self.seeds.len()).map(|load| self.lower_of(load)).fold(0.0, f64::max)
+    }
+
+    /// The seed's lower bound; without one, what holds for every pressure: no point of a face moves faster than its
+    /// fastest vertex, so `D(v)` is at most `sum N_k max |v|`.
+    fn lower_of(&self, load: usize) -> f64 {
+        let seed = &self.seeds[load];
+        let (SeedStatus::Unbounded, Some(pads)) = (seed.status, self.pads) else { return seed.lower };
+        let load = pads.load(self.problem.distance, self.problem.force, &self.problem.wrenches[load]);
+        let bound = |v: Vector3<f64>| {
+            let speed = |x: &DVec2| DVec2::new(v.x - v.z * x.y, v.y + v.z * x.x).length_squared();
+            let fastest = |k: usize| pads.hulls[k].iter().map(speed).fold(0.0, f64::max).sqrt();
+            load.direction.dot(&v) / (load.normal[0] * fastest(0) + load.normal[1] * fastest(1))
+        };
+        let slide = bound(Vector3::new(load.direction.x, load.direction.y, 0.0));
+        let turn = bound(pads.scaled_twist(seed.twist));
+        // Less than rounding leaves of either; not a number where nothing moves.
+        slide.max(turn).max(0.0) * load.size * (1.0 - F32_TOLERANCE)
+    }
+
+    /// The grip's worst load. With `beaten`, which says whether a grip is out of the race whose `mu_s` is at least this
+    /// much, it ends without an answer as soon as that is so.
+    pub(super) fn score(&self, beaten: Option<&(dyn Fn(f64) -> bool + Sync)>) -> Scored {
+        if self.options.polish == Polish::All {
+            let all: Vec<Score> = (0..self.seeds.len()).into_par_iter().with_min_len(8).map(|load| self.solve(load)).collect();
+            let answers: Vec<(usize, Score)> = all.iter().copied().enumerate().collect();
+            let worst = self.settle(self.worst(&answers));
+            return Scored { worst, solved: all.len(), compared: 0, all, outranked: false };
+        }
+        let mut work = Work { case: self, solved: Vec::new(), compared: 0 };
+        let out = |mu: f64| beaten.is_some_and(|beaten| beaten(mu));
+        if beaten.is_some() && out(self.lower()) {
+            return work.outranked();
+        }
+        let has_bounds = |load: &usize| matches!(self.seeds[*load].status, SeedStatus::Bounded | SeedStatus::Coupled);
+        let (mut bounded, mut open): (Vec<usize>, Vec<usize>) = (0..self.seeds.len()).partition(has_bounds);
+        // Loads without bounds are solved. One that has no limit state is the worst, whatever the others are (a load with
+        // bounds has one): the nearest to twisting out comes first. In a race the most demanding does.
+        let urgency: Vec<f64> = if beaten.is_some() { open.iter().map(|&load| -self.seeds[load].estimate).collect() } else { self.margins(&open) };
+        let mut order: Vec<usize> = (0..open.len()).collect();
+        order.sort_by(|&a, &b| urgency[a].total_cmp(&urgency[b]).then(a.cmp(&b)));
+        open = order.into_iter().map(|place| open[place]).collect();
+        let mut largest: f64 = 0.0;
+        for load in open {
+            match usable(&work.solve(load)) {
+                Some(mu) => largest = largest.max(mu),
+                None => return work.refused(),
+            }
+            if out(largest) {
+                return work.outranked();
+            }
+        }
+        // Then the others by falling upper bound, until none can reach the largest found. For congruent faces the slip
+        // problem alone decides `mu_s`: the seven equations are solved for the worst of them only.
+        let floor = bounded.iter().map(|&load| self.seeds[load].lower).fold(largest, f64::max);
+        bounded.retain(|&load| self.seeds[load].upper >= floor);
+        bounded.sort_by(|&a, &b| self.seeds[b].upper.total_cmp(&self.seeds[a].upper).then(a.cmp(&b)));
+        let mut slips: Vec<(usize, f64)> = Vec::new();
+        // Ties with the largest are solved too, so that the first of them is found.
+        // Congruent to rounding, not only to the single precision of the part's file.
+        let exact = self.pads.is_some_and(|pads| pads.congruent);
+        let margin = if exact { 2.0 * TIE } else { F32_TOLERANCE };
+        for load in bounded {
+            if self.seeds[load].upper < largest * (1.0 - margin) {
+                break;
+            }
+            if let (SeedStatus::Bounded, Some(pads)) = (self.seeds[load].status, self.pads) {
+                let mu = slip_only(pads, self.problem, load, self.seeds[load].twist);
+                largest = largest.max(mu);
+                slips.push((load, mu));
+            } else {
+                largest = largest.max(usable(&work.solve(load)).unwrap_or(f64::INFINITY));
+            }
+        }
+        work.compared = slips.len();
+        if out(largest * (1.0 - margin)) {
+            return work.outranked();
+        }
+        slips.retain(|&(_, mu)| mu >= largest * (1.0 - margin));
+        slips.sort_unstable_by_key(|&(load, _)| load);
+        for (load, mu) in slips {
+            let score = work.solve(load);
+            // The first of those that tie is the answer.
+            if exact && usable(&score).is_some_and(|found| (found - mu).abs() <= TIE * mu && found >= largest * (1.0 - TIE)) {
+                break;
+            }
+        }
+        work.worst()
+    }
+
+    /// Margin against twisting out of each of the `loads`.
+    fn margins(&self, loads: &[usize]) -> Vec<f64> {
+        if loads.is_empty() {
+            return Vec::new();
+        }
+        let lever = TwistOut::new(self.problem.contact);
+        loads.iter().map(|&load| lever.margin(self.problem.force, &self.problem.wrenches[load])).collect()
+    }
+
+    fn full(&self, load: usize, search: Search) -> Score {
+        let seed = &self.seeds[load];
+        let searched = matches!(seed.status, SeedStatus::Bounded | SeedStatus::Coupled | SeedStatus::Unbounded);
+        let options = Options { separation: self.options.separation, refiner: self.options.refiner, seed: searched.then_some(seed.twist), search };
+        match self.pads {
+            Some(pads) => solve_pads(pads, self.problem.distance, self.problem.force, &self.problem.wrenches[load], &options),
             None => refused(Status::NoContact, 0),
         }
-    };
-    // Further solutions are looked for where a load seems to have none, and for the worst one in the end.
-    let solve = |load: usize| {
-        let score = full(load, Search::Off);
-        if usable(&score).is_some() { score } else { full(load, Search::WhereNeeded) }
-    };
-    let settle =
-        |worst: Option<(usize, Score)>| worst.map(|(load, score)| (load, if usable(&score).is_some() { full(load, Search::WhereNeeded) } else { score }));
-    if options.polish == Polish::All {
-        let all: Vec<Score> = (0..seeds.len()).into_par_iter().with_min_len(8).map(solve).collect();
-        return Scored { worst: settle(worst(all.iter().copied().enumerate())), solved: all.len(), compared: 0, all };
     }
-    // Loads without bounds are solved in order. One that has no limit state is the worst, whatever the others are:
-    // a load with bounds has one.
-    let mut solved: Vec<(usize, Score)> = Vec::new();
-    let mut largest: f64 = 0.0;
-    let mut bounded: Vec<usize> = Vec::with_capacity(seeds.len());
-    for load in 0..seeds.len() {
-        if matches!(seeds[load].status, SeedStatus::Bounded | SeedStatus::Coupled) {
-            bounded.push(load);
-            continue;
-        }
-        let score = solve(load);
-        solved.push((load, score));
-        match usable(&score) {
-            Some(mu) => largest = largest.max(mu),
-            None => return Scored { worst: Some((load, score)), all: Vec::new(), solved: solved.len(), compared: 0 },
-        }
+
+    /// Further solutions are looked for where a load seems to have none, and for the worst one in the end.
+    fn solve(&self, load: usize) -> Score {
+        let score = self.full(load, Search::Off);
+        if usable(&score).is_some() { score } else { self.full(load, Search::WhereNeeded) }
     }
-    // Then the others by falling upper bound, until none can reach the largest found. For congruent faces the slip
-    // problem alone decides `mu_s`: the seven equations are solved for the worst of them only.
-    let floor = bounded.iter().map(|&load| seeds[load].lower).fold(largest, f64::max);
-    bounded.retain(|&load| seeds[load].upper >= floor);
-    bounded.sort_by(|&a, &b| seeds[b].upper.total_cmp(&seeds[a].upper).then(a.cmp(&b)));
-    let mut slips: Vec<(usize, f64)> = Vec::new();
-    // Ties with the largest are solved too, so that the first of them is found.
-    // Congruent to rounding, not only to the single precision of the part's file.
-    let exact = pads.is_some_and(|pads| pads.congruent);
-    let margin = if exact { 2.0 * TIE } else { F32_TOLERANCE };
-    for load in bounded {
-        if seeds[load].upper < largest * (1.0 - margin) {
-            break;
-        }
-        if let (SeedStatus::Bounded, Some(pads)) = (seeds[load].status, pads) {
-            let mu = slip_only(pads, problem, load, seeds[load].twist);
-            largest = largest.max(mu);
-            slips.push((load, mu));
-        } else {
-            let score = solve(load);
-            largest = largest.max(usable(&score).unwrap_or(f64::INFINITY));
-            solved.push((load, score));
-        }
+
+    fn settle(&self, worst: Option<(usize, Score)>) -> Option<(usize, Score)> {
+        worst.map(|(load, score)| (load, if usable(&score).is_some() { self.full(load, Search::WhereNeeded) } else { score }))
     }
-    let compared = slips.len();
-    slips.retain(|&(_, mu)| mu >= largest * (1.0 - margin));
-    slips.sort_unstable_by_key(|&(load, _)| load);
-    for (load, mu) in slips {
-        let score = solve(load);
-        solved.push((load, score));
-        // The first of those that tie is the answer.
-        if exact && usable(&score).is_some_and(|found| (found - mu).abs() <= TIE * mu && found >= largest * (1.0 - TIE)) {
-            break;
+
+    /// The worst of some loads' answers, which come by rising load index.
+    fn worst(&self, answers: &[(usize, Score)]) -> Option<(usize, Score)> {
+        let refused: Vec<usize> = answers.iter().filter(|(_, score)| usable(score).is_none()).map(|&(load, _)| load).collect();
+        let least = self.margins(&refused).into_iter().zip(&refused).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(b.1)));
+        if let Some((_, worst)) = least {
+            return answers.iter().find(|(load, _)| load == worst).copied();
         }
+        let largest = answers.iter().filter_map(|(_, score)| usable(score)).fold(0.0, f64::max);
+        answers.iter().find(|(_, score)| usable(score).is_some_and(|mu| mu >= largest * (1.0 - TIE))).copied()
     }
-    solved.sort_by_key(|(load, _)| *load);
-    Scored { solved: solved.len(), compared, worst: settle(worst(solved.into_iter())), all: Vec::new() }
+}
+
+/// What has been solved of a grip so far.
+struct Work<'a> {
+    case: &'a Case<'a>,
+    solved: Vec<(usize, Score)>,
+    compared: usize,
+}
+
+impl Work<'_> {
+    fn solve(&mut self, load: usize) -> Score {
+        let score = self.case.solve(load);
+        self.solved.push((load, score));
+        score
+    }
+
+    fn end(self, worst: Option<(usize, Score)>, outranked: bool) -> Scored {
+        Scored { worst, all: Vec::new(), solved: self.solved.len(), compared: self.compared, outranked }
+    }
+
+    fn outranked(self) -> Scored {
+        self.end(None, true)
+    }
+
+    /// The load solved last has no limit state.
+    fn refused(self) -> Scored {
+        let last = self.solved.last().copied();
+        self.end(last, false)
+    }
+
+    fn worst(mut self) -> Scored {
+        self.solved.sort_by_key(|(load, _)| *load);
+        let worst = self.case.settle(self.case.worst(&self.solved));
+        self.end(worst, false)
+    }
 }
 
 /// `mu_s` of congruent faces in full contact: their summed pressure is constant.
@@ -194,16 +331,6 @@ fn slip_only(pads: &Pads, problem: &Problem<'_>, load: usize, seed: [f64; 3]) ->
 }
 
 /// `mu_s` when the load is held.
-fn usable(score: &Score) -> Option<f64> {
+pub(super) fn usable(score: &Score) -> Option<f64> {
     score.mu_s.filter(|_| score.status.holds())
-}
-
-/// The worst of some answers given by rising load index: the first without a usable `mu_s`, else the largest `mu_s`;
-/// of those within [`TIE`] of the largest the first.
-pub fn worst(scores: impl Iterator<Item = (usize, Score)> + Clone) -> Option<(usize, Score)> {
-    if let Some(refused) = scores.clone().find(|(_, score)| usable(score).is_none()) {
-        return Some(refused);
-    }
-    let largest = scores.clone().filter_map(|(_, score)| usable(&score)).fold(0.0, f64::max);
-    scores.clone().find(|(_, score)| usable(score).is_some_and(|mu| mu >= largest * (1.0 - TIE)))
 }

@@ -1,127 +1,199 @@
-//! The search for the best twist of one load, in f32: the twin of `shaders/search.wgsl`, same functions in the same
-//! order.
+//! The search for the best twist of each load, in f32: the twin of `shaders/search.wgsl`, same functions in the same
+//! order. There one invocation takes one load; here [`LANES`] loads go side by side through plain loops, which the
+//! compiler turns into vector instructions. No product is fused with a sum, so the instruction set changes no bit.
 
 use super::layout::{
-    BASIS, BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader, DEGENERATE, EdgeRecord, LEAST_VARIATION, LoadRecord, OUT_OF_RANGE,
+    BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader, DEGENERATE, EdgeRecord, LEAST_DISSIPATION, LEAST_VARIATION, LoadRecord, OUT_OF_RANGE,
     SeedRecord, TILT_LIMIT, UNBOUNDED,
 };
 use super::seeds::{NEGATED, RING};
+use super::table::{CORNER, SLOTS, Table};
+
+/// Loads searched side by side.
+pub(crate) const LANES: usize = 16;
+
+/// A number of each load.
+pub(crate) type Lanes = [f32; LANES];
 
 /// One contact as the search sees it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Field<'a> {
     pub(crate) header: &'a ContactHeader,
-    /// All edges of the chunk.
-    pub(crate) edges: &'a [EdgeRecord],
-    /// This contact's part of the basis array: `[face][component][twist]`.
-    pub(crate) basis: &'a [f32],
-    pub(crate) twists: &'a [[f32; 4]],
+    /// This contact's edges: face I's, then face II's.
+    pub(crate) edges: [&'a [EdgeRecord]; 2],
+    pub(crate) table: &'a Table,
     pub(crate) rings: &'a [[u32; RING]],
+}
+
+/// [`LoadRecord`]s side by side; the places beyond the last hold no load.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Loads {
+    wrench: [Lanes; 3],
+    scale: Lanes,
+    f3: Lanes,
+    m1: Lanes,
+    m2: Lanes,
+    distance: Lanes,
+}
+
+impl Loads {
+    #[inline(always)]
+    pub(crate) fn new(loads: &[LoadRecord]) -> Self {
+        let zero = [0.0; LANES];
+        let mut all = Self { wrench: [zero; 3], scale: zero, f3: zero, m1: zero, m2: zero, distance: zero };
+        for (lane, load) in loads.iter().enumerate().take(LANES) {
+            for m in 0..3 {
+                all.wrench[m][lane] = load.wrench[m];
+            }
+            all.scale[lane] = load.scale;
+            all.f3[lane] = load.f3;
+            all.m1[lane] = load.m1;
+            all.m2[lane] = load.m2;
+            all.distance[lane] = load.distance;
+        }
+        all
+    }
 }
 
 /// Pressures at the origin and their common slope: `p_I = at_i + slope.x`, `p_II = at_ii - slope.x`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Planes {
-    pub(crate) at_i: f32,
-    pub(crate) at_ii: f32,
-    pub(crate) slope: [f32; 2],
+    pub(crate) at_i: Lanes,
+    pub(crate) at_ii: Lanes,
+    pub(crate) slope: [Lanes; 2],
     /// Whether both pads stay in full contact under it.
-    pub(crate) full: bool,
+    pub(crate) full: [bool; LANES],
+}
+
+/// What the ring round the best twist says of one load.
+#[derive(Debug, Clone, Copy, Default)]
+struct Corner {
+    /// In the sense that the load drives, unit length.
+    twist: [f32; 3],
+    upper: f32,
+    /// Integrals over face I of `v/|v|`, `x1 v/|v|`, `x2 v/|v|` at that twist, two components each.
+    g: [f32; 6],
+}
+
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// `a` where `first`, else `b`; by masks, because a choice becomes a store under a condition, which is slow.
+#[inline(always)]
+fn pick(first: bool, a: u32, b: u32) -> u32 {
+    let mask = 0_u32.wrapping_sub(u32::from(first));
+    (a & mask) | (b & !mask)
+}
+
+#[inline(always)]
+fn pick_number(first: bool, a: f32, b: f32) -> f32 {
+    f32::from_bits(pick(first, a.to_bits(), b.to_bits()))
 }
 
 impl Field<'_> {
-    fn component(&self, face: usize, component: usize, twist: usize) -> f32 {
-        self.basis[(face * BASIS + component) * self.twists.len() + twist]
-    }
-
-    /// Largest share of `slope`, at most 1, that lifts neither pad.
-    pub(crate) fn free_share(&self, mean_i: f32, mean_ii: f32, slope: [f32; 2]) -> f32 {
-        let mut share = 1.0_f32;
-        for (index, edge) in self.edges[self.header.edges_i as usize..self.header.edges_end as usize].iter().enumerate() {
-            let on_i = index < (self.header.edges_ii - self.header.edges_i) as usize;
-            let (centroid, mean, sign) = if on_i { (self.header.centroid_i, mean_i, 1.0) } else { (self.header.centroid_ii, mean_ii, -1.0) };
-            let drop = -sign * (slope[0] * (edge[0] - centroid[0]) + slope[1] * (edge[1] - centroid[1]));
-            if drop * share > mean {
-                share = mean / drop;
+    /// Largest share of the slope, at most 1, that lifts neither pad. A pad lifts where the pressure drops by its mean.
+    #[inline(always)]
+    fn free_share(&self, mean_i: &Lanes, mean_ii: &Lanes, slope: &[Lanes; 2]) -> Lanes {
+        let mut drop = [[0.0; LANES]; 2];
+        for (face, (centroid, sign)) in [(self.header.centroid_i, -1.0), (self.header.centroid_ii, 1.0)].into_iter().enumerate() {
+            for edge in self.edges[face] {
+                let (x, y) = (sign * (edge[0] - centroid[0]), sign * (edge[1] - centroid[1]));
+                for lane in 0..LANES {
+                    drop[face][lane] = larger(drop[face][lane], slope[0][lane] * x + slope[1][lane] * y);
+                }
             }
+        }
+        let mut share = [1.0; LANES];
+        for lane in 0..LANES {
+            let on_i = if drop[0][lane] > mean_i[lane] { mean_i[lane] / drop[0][lane] } else { 1.0 };
+            let on_ii = if drop[1][lane] > mean_ii[lane] { mean_ii[lane] / drop[1][lane] } else { 1.0 };
+            share[lane] = smaller(on_i, on_ii);
         }
         share
     }
 
     /// Pressure from force and moment balance without friction in the tilt equations, shortened to full contact.
-    pub(crate) fn planes(&self, load: &LoadRecord) -> Planes {
+    #[inline(always)]
+    pub(crate) fn planes(&self, loads: &Loads) -> Planes {
         let header = self.header;
-        let (n_i, n_ii) = (1.0 + 0.5 * load.f3, 1.0 - 0.5 * load.f3);
-        let (mean_i, mean_ii) = (n_i / header.area_i, n_ii / header.area_ii);
-        if header.faces == 1 {
-            return Planes { at_i: mean_i, at_ii: mean_ii, slope: [0.0, 0.0], full: true };
+        let (mut at_i, mut at_ii) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            at_i[lane] = (1.0 + 0.5 * loads.f3[lane]) / header.area_i;
+            at_ii[lane] = (1.0 - 0.5 * loads.f3[lane]) / header.area_ii;
         }
-        let [ci, cii, k] = [[header.centroid_i[0], header.centroid_i[1], 0.0], [header.centroid_ii[0], header.centroid_ii[1], 0.0], header.compliance];
-        let right1 = -load.m2 - n_i * ci[0] + n_ii * cii[0];
-        let right2 = load.m1 - n_i * ci[1] + n_ii * cii[1];
-        let full = [k[0] * right1 + k[1] * right2, k[1] * right1 + k[2] * right2];
-        let share = self.free_share(mean_i, mean_ii, full);
-        let full_contact = share >= 1.0;
-        let share = if full_contact { share } else { TILT_LIMIT * share };
-        let slope = [share * full[0], share * full[1]];
-        Planes { at_i: mean_i - slope[0] * ci[0] - slope[1] * ci[1], at_ii: mean_ii + slope[0] * cii[0] + slope[1] * cii[1], slope, full: full_contact }
-    }
-
-    /// Gradient of the dissipation at twist `entry` (a ring entry) under `planes`.
-    pub(crate) fn support(&self, planes: Planes, entry: u32) -> [f32; 3] {
-        let twist = (entry & !NEGATED) as usize;
-        let sign = if entry & NEGATED != 0 { -1.0 } else { 1.0 };
-        let g = |face: usize, component: usize| self.component(face, component, twist);
-        let other = self.header.faces as usize - 1;
-        [0, 1, 2].map(|m| {
-            if other == 0 {
-                sign * (planes.at_i + planes.at_ii) * g(0, m)
-            } else {
-                sign * (planes.at_i * g(0, m)
-                    + planes.at_ii * g(1, m)
-                    + planes.slope[0] * (g(0, 3 + m) - g(1, 3 + m))
-                    + planes.slope[1] * (g(0, 6 + m) - g(1, 6 + m)))
-            }
-        })
+        let mut slope = [[0.0; LANES]; 2];
+        if header.faces == 1 {
+            return Planes { at_i, at_ii, slope, full: [true; LANES] };
+        }
+        let (ci, cii, k) = (header.centroid_i, header.centroid_ii, header.compliance);
+        for lane in 0..LANES {
+            let (n_i, n_ii) = (1.0 + 0.5 * loads.f3[lane], 1.0 - 0.5 * loads.f3[lane]);
+            let right1 = -loads.m2[lane] - n_i * ci[0] + n_ii * cii[0];
+            let right2 = loads.m1[lane] - n_i * ci[1] + n_ii * cii[1];
+            slope[0][lane] = k[0] * right1 + k[1] * right2;
+            slope[1][lane] = k[1] * right1 + k[2] * right2;
+        }
+        let share = self.free_share(&at_i, &at_ii, &slope);
+        let mut full = [true; LANES];
+        for lane in 0..LANES {
+            full[lane] = share[lane] >= 1.0;
+            let share = if full[lane] { share[lane] } else { TILT_LIMIT * share[lane] };
+            slope[0][lane] *= share;
+            slope[1][lane] *= share;
+            at_i[lane] = at_i[lane] - slope[0][lane] * ci[0] - slope[1][lane] * ci[1];
+            at_ii[lane] = at_ii[lane] + slope[0][lane] * cii[0] + slope[1][lane] * cii[1];
+        }
+        Planes { at_i, at_ii, slope, full }
     }
 
     /// Whether congruent faces stay in full contact, with a margin, when the body slips with friction `mu` and the
-    /// weighted integrals `x1 v/|v|` = `g1`, `x2 v/|v|` = `g2`, `v/|v|` = `g0` (two components each).
-    pub(crate) fn full_contact(&self, load: &LoadRecord, mu: f32, g0: [f32; 2], g1: [f32; 2], g2: [f32; 2]) -> bool {
+    /// integrals `g` of a [`Corner`].
+    #[inline(always)]
+    fn full_contact(&self, loads: &Loads, mu: &Lanes, g: &[Lanes; 6]) -> [bool; LANES] {
         let header = self.header;
-        if load.distance >= OUT_OF_RANGE || header.resolved == 0 {
-            return false;
-        }
-        // Tilt equations (6)(7) about the common centroid: slope = compliance * (moments + coupling * slope).
-        let reach = 0.5 * load.distance * mu;
         let k = header.compliance;
-        let x11 = 2.0 * reach * (k[0] * g1[0] + k[1] * g1[1]);
-        let x12 = 2.0 * reach * (k[0] * g2[0] + k[1] * g2[1]);
-        let x21 = 2.0 * reach * (k[1] * g1[0] + k[2] * g1[1]);
-        let x22 = 2.0 * reach * (k[1] * g2[0] + k[2] * g2[1]);
-        let (trace, det) = (x11 + x22, x11 * x22 - x12 * x21);
-        // 1 - s trace + s^2 det stays above the margin for s in [0, 1].
-        let lowest = if det > 0.0 && trace > 0.0 && trace < 2.0 * det { 1.0 - 0.25 * trace * trace / det } else { 1.0 - trace + det };
-        if lowest.is_nan() || lowest < COUPLING_MARGIN {
-            return false;
+        let zero = [0.0; LANES];
+        let (mut slope, mut without, mut drop_i, mut drop_ii) = ([zero; 2], [zero; 2], zero, zero);
+        let mut held = [false; LANES];
+        for lane in 0..LANES {
+            // Tilt equations (6)(7) about the common centroid: slope = compliance * (moments + coupling * slope).
+            let reach = 0.5 * loads.distance[lane] * mu[lane];
+            let x11 = 2.0 * reach * (k[0] * g[2][lane] + k[1] * g[3][lane]);
+            let x12 = 2.0 * reach * (k[0] * g[4][lane] + k[1] * g[5][lane]);
+            let x21 = 2.0 * reach * (k[1] * g[2][lane] + k[2] * g[3][lane]);
+            let x22 = 2.0 * reach * (k[1] * g[4][lane] + k[2] * g[5][lane]);
+            let (trace, det) = (x11 + x22, x11 * x22 - x12 * x21);
+            // 1 - s trace + s^2 det stays above the margin for s in [0, 1].
+            let whole = 1.0 - trace + det;
+            let between = det > 0.0 && trace > 0.0 && trace < 2.0 * det;
+            let lowest = if between { 1.0 - 0.25 * trace * trace / det } else { whole };
+            held[lane] = lowest >= COUPLING_MARGIN && loads.distance[lane] < OUT_OF_RANGE;
+            let right1 = -loads.m2[lane] + reach * loads.f3[lane] / header.area_i * g[0][lane];
+            let right2 = loads.m1[lane] + reach * loads.f3[lane] / header.area_i * g[1][lane];
+            let b1 = k[0] * right1 + k[1] * right2;
+            let b2 = k[1] * right1 + k[2] * right2;
+            slope[0][lane] = ((1.0 - x22) * b1 + x12 * b2) / whole;
+            slope[1][lane] = (x21 * b1 + (1.0 - x11) * b2) / whole;
+            without[0][lane] = -k[0] * loads.m2[lane] + k[1] * loads.m1[lane];
+            without[1][lane] = -k[1] * loads.m2[lane] + k[2] * loads.m1[lane];
+            drop_i[lane] = (1.0 + 0.5 * loads.f3[lane] - CONTACT_MARGIN) / header.area_i;
+            drop_ii[lane] = (1.0 - 0.5 * loads.f3[lane] - CONTACT_MARGIN) / header.area_i;
         }
-        let right1 = -load.m2 + reach * load.f3 / header.area_i * g0[0];
-        let right2 = load.m1 + reach * load.f3 / header.area_i * g0[1];
-        let b1 = k[0] * right1 + k[1] * right2;
-        let b2 = k[1] * right1 + k[2] * right2;
-        let whole = 1.0 - trace + det;
-        let slope = [((1.0 - x22) * b1 + x12 * b2) / whole, (x21 * b1 + (1.0 - x11) * b2) / whole];
-        let without = [-k[0] * load.m2 + k[1] * load.m1, -k[1] * load.m2 + k[2] * load.m1];
-        let drop_i = (1.0 + 0.5 * load.f3 - CONTACT_MARGIN) / header.area_i;
-        let drop_ii = (1.0 - 0.5 * load.f3 - CONTACT_MARGIN) / header.area_i;
-        for edge in &self.edges[header.edges_i as usize..header.edges_ii as usize] {
-            let with = slope[0] * edge[0] + slope[1] * edge[1];
-            let from = without[0] * edge[0] + without[1] * edge[1];
-            if !(with.max(from) <= drop_ii && -with.min(from) <= drop_i) {
-                return false;
+        for edge in self.edges[0] {
+            for lane in 0..LANES {
+                let with = slope[0][lane] * edge[0] + slope[1][lane] * edge[1];
+                let from = without[0][lane] * edge[0] + without[1][lane] * edge[1];
+                held[lane] &= larger(with, from) <= drop_ii[lane] && -smaller(with, from) <= drop_i[lane];
             }
         }
-        true
+        held
     }
 
     /// For different faces: the largest share by which the friction coupling can change the dissipation at any twist,
@@ -132,116 +204,204 @@ impl Field<'_> {
     /// without coupling plus `spread` times the change of slope, and `mu` at most `upper` over 1 less the share. The
     /// three together are a quadratic equation for the share; its smaller root cannot be left on the way from no
     /// coupling to all of it.
-    pub(crate) fn coupled_share(&self, load: &LoadRecord, planes: Planes, upper: f32) -> f32 {
+    #[inline(always)]
+    fn coupled_share(&self, loads: &Loads, planes: &Planes, upper: &Lanes) -> Lanes {
         let header = self.header;
-        let mu = load.scale * upper;
-        if load.distance >= OUT_OF_RANGE
-            || header.resolved == 0
-            || !planes.full
-            || mu * mu * load.distance * load.distance > 0.5 * (header.area_i + header.area_ii)
-        {
-            return -1.0;
+        let zero = [0.0; LANES];
+        // Largest relative change of pressure at a vertex per change of slope, as the squares of distance and pressure;
+        // and whether every vertex is pressed.
+        let (mut far, mut pressure, mut pressed) = (zero, [1.0; LANES], planes.full);
+        for (face, (centroid, sign)) in [(header.centroid_i, 1.0), (header.centroid_ii, -1.0)].into_iter().enumerate() {
+            let at = if face == 0 { &planes.at_i } else { &planes.at_ii };
+            for edge in self.edges[face] {
+                let (x, y) = (edge[0] - centroid[0], edge[1] - centroid[1]);
+                let distance = x * x + y * y;
+                for lane in 0..LANES {
+                    let here = at[lane] + sign * (planes.slope[0][lane] * edge[0] + planes.slope[1][lane] * edge[1]);
+                    pressed[lane] &= here > CONTACT_MARGIN * at[lane].abs();
+                    let square = here * here;
+                    let worse = distance * pressure[lane] > far[lane] * square;
+                    far[lane] = pick_number(worse, distance, far[lane]);
+                    pressure[lane] = pick_number(worse, square, pressure[lane]);
+                }
+            }
         }
         let ([q11, q22, q12, q33], [q13, q14, q23, q24]) = (header.variation_first, header.variation_second);
         let [q34, q44] = header.variation_slope;
-        let (z1, z2, [z3, z4]) = (planes.at_i, planes.at_ii, planes.slope);
-        let square = q11 * z1 * z1 + q22 * z2 * z2 + q33 * z3 * z3 + q44 * z4 * z4;
-        let mixed = z1 * (q12 * z2 + q13 * z3 + q14 * z4) + z2 * (q23 * z3 + q24 * z4) + q34 * z3 * z4;
-        let variation = (square + 2.0 * mixed).max(0.0).sqrt() + LEAST_VARIATION;
-        // Largest relative change of pressure at a vertex per change of slope.
-        let mut steepest = 0.0_f32;
-        for (index, edge) in self.edges[header.edges_i as usize..header.edges_end as usize].iter().enumerate() {
-            let on_i = index < (header.edges_ii - header.edges_i) as usize;
-            let along = planes.slope[0] * edge[0] + planes.slope[1] * edge[1];
-            let (centroid, pressure) = if on_i { (header.centroid_i, planes.at_i + along) } else { (header.centroid_ii, planes.at_ii - along) };
-            let (x, y) = (edge[0] - centroid[0], edge[1] - centroid[1]);
-            let least = CONTACT_MARGIN * if on_i { planes.at_i.abs() } else { planes.at_ii.abs() };
-            if pressure <= least {
-                return -1.0;
-            }
-            steepest = steepest.max((x * x + y * y) / (pressure * pressure));
+        let half_area = 0.5 * (header.area_i + header.area_ii);
+        let mut shares = [-1.0; LANES];
+        for lane in 0..LANES {
+            let mu = loads.scale[lane] * upper[lane];
+            let distance = loads.distance[lane];
+            let weak = mu * mu * distance * distance <= half_area && distance < OUT_OF_RANGE;
+            let (z1, z2, z3, z4) = (planes.at_i[lane], planes.at_ii[lane], planes.slope[0][lane], planes.slope[1][lane]);
+            let square = q11 * z1 * z1 + q22 * z2 * z2 + q33 * z3 * z3 + q44 * z4 * z4;
+            let mixed = z1 * (q12 * z2 + q13 * z3 + q14 * z4) + z2 * (q23 * z3 + q24 * z4) + q34 * z3 * z4;
+            let variation = larger(square + 2.0 * mixed, 0.0).sqrt() + LEAST_VARIATION;
+            let reach = 0.5 * header.softness * distance.abs() * mu;
+            let c = 1.0 - reach * header.spread;
+            let b = reach * variation * (far[lane] / pressure[lane]).sqrt();
+            let room = c * c - 4.0 * b;
+            let share = 2.0 * b / (c + larger(room, 0.0).sqrt());
+            let known = weak && pressed[lane] && c > 0.0 && room > 0.0 && share <= COUPLED_SHARE;
+            shares[lane] = if known { share } else { -1.0 };
         }
-        let reach = 0.5 * header.softness * load.distance.abs() * mu;
-        let c = 1.0 - reach * header.spread;
-        let b = reach * variation * steepest.sqrt();
-        if c <= 0.0 || c * c <= 4.0 * b {
-            return -1.0;
-        }
-        let share = 2.0 * b / (c + (c * c - 4.0 * b).sqrt());
-        if share <= COUPLED_SHARE { share } else { -1.0 }
+        shares
     }
 
-    /// Bounds and interpolated twist from the triangles round the best twist `best`, whose value is `value`.
-    pub(crate) fn finish(&self, load: &LoadRecord, planes: Planes, best: u32, value: f32) -> SeedRecord {
-        let w = load.wrench;
-        let twist_of = |entry: u32| {
-            let v = self.twists[(entry & !NEGATED) as usize];
-            let sign = if entry & NEGATED != 0 { -1.0 } else { 1.0 };
-            [sign * v[0], sign * v[1], sign * v[2]]
-        };
-        let at_best = twist_of(best);
-        let best = if dot(w, at_best) < 0.0 { best ^ NEGATED } else { best };
-        let ring = self.rings[(best & !NEGATED) as usize].map(|entry| entry ^ (best & NEGATED));
-        let ga = self.support(planes, best);
-        let mut upper = f32::MAX;
-        let mut triangle = [best; 3];
-        let mut share = [1.0_f32, 0.0, 0.0];
-        let mut gb = self.support(planes, ring[0]);
-        for i in 0..RING {
-            let next = ring[(i + 1) % RING];
-            let gc = self.support(planes, next);
+    /// Bound and interpolated twist of one load from the triangles round its best twist.
+    ///
+    /// In each triangle `w = a ga + b gb + c gc` by Cramer's rule; two of its numerators are products with `ga x w`.
+    #[inline(always)]
+    fn ring_of<const PRESSURES: usize>(&self, wrench: [f32; 3], pressures: [f32; PRESSURES], best: usize) -> Corner {
+        let own = self.table.corner(best);
+        let sense = if dot(wrench, [own[0], own[1], own[2]]) < 0.0 { -1.0 } else { 1.0 };
+        let w = wrench.map(|x| sense * x);
+        let supports = self.table.ring(best);
+        let mut g = [[0.0_f32; SLOTS]; 3];
+        for (of_pressure, pressure) in supports.chunks_exact(3 * SLOTS).zip(pressures) {
+            for m in 0..3 {
+                for slot in 0..SLOTS {
+                    g[m][slot] += pressure * of_pressure[m * SLOTS + slot];
+                }
+            }
+        }
+        let ga = [g[0][SLOTS - 1], g[1][SLOTS - 1], g[2][SLOTS - 1]];
+        let u = cross(ga, w);
+        let mut next = [[0.0_f32; SLOTS]; 3];
+        for m in 0..3 {
+            next[m][..SLOTS - 1].copy_from_slice(&g[m][1..]);
+        }
+        let zero = [0.0_f32; SLOTS];
+        let (mut a, mut b, mut c, mut total) = (zero, zero, zero, zero);
+        for slot in 0..SLOTS {
+            let gb = [g[0][slot], g[1][slot], g[2][slot]];
+            let gc = [next[0][slot], next[1][slot], next[2][slot]];
             let normal = cross(gb, gc);
             let det = dot(ga, normal);
-            if det.abs() > DEGENERATE {
-                let a = dot(w, normal) / det;
-                let b = dot(w, cross(gc, ga)) / det;
-                let c = dot(w, cross(ga, gb)) / det;
-                let total = a.abs() + b.abs() + c.abs();
-                if total < upper {
-                    upper = total;
-                    triangle = [best, ring[i], next];
-                    share = [a / total, b / total, c / total];
+            let sign = if det < 0.0 { -1.0 } else { 1.0 };
+            a[slot] = sign * dot(w, normal);
+            b[slot] = sign * dot(u, gc);
+            c[slot] = -sign * dot(u, gb);
+            let bound = (a[slot].abs() + b[slot].abs() + c[slot].abs()) / det.abs();
+            total[slot] = if det.abs() > DEGENERATE { bound } else { f32::MAX };
+        }
+        let mut chosen = 0;
+        for slot in 1..RING {
+            if total[slot] < total[chosen] {
+                chosen = slot;
+            }
+        }
+        let upper = total[chosen];
+        let mut mix = [0.0_f32; CORNER];
+        let sum = a[chosen].abs() + b[chosen].abs() + c[chosen].abs();
+        if upper < f32::MAX && sum > 0.0 {
+            let ring = &self.rings[best];
+            let corners = [(best as u32, a[chosen]), (ring[chosen], b[chosen]), (ring[(chosen + 1) % RING], c[chosen])];
+            for (entry, share) in corners {
+                let share = if entry & NEGATED != 0 { -sense } else { sense } * share / sum;
+                let corner = self.table.corner((entry & !NEGATED) as usize);
+                for m in 0..CORNER {
+                    mix[m] += share * corner[m];
                 }
             }
-            gb = gc;
         }
-        let corners = triangle.map(twist_of);
-        let mut twist = [0, 1, 2].map(|m| share[0] * corners[0][m] + share[1] * corners[1][m] + share[2] * corners[2][m]);
-        let length = dot(twist, twist).sqrt();
+        let length = dot([mix[0], mix[1], mix[2]], [mix[0], mix[1], mix[2]]).sqrt();
         // Shares of opposite signs can cancel; the best twist itself always is a seed.
-        twist = if length > 0.5 { twist.map(|x| x / length) } else { twist_of(best) };
-        let mut status = UNBOUNDED;
-        if self.header.faces == 1 && upper < f32::MAX {
-            let mix = |component: usize| {
-                let mut sum = 0.0;
-                for m in 0..3 {
-                    let sign = if triangle[m] & NEGATED != 0 { -1.0 } else { 1.0 };
-                    sum += sign * share[m] * self.component(0, component, (triangle[m] & !NEGATED) as usize);
-                }
-                sum
+        let twist = if length > 0.5 { [mix[0] / length, mix[1] / length, mix[2] / length] } else { [sense * own[0], sense * own[1], sense * own[2]] };
+        Corner { twist, upper, g: [mix[3], mix[4], mix[5], mix[6], mix[7], mix[8]] }
+    }
+
+    /// Records of the loads whose best twists are `best` with the values `value`.
+    #[inline(always)]
+    fn finish(&self, loads: &Loads, planes: &Planes, best: &[u32; LANES], value: &Lanes, out: &mut [SeedRecord]) {
+        let congruent = self.header.faces == 1;
+        let mut corners = [Corner::default(); LANES];
+        for lane in 0..out.len().min(LANES) {
+            let w = [loads.wrench[0][lane], loads.wrench[1][lane], loads.wrench[2][lane]];
+            let best = best[lane] as usize;
+            corners[lane] = if congruent {
+                self.ring_of(w, [planes.at_i[lane] + planes.at_ii[lane]], best)
+            } else {
+                self.ring_of(w, [planes.at_i[lane], planes.at_ii[lane], planes.slope[0][lane], planes.slope[1][lane]], best)
             };
-            let (g0, g1, g2) = ([mix(0), mix(1)], [mix(3), mix(4)], [mix(6), mix(7)]);
-            if self.full_contact(load, load.scale * upper, g0, g1, g2) {
-                status = BOUNDED;
+        }
+        let (mut upper, mut lower, mut status) = ([0.0; LANES], *value, [UNBOUNDED; LANES]);
+        for lane in 0..LANES {
+            upper[lane] = corners[lane].upper;
+        }
+        if self.header.resolved == 0 {
+            // A sliver: seeds only.
+        } else if congruent {
+            let (mut mu, mut g) = ([0.0; LANES], [[0.0; LANES]; 6]);
+            for lane in 0..LANES {
+                mu[lane] = loads.scale[lane] * upper[lane];
+                for m in 0..6 {
+                    g[m][lane] = corners[lane].g[m];
+                }
+            }
+            let held = self.full_contact(loads, &mu, &g);
+            for lane in 0..LANES {
+                status[lane] = if held[lane] && upper[lane] < f32::MAX { BOUNDED } else { UNBOUNDED };
+            }
+        } else {
+            let shares = self.coupled_share(loads, planes, &upper);
+            for lane in 0..LANES {
+                let known = shares[lane] >= 0.0 && upper[lane] < f32::MAX;
+                status[lane] = if known { COUPLED } else { UNBOUNDED };
+                lower[lane] = if known { lower[lane] / (1.0 + shares[lane]) } else { lower[lane] };
+                upper[lane] = if known { upper[lane] / (1.0 - shares[lane]) } else { upper[lane] };
             }
         }
-        let mut lower = value;
-        if self.header.faces == 2 && upper < f32::MAX {
-            let share = self.coupled_share(load, planes, upper);
-            if share >= 0.0 {
-                status = COUPLED;
-                lower /= 1.0 + share;
-                upper /= 1.0 - share;
+        for (lane, record) in out.iter_mut().enumerate().take(LANES) {
+            *record = SeedRecord { twist: corners[lane].twist, lower: lower[lane], upper: upper[lane], status: status[lane], best: best[lane], padding: 0 };
+        }
+    }
+
+    /// Records of up to [`LANES`] loads.
+    #[inline(always)]
+    pub(crate) fn search(&self, loads: &[LoadRecord], out: &mut [SeedRecord]) {
+        let loads = Loads::new(loads);
+        let planes = self.planes(&loads);
+        let (mut best, mut value) = ([0_u32; LANES], [-1.0_f32; LANES]);
+        let w = &loads.wrench;
+        if self.header.faces == 1 {
+            for (k, n) in self.table.parts().enumerate() {
+                for lane in 0..LANES {
+                    let mu = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
+                    let better = mu > value[lane];
+                    best[lane] = pick(better, k as u32, best[lane]);
+                    value[lane] = larger(mu, value[lane]);
+                }
+            }
+        } else {
+            // The largest of the quotients power / dissipation, without a division for each.
+            let mut least = [1.0_f32; LANES];
+            for (k, n) in self.table.parts().enumerate() {
+                for lane in 0..LANES {
+                    let power = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
+                    let d = planes.at_i[lane] * n[3] + planes.at_ii[lane] * n[4] + planes.slope[0][lane] * n[5] + planes.slope[1][lane] * n[6];
+                    let d = larger(d, LEAST_DISSIPATION);
+                    let better = power * least[lane] > value[lane] * d;
+                    best[lane] = pick(better, k as u32, best[lane]);
+                    value[lane] = pick_number(better, power, value[lane]);
+                    least[lane] = pick_number(better, d, least[lane]);
+                }
+            }
+            for lane in 0..LANES {
+                value[lane] /= least[lane];
             }
         }
-        SeedRecord { twist, lower, upper, status, best: best & !NEGATED, padding: 0 }
+        self.finish(&loads, &planes, &best, &value, out);
     }
 }
 
+#[inline(always)]
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+#[inline(always)]
 fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

@@ -16,6 +16,14 @@ pub(crate) struct BackendArgs {
     pub(crate) seeds: usize,
 }
 
+/// Limits the processor to so many threads; all cores without a number.
+pub(crate) fn use_threads(threads: Option<usize>) -> anyhow::Result<()> {
+    if let Some(threads) = threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+    }
+    Ok(())
+}
+
 impl BackendArgs {
     /// Opens the backend.
     pub(crate) fn select(&self) -> anyhow::Result<Selection> {

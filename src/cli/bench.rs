@@ -12,7 +12,7 @@ use gripfast::load::sphere;
 use gripfast::model::{Contact, Polygon, Wrench};
 use serde_json::json;
 
-use super::backend::BackendArgs;
+use super::backend::{self, BackendArgs};
 
 /// Measures seed evaluations, exact solves and scored grips per second, and checks the GPU against the processor.
 #[derive(Debug, ClapArgs)]
@@ -30,6 +30,9 @@ pub(crate) struct Args {
     /// Seconds for each workload.
     #[arg(long, value_name = "S", default_value_t = 1.0)]
     seconds: f64,
+    /// Threads [default: all cores].
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
     /// One JSON object on standard output.
     #[arg(long)]
     json: bool,
@@ -79,6 +82,7 @@ struct Measured {
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     anyhow::ensure!(args.seconds.is_finite() && args.seconds > 0.0, "--seconds {}: give a positive number", args.seconds);
+    backend::use_threads(args.threads)?;
     let selection = args.backend.select()?;
     let set = args.backend.seed_set()?;
     let backends: Vec<Backend> = match selection.backend {

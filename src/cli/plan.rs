@@ -8,9 +8,10 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Mutex;
 
 use clap::{Args as ClapArgs, ValueEnum};
-use gripfast::backend::{Polish, ScoreOptions};
+use gripfast::backend::{Best, Polish, ScoreOptions};
 use gripfast::error::Error;
 use gripfast::export::{self, Format};
 use gripfast::gripper;
@@ -24,7 +25,7 @@ use gripfast::report;
 use gripfast::results::{self, GripSet, PartSummary, Provenance, RankedGrip, Summary};
 use gripfast::units::Quantity;
 
-use super::backend::BackendArgs;
+use super::backend::{self, BackendArgs};
 use super::candidates::CandidateArgs;
 use super::export::GLB_TOP;
 use super::solve::{RefinerArg, SeparationArg};
@@ -92,7 +93,7 @@ pub(crate) struct Args {
     /// Pads that separate under a load: solve with the contact left, or discard the grip as the paper does.
     #[arg(long, value_enum, default_value = "solve", help_heading = "Scoring")]
     separation: SeparationArg,
-    /// Which loads get the final f64 solution: those that can be the worst, or all (kept in the result).
+    /// What gets the final f64 solution: the loads that can be a grip's worst; the same, and only for grips that can be among the best ones kept; or all loads (kept in the result).
     #[arg(long, value_enum, default_value = "worst", help_heading = "Scoring")]
     polish: PolishArg,
     /// Minimiser that polishes the final answers.
@@ -111,9 +112,9 @@ pub(crate) struct Args {
     /// Lists one of the grips that a symmetry of the part maps to each other, for all of them.
     #[arg(long, help_heading = "Output")]
     merge_symmetric: bool,
-    /// Best grips to keep in the result file.
-    #[arg(long, default_value_t = 10_000, help_heading = "Output")]
-    keep: usize,
+    /// Best grips to keep in the result file [default: 10000; with --polish top as many as --top prints].
+    #[arg(long, value_name = "N", help_heading = "Output")]
+    keep: Option<usize>,
     /// Result file; its ending says the format: .json (read by the other subcommands), .jsonl, .csv, .parquet, .npz, ... as `export`.
     #[arg(long, short, value_name = "FILE", help_heading = "Output")]
     output: Option<PathBuf>,
@@ -153,13 +154,24 @@ pub(crate) struct Args {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum PolishArg {
     Worst,
+    Top,
     All,
 }
 
-pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    if let Some(threads) = args.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+/// Grips kept in the result file where `--keep` is not given.
+const KEEP: usize = 10_000;
+
+impl Args {
+    /// How many of the best grips are kept. A choice of grips that differ needs more than it shows, and so does a list
+    /// in which one stands for many.
+    fn kept(&self) -> usize {
+        let few = self.polish == PolishArg::Top && !self.diverse && !self.merge_symmetric;
+        self.keep.unwrap_or(if few { 0 } else { KEEP }).max(self.top).max(1)
     }
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    backend::use_threads(args.threads)?;
     let note = |text: &str| {
         if !args.quiet {
             eprintln!("{text}");
@@ -189,6 +201,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             refiner: args.refiner.into(),
         },
     };
+    if args.polish == PolishArg::Top && settings.weights.k1 < 0.0 {
+        return Err(Error::input("--polish top", "needs a score that falls with mu_s, and --k1 is negative", "use --polish worst").into());
+    }
     let seeds = args.backend.seed_set()?;
     let format = args.output.as_deref().map(flags::output_format).transpose()?;
     let noise = flags::noise(&args)?;
@@ -214,9 +229,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         why::print(&mut std::io::stdout().lock(), &explanation)?;
         return Ok(if explanation.rejection.is_none() { ExitCode::SUCCESS } else { ExitCode::from(1) });
     }
-    let keep = args.keep.max(args.top);
-    let assessor = Assessor { loads: &cases, mass, settings: &settings, backend: &selection.backend, seeds: &seeds };
-    let mut described = describe(&settings, seeds.len());
+    let keep = args.kept();
+    let best = (args.polish == PolishArg::Top).then(|| Mutex::new(Best::new(keep)));
+    let assessor = Assessor { loads: &cases, mass, settings: &settings, backend: &selection.backend, seeds: &seeds, best };
+    let mut described = describe(&settings, &args, seeds.len());
     described.insert("keep".into(), keep.into());
     let partial = args.output.as_deref().and_then(Partial::beside).map(|path| Partial {
         path,
@@ -312,7 +328,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 /// The settings that decide the answer, but for the candidates'.
-fn describe(settings: &Settings, seeds: usize) -> BTreeMap<String, serde_json::Value> {
+fn describe(settings: &Settings, args: &Args, seeds: usize) -> BTreeMap<String, serde_json::Value> {
     BTreeMap::from([
         ("force_n".to_string(), settings.force.into()),
         ("k1".to_string(), settings.weights.k1.into()),
@@ -322,7 +338,7 @@ fn describe(settings: &Settings, seeds: usize) -> BTreeMap<String, serde_json::V
         ("pad_friction".to_string(), settings.pad_friction.into()),
         ("separation".to_string(), format!("{:?}", settings.score.separation).to_lowercase().into()),
         ("refiner".to_string(), format!("{:?}", settings.score.refiner).to_lowercase().into()),
-        ("polish".to_string(), format!("{:?}", settings.score.polish).to_lowercase().into()),
+        ("polish".to_string(), format!("{:?}", args.polish).to_lowercase().into()),
         ("seeds".to_string(), seeds.into()),
     ])
 }

@@ -20,7 +20,7 @@ use gripfast::results::{FORMAT, GripSet};
 use gripfast::units::Quantity;
 use serde_json::Value;
 
-use super::backend::BackendArgs;
+use super::backend::{self, BackendArgs};
 use super::solve::{RefinerArg, SeparationArg};
 
 /// Scores many contact pairs under many loads: the worst load of each and the friction coefficient it needs.
@@ -54,8 +54,11 @@ pub(crate) struct Args {
     /// Output file, written whole or not at all. Default: standard output.
     #[arg(short, long, value_name = "FILE.jsonl")]
     output: Option<PathBuf>,
+    /// Threads [default: all cores].
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
     /// No summary on standard error.
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
 }
 
@@ -112,6 +115,7 @@ struct Line<'a> {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    backend::use_threads(args.threads)?;
     let selection = args.backend.select()?;
     let seeds = args.backend.seed_set()?;
     let force = args.force.as_deref().map(|text| Quantity::Force.parse("--force", text)).transpose()?;
@@ -343,7 +347,7 @@ impl Job<'_> {
             .collect();
         let scored =
             self.backend.score(&Batch { problems }, self.seeds, &self.options).with_context(|| format!("{}: grips from {}", self.name, counts.grips))?;
-        for (entry, Scored { worst, all, solved, compared }) in entries.iter().zip(scored) {
+        for (entry, Scored { worst, all, solved, compared, .. }) in entries.iter().zip(scored) {
             let index = counts.grips;
             counts.grips += 1;
             counts.solved += solved as u64;

@@ -121,7 +121,7 @@ impl Gpu {
             loads,
             contacts: (bytes / size_of::<ContactHeader>() as u64).min(rows) as usize,
             edges: (bytes / size_of::<EdgeRecord>() as u64) as usize,
-            basis: (bytes / size_of::<f32>() as u64) as usize,
+            basis: (bytes / size_of::<[f32; 4]>() as u64) as usize,
         };
         Ok(Self {
             info,
@@ -249,7 +249,7 @@ impl Gpu {
         let State { seeds: known, slots } = state;
         let slot = &mut slots[slot];
         let records = (chunk.loads.len() * size_of::<SeedRecord>()) as u64;
-        let basis_bytes = (chunk.basis * size_of::<f32>()) as u64;
+        let basis_bytes = (chunk.basis * size_of::<[f32; 4]>()) as u64;
         let input = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let output = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let contacts = self.upload(&mut slot.contacts, "contacts", bytemuck::cast_slice::<ContactHeader, u8>(&chunk.contacts));

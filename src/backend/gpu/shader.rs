@@ -25,6 +25,7 @@ pub(crate) fn constants() -> [(&'static str, f64); 16] {
         ("COUPLED_SHARE", f64::from(layout::COUPLED_SHARE)),
         ("LEAST_VARIATION", f64::from(layout::LEAST_VARIATION)),
         ("TILT_LIMIT", f64::from(layout::TILT_LIMIT)),
+        ("LEAST_DISSIPATION", f64::from(layout::LEAST_DISSIPATION)),
         ("DEGENERATE", f64::from(layout::DEGENERATE)),
         ("OUT_OF_RANGE", f64::from(layout::OUT_OF_RANGE)),
         ("BOUNDED", f64::from(layout::BOUNDED)),

@@ -1,7 +1,7 @@
 //! Rust f32 against WGSL, record by record, and the loss of a device.
 
 use super::super::layout::{BOUNDED, UNWRITTEN};
-use super::super::{Backend, Batch, Job, Problem, Seed, SeedStatus, cpu};
+use super::super::{Backend, Batch, Job, Polish, Problem, ScoreOptions, SeedStatus, cpu};
 use super::*;
 use crate::model::{Contact, Patch, Polygon, Wrench};
 use glam::{DVec2, DVec3};
@@ -151,38 +151,89 @@ fn the_comparer_sees_one_wrong_number() {
     }
 }
 
-/// Four chunks, the device destroyed before the third.
-fn lose_the_device(mut gpu: Gpu) -> (Result<Vec<Seed>>, Vec<Seed>, Backend) {
+/// A device that is destroyed before its third chunk of 100 loads, and a batch of 350.
+fn with_doomed_device<R>(mut gpu: Gpu, then: impl FnOnce(&Backend, &Batch<'_>) -> R) -> R {
     gpu.limits.loads = 100;
     gpu.destroy_before = AtomicU64::new(3);
     let mut random = Random(11);
     let contact = random.contact();
     let wrenches: Vec<Wrench> = (0..350).map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 }).collect();
     let batch = Batch { problems: vec![Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches }] };
-    let seeds = SeedSet::default();
-    let backend = Backend::Gpu(Box::new(gpu));
-    (backend.seed(&batch, &seeds), Backend::Cpu.seed(&batch, &seeds).unwrap(), backend)
+    then(&Backend::Gpu(Box::new(gpu)), &batch)
 }
 
 #[test]
 fn a_lost_device_is_replaced_by_the_processor_under_auto() {
     let Some(gpu) = gpu(false) else { return };
-    let (found, expected, backend) = lose_the_device(gpu);
-    let found = found.unwrap();
-    assert_eq!(found.len(), expected.len());
-    for (a, b) in found.iter().zip(&expected) {
-        assert!(a.status == b.status && (a.lower - b.lower).abs() <= 1e-4 * b.lower.max(1e-9), "{a:?} instead of {b:?}");
-    }
-    // Chunk two was in flight, three and four were never sent.
-    assert_eq!(found[200..], expected[200..]);
-    let Backend::Gpu(gpu) = &backend else { panic!("the backend changed") };
-    assert!((2..=3).contains(&gpu.chunks_redone()), "{} chunks redone", gpu.chunks_redone());
+    with_doomed_device(gpu, |backend, batch| {
+        let set = SeedSet::default();
+        let (found, expected) = (backend.seed(batch, &set).unwrap(), Backend::Cpu.seed(batch, &set).unwrap());
+        assert_eq!(found.len(), expected.len());
+        for (a, b) in found.iter().zip(&expected) {
+            assert!(a.status == b.status && (a.lower - b.lower).abs() <= 1e-4 * b.lower.max(1e-9), "{a:?} instead of {b:?}");
+        }
+        // Chunk two was in flight, three and four were never sent.
+        assert_eq!(found[200..], expected[200..]);
+        let Backend::Gpu(gpu) = backend else { panic!("the backend changed") };
+        assert!((2..=3).contains(&gpu.chunks_redone()), "{} chunks redone", gpu.chunks_redone());
+    });
+}
+
+#[test]
+fn final_answers_are_right_when_the_device_is_lost_in_mid_batch() {
+    let Some(gpu) = gpu(false) else { return };
+    with_doomed_device(gpu, |backend, batch| {
+        let (set, options) = (SeedSet::default(), ScoreOptions { polish: Polish::All, ..ScoreOptions::default() });
+        let [found, expected] = [backend, &Backend::Cpu].map(|backend| backend.score(batch, &set, &options).unwrap().remove(0));
+        let Backend::Gpu(gpu) = backend else { panic!("the backend changed") };
+        assert!(gpu.chunks_redone() > 0);
+        let ((load, worst), (expected_load, expected_worst)) = (found.worst.unwrap(), expected.worst.unwrap());
+        assert_eq!((load, worst.status), (expected_load, expected_worst.status));
+        for (a, b) in found.all.iter().zip(&expected.all) {
+            let same = a.mu_s.zip(b.mu_s).map_or(a.mu_s == b.mu_s, |(a, b)| (a / b - 1.0).abs() < 1e-9);
+            assert!(same && a.status == b.status, "{a:?} instead of {b:?}");
+        }
+    });
 }
 
 #[test]
 fn a_lost_device_is_an_error_under_gpu() {
     let Some(gpu) = gpu(true) else { return };
-    let (found, ..) = lose_the_device(gpu);
-    let message = found.unwrap_err().to_string();
-    assert!(message.contains("lost"), "{message}");
+    with_doomed_device(gpu, |backend, batch| {
+        let message = backend.seed(batch, &SeedSet::default()).unwrap_err().to_string();
+        assert!(message.contains("lost"), "{message}");
+    });
+}
+
+/// Outputs start as zeros, also in buffers used before: a record that no invocation wrote is found out.
+#[test]
+fn a_record_that_was_not_written_is_an_error() {
+    let Some(gpu) = gpu(true) else { return };
+    let set = SeedSet::default();
+    let mut random = Random(19);
+    let contact = random.contact();
+    let wrenches: Vec<Wrench> = (0..130).map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 }).collect();
+    let batch = Batch { problems: vec![Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches }] };
+    let job = Job::new(&batch, &set).unwrap();
+    let run = |forget: bool| {
+        let mut answers = vec![super::super::not_searched(SeedStatus::NoContact); job.loads];
+        let mut plans = job.plans(gpu.limits(), &mut answers).into_iter();
+        let next = || {
+            plans.next().map(|mut plan| {
+                let mut chunk = job.build(&mut plan);
+                if forget {
+                    chunk.groups.truncate(1);
+                }
+                (chunk, plan)
+            })
+        };
+        gpu.run(&set, next, |records, plan| job.scatter(&records, plan))
+    };
+    // Twice each, for both slots of buffers have been written by then.
+    for forget in [false, false, true, true] {
+        match run(forget) {
+            Ok(()) => assert!(!forget),
+            Err(error) => assert!(forget && error.to_string().contains("did not write"), "{error}"),
+        }
+    }
 }

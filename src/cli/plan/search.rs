@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -80,6 +80,10 @@ impl Search<'_> {
                         found.backend = format!("{}, then {}", checkpoint.backend, found.backend);
                     }
                     found.collector = checkpoint.collector.into_owned();
+                    if let Some(best) = &self.assessor.best {
+                        let mut best = best.lock().unwrap_or_else(PoisonError::into_inner);
+                        found.collector.scores().for_each(|score| best.insert(score));
+                    }
                 }
                 (true, false) => self.note(&format!("nothing to go on from ({file} is not there): starting at the first candidate")),
                 (false, true) => self.note(&format!("warning: {file} holds an unfinished run and will be overwritten; --resume goes on from it")),
@@ -93,6 +97,7 @@ impl Search<'_> {
         bar.reset_eta();
         let (mut saved, mut pause) = (Instant::now(), self.partial.map_or(Duration::MAX, |partial| partial.every));
         while let Some(chunk) = proposer.next() {
+            let proposed = chunk.grips.len();
             let scored = match self.assessor.assess(chunk.grips) {
                 Ok(scored) => scored,
                 Err(error) => {
@@ -104,6 +109,7 @@ impl Search<'_> {
                     return Err(error.into());
                 }
             };
+            found.collector.outrank((proposed - scored.len()) as u64);
             found.collector.add(scored, self.keep, self.assessor.settings.weights);
             done = proposer.progress();
             bar.set_position(done.candidates());

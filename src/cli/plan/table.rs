@@ -5,6 +5,7 @@ use std::io::Write;
 use comfy_table::{CellAlignment, Table, presets};
 use gripfast::gripper::Gripper;
 use gripfast::model::{Slip, Status};
+use gripfast::plan::OUTRANKED;
 use gripfast::plan::compare::places_by_score;
 use gripfast::results::{Comparison, GripSet, RankedGrip};
 
@@ -70,8 +71,11 @@ fn summary(out: &mut impl Write, set: &GripSet, gripper: &Gripper, force: f64) -
         set.summary.candidates,
         set.summary.ranked
     )?;
-    if !set.summary.rejections.is_empty() {
-        let mut reasons: Vec<_> = set.summary.rejections.iter().collect();
+    if let Some(outranked) = set.summary.rejections.get(OUTRANKED) {
+        writeln!(out, "{outranked} more were not solved: their bounds put them behind the best {}", set.grips.len())?;
+    }
+    let mut reasons: Vec<_> = set.summary.rejections.iter().filter(|(reason, _)| *reason != OUTRANKED).collect();
+    if !reasons.is_empty() {
         reasons.sort_by(|a, b| b.1.cmp(a.1));
         writeln!(out, "rejected: {}", reasons.iter().map(|(reason, count)| format!("{count} {}", reason.replace('_', " "))).collect::<Vec<_>>().join(", "))?;
     }
