@@ -13,6 +13,7 @@ override LEAST_VARIATION: f32;
 override TILT_LIMIT: f32;
 override LEAST_DISSIPATION: f32;
 override DEGENERATE: f32;
+override OUT_OF_RANGE: f32;
 override BOUNDED: u32;
 override UNBOUNDED: u32;
 override COUPLED: u32;

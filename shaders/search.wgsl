@@ -80,7 +80,7 @@ fn support(header: ContactHeader, p: Planes, entry: u32) -> vec3<f32> {
 }
 
 fn full_contact(header: ContactHeader, load: LoadRecord, mu: f32, g0: vec2<f32>, g1: vec2<f32>, g2: vec2<f32>) -> bool {
-    if load.distance < 0.0 || header.resolved == 0u {
+    if load.distance >= OUT_OF_RANGE || header.resolved == 0u {
         return false;
     }
     let reach = 0.5 * load.distance * mu;
@@ -118,7 +118,7 @@ fn full_contact(header: ContactHeader, load: LoadRecord, mu: f32, g0: vec2<f32>,
 
 fn coupled_share(header: ContactHeader, load: LoadRecord, p: Planes, upper: f32) -> f32 {
     let mu = load.scale * upper;
-    if load.distance < 0.0 || header.resolved == 0u || !p.full || mu * mu * load.distance * load.distance > 0.5 * (header.area_i + header.area_ii) {
+    if load.distance >= OUT_OF_RANGE || header.resolved == 0u || !p.full || mu * mu * load.distance * load.distance > 0.5 * (header.area_i + header.area_ii) {
         return -1.0;
     }
     let q = header.variation_first;
@@ -147,7 +147,7 @@ fn coupled_share(header: ContactHeader, load: LoadRecord, p: Planes, upper: f32)
             pressure = here * here;
         }
     }
-    let reach = 0.5 * header.softness * load.distance * mu;
+    let reach = 0.5 * header.softness * abs(load.distance) * mu;
     let c = 1.0 - reach * header.spread;
     let b = reach * variation * sqrt(far / pressure);
     if c <= 0.0 || c * c <= 4.0 * b {

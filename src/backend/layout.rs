@@ -61,8 +61,8 @@ pub const UNBOUNDED: u32 = 2;
 /// [`SeedRecord::status`]: different faces; twist and bounds that allow for the friction coupling.
 pub const COUPLED: u32 = 3;
 
-/// [`LoadRecord::distance`] of a load whose numbers leave the range in which bounds are computed.
-pub const OUT_OF_RANGE: f32 = -1.0;
+/// [`LoadRecord::distance`] of a load whose numbers leave the range in which bounds are computed: above every distance within it.
+pub const OUT_OF_RANGE: f32 = 2e6;
 
 /// Gauss-Legendre nodes and weights on `[0, 1]`, six points: `(node, weight, 0, 0)`.
 pub const GAUSS: [[f32; 4]; 6] = [
@@ -132,7 +132,7 @@ pub struct LoadRecord {
     pub m1: f32,
     /// `M2` likewise.
     pub m2: f32,
-    /// Distance between the faces over the length unit, or [`OUT_OF_RANGE`].
+    /// Distance between the faces over the length unit (negative for grips from inside), or [`OUT_OF_RANGE`].
     pub distance: f32,
 }
 

@@ -50,7 +50,7 @@ pub const F32_TOLERANCE: f64 = 2e-5;
 pub struct Problem<'a> {
     /// Contact areas in the grip frame. Problems that share the `Arc` share the work that depends on it alone.
     pub contact: &'a Arc<Contact>,
-    /// Distance between the faces [m].
+    /// Height of face I over face II [m], the `d` of the mechanics: negative for grips from inside ([`crate::model::Grip::distance`]).
     pub distance: f64,
     /// Gripping force [N].
     pub force: f64,
@@ -326,8 +326,8 @@ fn check(problem: &Problem<'_>, index: usize) -> Result<()> {
     if !(problem.force.is_finite() && problem.force > 0.0) {
         return Err(Error::input(place(), format!("gripping force {} N", problem.force), "give a positive force"));
     }
-    if !(problem.distance.is_finite() && problem.distance >= 0.0) {
-        return Err(Error::input(place(), format!("distance between the faces {} m", problem.distance), "give a distance of zero or more"));
+    if !problem.distance.is_finite() {
+        return Err(Error::input(place(), format!("distance between the faces {} m", problem.distance), "give a finite distance"));
     }
     for (load, wrench) in problem.wrenches.iter().enumerate() {
         if !(wrench.force.is_finite() && wrench.moment.is_finite()) {

@@ -4,7 +4,7 @@
 
 use super::layout::{
     BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader, DEGENERATE, EdgeRecord, LEAST_DISSIPATION, LEAST_VARIATION, LoadRecord,
-    SeedRecord, TILT_LIMIT, UNBOUNDED,
+    OUT_OF_RANGE, SeedRecord, TILT_LIMIT, UNBOUNDED,
 };
 use super::seeds::{NEGATED, RING};
 use super::table::{CORNER, SLOTS, Table};
@@ -174,7 +174,7 @@ impl Field<'_> {
             let whole = 1.0 - trace + det;
             let between = det > 0.0 && trace > 0.0 && trace < 2.0 * det;
             let lowest = if between { 1.0 - 0.25 * trace * trace / det } else { whole };
-            held[lane] = lowest >= COUPLING_MARGIN && loads.distance[lane] >= 0.0;
+            held[lane] = lowest >= COUPLING_MARGIN && loads.distance[lane] < OUT_OF_RANGE;
             let right1 = -loads.m2[lane] + reach * loads.f3[lane] / header.area_i * g[0][lane];
             let right2 = loads.m1[lane] + reach * loads.f3[lane] / header.area_i * g[1][lane];
             let b1 = k[0] * right1 + k[1] * right2;
@@ -199,7 +199,7 @@ impl Field<'_> {
     /// For different faces: the largest share by which the friction coupling can change the dissipation at any twist,
     /// or a negative number where that is not known to be small. `upper` bounds `mu_s` without coupling.
     ///
-    /// Friction moves the slope by at most `softness d/2 mu V`, where `V`, the integral of the difference of the two
+    /// Friction moves the slope by at most `softness |d|/2 mu V`, where `V`, the integral of the difference of the two
     /// pressures over both areas, bounds the difference of the two friction forces over `mu`. `V` is at most its value
     /// without coupling plus `spread` times the change of slope, and `mu` at most `upper` over 1 less the share. The
     /// three together are a quadratic equation for the share; its smaller root cannot be left on the way from no
@@ -233,12 +233,12 @@ impl Field<'_> {
         for lane in 0..LANES {
             let mu = loads.scale[lane] * upper[lane];
             let distance = loads.distance[lane];
-            let weak = mu * mu * distance * distance <= half_area && distance >= 0.0;
+            let weak = mu * mu * distance * distance <= half_area && distance < OUT_OF_RANGE;
             let (z1, z2, z3, z4) = (planes.at_i[lane], planes.at_ii[lane], planes.slope[0][lane], planes.slope[1][lane]);
             let square = q11 * z1 * z1 + q22 * z2 * z2 + q33 * z3 * z3 + q44 * z4 * z4;
             let mixed = z1 * (q12 * z2 + q13 * z3 + q14 * z4) + z2 * (q23 * z3 + q24 * z4) + q34 * z3 * z4;
             let variation = larger(square + 2.0 * mixed, 0.0).sqrt() + LEAST_VARIATION;
-            let reach = 0.5 * header.softness * distance * mu;
+            let reach = 0.5 * header.softness * distance.abs() * mu;
             let c = 1.0 - reach * header.spread;
             let b = reach * variation * (far[lane] / pressure[lane]).sqrt();
             let room = c * c - 4.0 * b;

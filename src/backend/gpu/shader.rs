@@ -13,7 +13,7 @@ pub(crate) const SEARCH: &str = include_str!("../../../shaders/search.wgsl");
 pub(crate) const GRID: u32 = 32_768;
 
 /// The constants that the shaders leave open, from [`layout`].
-pub(crate) fn constants() -> [(&'static str, f64); 16] {
+pub(crate) fn constants() -> [(&'static str, f64); 17] {
     [
         ("GROUP", layout::GROUP as f64),
         ("BASIS_GROUP", layout::BASIS_GROUP as f64),
@@ -27,6 +27,7 @@ pub(crate) fn constants() -> [(&'static str, f64); 16] {
         ("TILT_LIMIT", f64::from(layout::TILT_LIMIT)),
         ("LEAST_DISSIPATION", f64::from(layout::LEAST_DISSIPATION)),
         ("DEGENERATE", f64::from(layout::DEGENERATE)),
+        ("OUT_OF_RANGE", f64::from(layout::OUT_OF_RANGE)),
         ("BOUNDED", f64::from(layout::BOUNDED)),
         ("UNBOUNDED", f64::from(layout::UNBOUNDED)),
         ("COUPLED", f64::from(layout::COUPLED)),
