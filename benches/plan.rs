@@ -29,7 +29,7 @@ fn plan(gripper: &Gripper, loads: &LoadSet, seeds: &SeedSet) -> u64 {
     let cases = loads.cases(&mass).unwrap();
     let weights = Weights { k1: 1.0, k2: 1.0 };
     let settings = Settings { force: gripper.force[1], weights, delta: 0.0, mu_c: 0.0, pad_friction: gripper.pad_friction, score: ScoreOptions::default() };
-    let assessor = Assessor { loads: &cases, mass, settings: &settings, backend: &Backend::Cpu, seeds, best: None };
+    let assessor = Assessor { loads: &cases, mass, settings: &settings, backend: &Backend::Cpu, seeds };
     let mut collector = Collector::default();
     for chunk in Proposer::new(&part, gripper, &ProposeOptions::default()).unwrap() {
         collector.add(assessor.assess(chunk.grips).unwrap(), 10_000, weights);

@@ -7,7 +7,6 @@ pub mod compare;
 pub mod noise;
 
 use std::collections::BTreeMap;
-use std::sync::{Mutex, PoisonError};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -54,8 +53,6 @@ pub struct Assessor<'a> {
     pub backend: &'a Backend,
     /// The twists tried.
     pub seeds: &'a SeedSet,
-    /// Where only the best grips are wanted: the merits so far. `k1` must not be negative then.
-    pub best: Option<Mutex<Best>>,
 }
 
 /// Loads of one call of the backend: bounds the memory whatever the number of grips and loads.
@@ -63,21 +60,34 @@ const LOADS_AT_ONCE: usize = 1 << 20;
 
 impl Assessor<'_> {
     /// Scores every grip under its worst load, in order. The answers depend neither on the number of threads nor on the
-    /// backend. With [`Assessor::best`] the grips whose bounds show that they cannot be among the best are left out.
+    /// backend.
     ///
     /// # Errors
     /// As [`Backend::score`].
     pub fn assess(&self, grips: Vec<Grip>) -> Result<Vec<RankedGrip>> {
+        self.assess_blocks(grips, None)
+    }
+
+    /// As [`Assessor::assess`], but without the grips whose bounds show that they cannot be among the `best`, the merits
+    /// so far. The weight `k1` must not be negative.
+    ///
+    /// # Errors
+    /// As [`Backend::score_best`].
+    pub fn assess_best(&self, grips: Vec<Grip>, best: &mut Best) -> Result<Vec<RankedGrip>> {
+        self.assess_blocks(grips, Some(best))
+    }
+
+    fn assess_blocks(&self, grips: Vec<Grip>, mut best: Option<&mut Best>) -> Result<Vec<RankedGrip>> {
         let mut ranked = Vec::with_capacity(grips.len());
         let mut grips = grips.into_iter().peekable();
         while grips.peek().is_some() {
             let block: Vec<Grip> = grips.by_ref().take((LOADS_AT_ONCE / self.loads.len().max(1)).max(1)).collect();
-            ranked.extend(self.assess_block(block)?);
+            ranked.extend(self.assess_block(block, best.as_deref_mut())?);
         }
         Ok(ranked)
     }
 
-    fn assess_block(&self, grips: Vec<Grip>) -> Result<Vec<RankedGrip>> {
+    fn assess_block(&self, grips: Vec<Grip>, best: Option<&mut Best>) -> Result<Vec<RankedGrip>> {
         let in_grip = |grip: &Grip| -> Vec<Wrench> {
             self.loads.iter().map(|load| wrench_in_grip(&load.wrench, self.mass.centre_of_mass, &grip.part_from_grip)).collect()
         };
@@ -85,13 +95,12 @@ impl Assessor<'_> {
         let problems = grips.iter().zip(&wrenches);
         let problems = problems.map(|(grip, wrenches)| Problem { contact: &grip.contact, distance: grip.distance(), force: self.settings.force, wrenches });
         let batch = Batch { problems: problems.collect() };
-        let scored = match &self.best {
+        let scored = match best {
             None => self.backend.score(&batch, self.seeds, &self.settings.score)?,
             Some(best) => {
                 let alphas: Vec<f64> = grips.par_iter().map(|grip| self.alpha(grip, &TwistOut::new(&grip.contact)).0).collect();
                 let merit = |index: usize, mu: f64| self.settings.weights.score(mu, alphas[index]);
-                let mut best = best.lock().unwrap_or_else(PoisonError::into_inner);
-                self.backend.score_best(&batch, self.seeds, &self.settings.score, &mut best, &merit)?
+                self.backend.score_best(&batch, self.seeds, &self.settings.score, best, &merit)?
             }
         };
         let jobs = grips.into_par_iter().zip(wrenches.par_iter()).zip(scored).filter(|(_, scored)| !scored.outranked);

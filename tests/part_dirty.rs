@@ -157,7 +157,7 @@ fn ranking(part: &Part) -> Vec<RankedGrip> {
     let loads = LoadSet::parse("loads", "gravity").unwrap().cases(&mass).unwrap();
     let settings =
         Settings { force: 40.0, weights: Weights::default(), delta: 0.0, mu_c: 0.0, pad_friction: gripper.pad_friction, score: ScoreOptions::default() };
-    let ranked = Assessor { loads: &loads, mass, settings: &settings, backend: &Backend::Cpu, seeds: &SeedSet::default(), best: None }.assess(grips).unwrap();
+    let ranked = Assessor { loads: &loads, mass, settings: &settings, backend: &Backend::Cpu, seeds: &SeedSet::default() }.assess(grips).unwrap();
     rank::rank(ranked, mass.centre_of_mass, 0.1, &rank::Options::default()).grips
 }
 

@@ -215,7 +215,7 @@ fn displaced_grips_agree_with_pads_clipped_by_hand() {
         .to_vec();
     let settings = Settings { force: 40.0, weights: Weights::default(), delta: 0.0, mu_c: 0.0, pad_friction: None, score: ScoreOptions::default() };
     let seeds = SeedSet::with_at_least(81).unwrap();
-    let assessor = Assessor { loads: &loads, mass, settings: &settings, backend: &Backend::Cpu, seeds: &seeds, best: None };
+    let assessor = Assessor { loads: &loads, mass, settings: &settings, backend: &Backend::Cpu, seeds: &seeds };
     let mut ranked = assessor.assess(edge.iter().map(|&grip| grip.clone()).collect()).unwrap();
     noise.assess(&proposer, &assessor, &mut ranked.iter_mut().collect::<Vec<_>>()).unwrap();
     let mut lost_in_all = 0;

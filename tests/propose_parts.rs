@@ -160,7 +160,7 @@ fn scores(part: &Part, gripper: &Gripper, grips: Vec<Grip>) -> Vec<RankedGrip> {
         pad_friction: gripper.pad_friction,
         score: ScoreOptions::default(),
     };
-    Assessor { loads: &loads, mass, settings: &settings, backend: &Backend::Cpu, seeds: &SeedSet::default(), best: None }.assess(grips).unwrap()
+    Assessor { loads: &loads, mass, settings: &settings, backend: &Backend::Cpu, seeds: &SeedSet::default() }.assess(grips).unwrap()
 }
 
 /// The same candidates and grips, positions to 1 um, scores to 1e-6.

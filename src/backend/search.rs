@@ -3,8 +3,8 @@
 //! compiler turns into vector instructions. No product is fused with a sum, so the instruction set changes no bit.
 
 use super::layout::{
-    BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader, DEGENERATE, EdgeRecord, LEAST_DISSIPATION, LEAST_VARIATION, LoadRecord, OUT_OF_RANGE,
-    SeedRecord, TILT_LIMIT, UNBOUNDED,
+    BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader, DEGENERATE, EdgeRecord, LEAST_DISSIPATION, LEAST_VARIATION, LoadRecord,
+    OUT_OF_RANGE, SeedRecord, TILT_LIMIT, UNBOUNDED,
 };
 use super::seeds::{NEGATED, RING};
 use super::table::{CORNER, SLOTS, Table};

@@ -8,10 +8,9 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Mutex;
 
 use clap::{Args as ClapArgs, ValueEnum};
-use gripfast::backend::{Best, Polish, ScoreOptions};
+use gripfast::backend::{Polish, ScoreOptions};
 use gripfast::error::Error;
 use gripfast::export::{self, Format};
 use gripfast::gripper;
@@ -230,8 +229,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         return Ok(if explanation.rejection.is_none() { ExitCode::SUCCESS } else { ExitCode::from(1) });
     }
     let keep = args.kept();
-    let best = (args.polish == PolishArg::Top).then(|| Mutex::new(Best::new(keep)));
-    let assessor = Assessor { loads: &cases, mass, settings: &settings, backend: &selection.backend, seeds: &seeds, best };
+    let assessor = Assessor { loads: &cases, mass, settings: &settings, backend: &selection.backend, seeds: &seeds };
     let mut described = describe(&settings, &args, seeds.len());
     described.insert("keep".into(), keep.into());
     let partial = args.output.as_deref().and_then(Partial::beside).map(|path| Partial {
@@ -242,7 +240,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.resume && partial.is_none() {
         return Err(Error::input("--resume", "the result does not go to a regular file", "give a file after -o").into());
     }
-    let found = Search { assessor: &assessor, keep, partial: partial.as_ref(), quiet: args.quiet }.run(&mut proposer, args.resume)?;
+    let found = Search { assessor: &assessor, keep, race: args.polish == PolishArg::Top, partial: partial.as_ref(), quiet: args.quiet }
+        .run(&mut proposer, args.resume)?;
 
     let (low, high) = part.mesh.bounding_box();
     let ranking = found.collector.finish(

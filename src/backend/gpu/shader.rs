@@ -13,7 +13,7 @@ pub(crate) const SEARCH: &str = include_str!("../../../shaders/search.wgsl");
 pub(crate) const GRID: u32 = 32_768;
 
 /// The constants that the shaders leave open, from [`layout`].
-pub(crate) fn constants() -> [(&'static str, f64); 16] {
+pub(crate) fn constants() -> [(&'static str, f64); 17] {
     [
         ("GROUP", layout::GROUP as f64),
         ("BASIS_GROUP", layout::BASIS_GROUP as f64),

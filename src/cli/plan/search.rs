@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, PoisonError};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use gripfast::backend::Best;
 use gripfast::error::{Error, Result};
 use gripfast::plan::checkpoint::Checkpoint;
 use gripfast::plan::{Assessor, Collector};
@@ -60,6 +61,8 @@ pub(super) struct Search<'a> {
     pub(super) assessor: &'a Assessor<'a>,
     /// Best grips to keep.
     pub(super) keep: usize,
+    /// Whether grips that cannot be among them are left unsolved.
+    pub(super) race: bool,
     pub(super) partial: Option<&'a Partial>,
     pub(super) quiet: bool,
 }
@@ -68,6 +71,7 @@ impl Search<'_> {
     /// Looks at all candidates; with `resume` at those that the unfinished run has left, if there is one.
     pub(super) fn run(&self, proposer: &mut Proposer<'_>, resume: bool) -> anyhow::Result<Found> {
         let mut found = Found { collector: Collector::default(), complete: true, backend: self.assessor.backend.name() };
+        let mut best = self.race.then(|| Best::new(self.keep));
         let total = proposer.candidates();
         if let Some(partial) = self.partial {
             let file = partial.path.display();
@@ -80,8 +84,7 @@ impl Search<'_> {
                         found.backend = format!("{}, then {}", checkpoint.backend, found.backend);
                     }
                     found.collector = checkpoint.collector.into_owned();
-                    if let Some(best) = &self.assessor.best {
-                        let mut best = best.lock().unwrap_or_else(PoisonError::into_inner);
+                    if let Some(best) = &mut best {
                         found.collector.scores().for_each(|score| best.insert(score));
                     }
                 }
@@ -98,7 +101,11 @@ impl Search<'_> {
         let (mut saved, mut pause) = (Instant::now(), self.partial.map_or(Duration::MAX, |partial| partial.every));
         while let Some(chunk) = proposer.next() {
             let proposed = chunk.grips.len();
-            let scored = match self.assessor.assess(chunk.grips) {
+            let scored = match &mut best {
+                Some(best) => self.assessor.assess_best(chunk.grips, best),
+                None => self.assessor.assess(chunk.grips),
+            };
+            let scored = match scored {
                 Ok(scored) => scored,
                 Err(error) => {
                     bar.finish_and_clear();
