@@ -280,7 +280,7 @@ impl<'a> Solver<'a> {
     /// ends before the real `d`.
     pub fn branch(&mut self, seed: Option<Vector3<f64>>) -> Option<State> {
         if self.refiner == Refiner::Newton {
-            let q = pressure::solve(self.pads, self.load.normal, self.uncoupled_target(), &mut self.scratch[0])?;
+            let q = pressure::solve(self.pads, self.load.normal, self.uncoupled_target(), None, &mut self.scratch[0])?;
             if let Some(state) = self.direct(q, seed) {
                 return Some(state);
             }

@@ -42,8 +42,8 @@ pub enum Search {
     /// region of contact moments is looked over ([`states`]).
     #[default]
     WhereNeeded,
-    /// Never: only the branch from `d = 0` counts, and a load that it does not reach is refused. For comparing many
-    /// loads or forces before the answer that matters is solved in full.
+    /// Never: only the branch from `d = 0` counts, and a load that it does not reach is refused; no certificate is made.
+    /// For comparing many loads or forces before the answer that matters is solved in full.
     Off,
 }
 
@@ -173,7 +173,8 @@ fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, eva
         }
         slip::dissipation(&[0, 1].map(|k| Field { area: &clipped[k], p: face_pressure(&q, k) }), v).gradient
     };
-    let bounds = slip::certificate(load.direction * load.size, state.twist(), &state.friction, rotation);
+    // Answers that are only compared need no certificate.
+    let bounds = (options.search != Search::Off).then(|| slip::certificate(load.direction * load.size, state.twist(), &state.friction, rotation));
     let r = state.residual;
     let slip_residual = Vector3::new(r[0], r[1], r[2]).amax() * load.size;
     let unit = pads.length * pads.length;
@@ -185,13 +186,13 @@ fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, eva
     Score {
         status,
         // Where the residual leaves more room than the certificate, the certificate knows better.
-        mu_s: Some((state.mu_over_size * load.size).max(bounds.lower).min(bounds.upper)),
+        mu_s: Some(bounds.map_or(state.mu_over_size * load.size, |bounds| (state.mu_over_size * load.size).max(bounds.lower).min(bounds.upper))),
         slip: Some(pads.slip(state.twist())),
         pressure: Some(pads.pressure(q, force)),
         contact_area_i: state.areas[0] * unit,
         contact_area_ii: state.areas[1] * unit,
         residual: slip_residual.max(r.fixed_rows::<4>(3).amax()),
-        bounds: Some(bounds),
+        bounds,
         evaluations,
     }
 }
