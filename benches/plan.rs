@@ -7,7 +7,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
 use gripfast::backend::{Backend, ScoreOptions, SeedSet};
 use gripfast::gripper::{self, Gripper};
 use gripfast::load::LoadSet;
@@ -52,7 +52,7 @@ fn l_bracket(criterion: &mut Criterion) {
     let ball = LoadSet::parse("ball", "ball:500").unwrap();
     let seeds = SeedSet::default();
     let mut group = criterion.benchmark_group("l_bracket.stl, robotiq-2f85");
-    group.sample_size(10).measurement_time(Duration::from_secs(5)).warm_up_time(Duration::from_secs(1));
+    group.sample_size(10).sampling_mode(SamplingMode::Flat).measurement_time(Duration::from_secs(5)).warm_up_time(Duration::from_secs(1));
     let all = rayon::current_num_threads();
     for threads in if all > 1 { vec![1, all] } else { vec![1] } {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
