@@ -224,7 +224,7 @@ mod tests {
             let limit = load_multiple(&pads, distance, 1.0, &wrench, friction, &Options::default());
             let at = |multiple: f64| solve_pads(&pads, distance, 1.0 / multiple, &wrench, &Options::default());
             let held = |multiple: f64| at(multiple).status.holds() && at(multiple).mu_s.unwrap() <= friction;
-            let slips = at(limit * (1.0 + 1e-8)).status.holds();
+            let slips = at(limit * (1.0 + 1e-8)).mu_s.is_some_and(|mu| mu > friction);
             // Where the contact ends otherwise, nothing is asked of the last per cents, where the solver finds some equilibria
             // and misses others: see [`FOUND_LOST`].
             let (sharp, beyond) = if slips { (1e-8, 1e-8) } else { (0.02, 0.05) };
