@@ -16,15 +16,13 @@ use gripfast::gripper;
 use gripfast::part::{Part, ReadOptions};
 use gripfast::propose::{ProposeOptions, Proposer};
 
-/// Seconds of processor time of this process so far; `None` where /proc does not tell.
+/// Seconds of processor time of this thread so far; `None` where /proc does not tell.
 fn processor_seconds() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // Fields after the command in brackets: utime and stime are the 12th and 13th, in ticks of 10 ms.
-    let fields: Vec<&str> = text.rsplit_once(") ")?.1.split_whitespace().collect();
-    Some((fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?) / 100.0)
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    Some(text.split_whitespace().next()?.parse::<f64>().ok()? * 1e-9)
 }
 
-/// Seconds that `work` takes on one thread, without its preparation; short work is repeated for half a second and the least taken.
+/// Seconds that `work` takes on this thread, without its preparation; short work is repeated for half a second and the least taken.
 fn seconds<P, T>(prepare: impl Fn() -> P, work: impl Fn(P) -> T) -> (f64, T) {
     let begin = Instant::now();
     let mut least = f64::INFINITY;
@@ -33,9 +31,7 @@ fn seconds<P, T>(prepare: impl Fn() -> P, work: impl Fn(P) -> T) -> (f64, T) {
         let (start, processor) = (Instant::now(), processor_seconds());
         let result = work(prepared);
         let wall = start.elapsed().as_secs_f64();
-        // The clock of processor time is coarse.
-        let spent = processor.zip(processor_seconds()).map(|(a, b)| b - a).filter(|spent| *spent > 0.3).unwrap_or(wall);
-        least = least.min(spent.min(wall));
+        least = least.min(processor.zip(processor_seconds()).map_or(wall, |(before, after)| after - before));
         if begin.elapsed() > Duration::from_millis(500) {
             return (least, result);
         }

@@ -35,7 +35,7 @@ fn answers(set: &GripSet, ranked: &RankedGrip, distance: f64, force: f64) -> Vec
 fn scores_are_those_of_the_exact_solver_at_minus_the_width() {
     let scratch = tempfile::tempdir().unwrap();
     // A weak grip under a strong load: pads separate, so that the distance of the faces counts.
-    let set = plan(scratch.path(), "inside.json", &["--grips", "inside", "--accel", "1g", "--force", "30N", "--spacing", "1mm"]);
+    let set = plan(scratch.path(), "inside.json", &["--grips", "inside", "--mass", "600g", "--loads", "gravity:26", "--force", "30N", "--spacing", "1mm"]);
     assert!(set.grips.len() >= 40, "{}", set.grips.len());
     let mut told_apart = 0;
     for ranked in set.grips.iter().step_by(1 + set.grips.len() / 40) {
