@@ -81,7 +81,7 @@ fn judge(number: u64, scans: Scans) -> Tally {
             }
             let lost = check.rounding.max(1e-12) / score.contact_area_i.min(score.contact_area_ii).max(1e-300) * (length * length);
             let areas = [score.contact_area_i, score.contact_area_ii];
-            if (0..2).any(|k| !((areas[k] / check.areas[k] - 1.0).abs() <= 1e-7 + lost)) {
+            if !(0..2).all(|k| (areas[k] / check.areas[k] - 1.0).abs() <= 1e-7 + lost) {
                 wrong(format!("areas {areas:?} are {:?}", check.areas));
             }
             let slack = 1e-9 + check.rounding / mu;
@@ -177,7 +177,7 @@ fn run(first: u64, count: u64, scans: Scans) -> Tally {
 
 #[test]
 fn ten_thousand_random_cases() {
-    let tally = run(0, 10_000, Scans { refused: 0.1, ambiguous: 0.3, strong: 0.05, weak: 0.005, rays: 32, rings: 16 });
+    let tally = run(0, 10_000, Scans { refused: 0.08, ambiguous: 0.3, strong: 0.03, weak: 0.005, rays: 32, rings: 16 });
     assert!(tally.wrong.is_empty(), "{} disagreements:\n{}", tally.wrong.len(), tally.wrong.join("\n"));
     let share = |name: &str| tally.counts.get(name).copied().unwrap_or(0);
     assert!(share("status NotConverged") <= 10, "{:?}", tally.counts);

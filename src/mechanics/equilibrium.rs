@@ -303,23 +303,20 @@ impl<'a> Solver<'a> {
     /// ends close to where the tangent led. `None` where the branch turns back or ends.
     pub fn follow(&mut self, start: Vector7) -> Option<State> {
         let mut at = self.newton(start, 0.0, 25)?;
-        let (mut reached, mut step) = (0.0, 0.25);
+        let (mut reached, mut step) = (0.0, 0.1);
         while reached < 1.0 {
             let mut jacobian = Matrix7::zeros();
             let here = self.evaluate(&at.z, reached, Some(&mut jacobian));
-            if jacobian.determinant() >= 0.0 {
-                return None; // past a turning point, where the sign changes
-            }
             // The residual is linear in the coupling.
             let change = (self.evaluate(&at.z, 1.0, None).residual - here.residual) / (1.0 - reached);
             let tangent = -jacobian.lu().solve(&change)?;
             loop {
                 let next = f64::min(1.0, reached + step);
                 let moved = (next - reached) * tangent;
-                let close = |found: &State| (found.z - at.z - moved).norm() <= (0.3 * moved.norm()).max(1e-9 * at.z.norm());
+                let close = |found: &State| (found.z - at.z - moved).norm() <= (0.3 * moved.norm()).max(FOLLOW_KINK * at.z.norm());
                 let short = moved.norm() <= FOLLOW_STEP * at.z.norm();
                 match if short { self.newton(at.z + moved, next, 8) } else { None } {
-                    Some(found) if close(&found) => {
+                    Some(found) if close(&found) && self.before_turning(&found, next) => {
                         (at, reached) = (found, next);
                         step *= 2.0;
                         break;
@@ -333,10 +330,21 @@ impl<'a> Solver<'a> {
         }
         Some(at)
     }
+
+    /// Whether the determinant still has the sign with which the branch starts: past a turning point, or on another
+    /// limit state that a long step has led to, it has the other.
+    fn before_turning(&mut self, state: &State, coupling: f64) -> bool {
+        let mut jacobian = Matrix7::zeros();
+        self.evaluate(&state.z, coupling, Some(&mut jacobian));
+        jacobian.determinant() < 0.0
+    }
 }
 
 /// Longest step of [`Solver::follow`], relative to the state.
-const FOLLOW_STEP: f64 = 0.3;
+const FOLLOW_STEP: f64 = 0.1;
+/// How far from the tangent's end a step may lead, relative to the state, however short it is: where a pad begins to
+/// separate the branch turns sharply.
+const FOLLOW_KINK: f64 = 1e-3;
 /// Residual at rounding level: no further step is taken.
 const ROUNDING: f64 = 1e-14;
 
