@@ -218,23 +218,12 @@ impl<'a> Picker<'a> {
             memory[..=place].rotate_right(1);
             return Some((obstacle, volume));
         }
-        let last = memory.first().map(|(obstacle, volume, _)| (*obstacle, *volume));
-        // The body that met last is likely to meet again elsewhere, and one body is found sooner than all.
-        let mut remember = |obstacle, volume, corners| {
-            memory.truncate(MEMORY - 1);
-            memory.insert(0, (obstacle, volume, corners));
-            Some((obstacle, volume))
-        };
-        if let Some((obstacle, volume)) = last
-            && let Ready::Mesh { tree, .. } = &self.obstacles[obstacle]
-            && let Some(corners) = tree.met_by(volumes, volume, world_from_grip, near)
-        {
-            return remember(obstacle, volume, corners);
-        }
         for (obstacle, ready) in self.obstacles.iter().enumerate() {
             let Ready::Mesh { tree, .. } = ready else { continue };
             if let Some((volume, corners)) = tree.first_met(volumes, world_from_grip, near) {
-                return remember(obstacle, volume, corners);
+                memory.truncate(MEMORY - 1);
+                memory.insert(0, (obstacle, volume, corners));
+                return Some((obstacle, volume));
             }
         }
         self.obstacles.iter().enumerate().find_map(|(obstacle, ready)| match ready {

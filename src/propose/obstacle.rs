@@ -191,44 +191,32 @@ impl MeshObstacle {
         if near.is_empty() {
             return None;
         }
-        (0..volumes.list.len()).find_map(|volume| {
+        let turn = world_from_grip.rotation.transpose();
+        volumes.list.iter().enumerate().find_map(|(volume, Volume { sweep, .. })| {
+            let query = Query::new(world_from_grip, sweep.low, sweep.high);
             stack.extend_from_slice(near);
-            self.descend(volumes, volume, world_from_grip, &mut stack).map(|corners| (volume, corners))
-        })
-    }
-
-    /// A triangle that one volume meets. `stack` is room for the search.
-    pub(crate) fn met_by(&self, volumes: &Volumes, volume: usize, world_from_grip: &Frame, stack: &mut Vec<u32>) -> Option<[DVec3; 3]> {
-        stack.clear();
-        if self.tree.is_empty() || volume >= volumes.list.len() {
-            return None;
-        }
-        stack.push(0);
-        self.descend(volumes, volume, world_from_grip, stack)
-    }
-
-    /// A triangle below the nodes of `stack` that a volume meets; leaves the stack empty.
-    fn descend(&self, volumes: &Volumes, volume: usize, world_from_grip: &Frame, stack: &mut Vec<u32>) -> Option<[DVec3; 3]> {
-        let sweep = &volumes.list[volume].sweep;
-        let query = Query::new(world_from_grip, sweep.low, sweep.high);
-        while let Some(node) = stack.pop() {
-            let (middle, half) = self.tree.bounds(node);
-            if !query.overlaps(middle, half) {
-                continue;
-            }
-            match self.tree.children(node) {
-                Some(children) => stack.extend(children),
-                None => {
-                    let in_grip = |corner: DVec3| query.turn * (corner - world_from_grip.origin);
-                    let met = self.tree.triangles(node).map(|(_, corners)| corners).find(|corners| sweep.meets(corners.map(in_grip)));
-                    if met.is_some() {
-                        stack.clear();
-                        return met;
+            while let Some(node) = stack.pop() {
+                let (middle, half) = self.tree.bounds(node);
+                if !query.overlaps(middle, half) {
+                    continue;
+                }
+                match self.tree.children(node) {
+                    Some(children) => stack.extend(children),
+                    None => {
+                        let met = self
+                            .tree
+                            .triangles(node)
+                            .map(|(_, corners)| corners)
+                            .find(|corners| sweep.meets(corners.map(|corner| turn * (corner - world_from_grip.origin))));
+                        if let Some(corners) = met {
+                            stack.clear();
+                            return Some((volume, corners));
+                        }
                     }
                 }
             }
-        }
-        None
+            None
+        })
     }
 
     /// The first volume of the grip itself whose middle lies inside the closed surface: a body that meets no triangle is either
