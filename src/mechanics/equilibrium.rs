@@ -280,8 +280,9 @@ impl<'a> Solver<'a> {
     /// ends before the real `d`.
     pub fn branch(&mut self, seed: Option<Vector3<f64>>) -> Option<State> {
         if self.refiner == Refiner::Newton {
-            let q = pressure::solve(self.pads, self.load.normal, self.uncoupled_target(), None, &mut self.scratch[0])?;
-            if let Some(state) = self.direct(q, seed) {
+            // None at the rim, where [`Solver::state_at`] knows the way.
+            let q = pressure::solve(self.pads, self.load.normal, self.uncoupled_target(), None, &mut self.scratch[0]);
+            if let Some(state) = q.and_then(|q| self.direct(q, seed)) {
                 return Some(state);
             }
         }
