@@ -48,16 +48,16 @@ pub fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3]) -> Friction {
     let middle = area.middle();
     let here = (p[0] + p[1] * middle.x + p[2] * middle.y).abs();
     let thin = (p[1] * p[1] + p[2] * p[2]) * area.radius() * area.radius() > STEEP * STEEP * here * here;
-    if thin && !is_far(area, twist) { thin::friction(area, twist, p) } else { whole(area, twist, p) }
+    match (thin, is_far(area, twist)) {
+        (true, far) => thin::friction(area, twist, p, far),
+        (false, true) => far::friction(area, twist, p),
+        (false, false) => fan::friction(area, twist, p),
+    }
 }
 
 /// Pressure that changes over the area's radius by this many times its value in the middle: the area is a thin strip
 /// along its zero-pressure line. The fan's loss there, `1e-16 STEEP^2`, is still unseen.
 const STEEP: f64 = 100.0;
-
-fn whole(area: &Loops, twist: [f64; 3], p: [f64; 3]) -> Friction {
-    if is_far(area, twist) { far::friction(area, twist, p) } else { fan::friction(area, twist, p) }
-}
 
 fn is_far(area: &Loops, twist: [f64; 3]) -> bool {
     let [u1, u2, omega] = twist;

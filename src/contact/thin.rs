@@ -14,9 +14,15 @@ const NEAR: f64 = 50.0;
 /// Ratio of the distances of a piece's ends from the slip centre: small enough that [`super::FAR`] holds for it.
 const GROWTH: f64 = 1.75;
 
-/// See [`super::friction`]; the slip centre is within reach and the pressure has a slope.
-pub(super) fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3]) -> Friction {
+/// Gauss points each way on a piece that is far from the slip centre.
+const POINTS: usize = 8;
+
+/// See [`super::friction`]; the pressure has a slope, and `far` says whether the slip centre is out of reach.
+pub(super) fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3], far: bool) -> Friction {
     let [u1, u2, omega] = twist;
+    if far {
+        return super::far::pointwise(area, twist, p, POINTS);
+    }
     let c = DVec2::new(-u2 / omega, u1 / omega);
     let slope = DVec2::new(p[1], p[2]);
     let steep = slope.length();
@@ -45,7 +51,7 @@ pub(super) fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3]) -> Friction {
         if piece.is_empty() {
             return;
         }
-        let part = super::whole(&piece, twist, p);
+        let part = if super::is_far(&piece, twist) { super::far::pointwise(&piece, twist, p, POINTS) } else { super::fan::friction(&piece, twist, p) };
         for i in 0..3 {
             for j in 0..3 {
                 sum.g[i][j] += part.g[i][j];
@@ -95,7 +101,7 @@ mod tests {
             let (area, p, place) = strip(0.008);
             let c = place(s, h);
             let twist = [c.y, -c.x, 1.0];
-            let (cut, whole) = (friction(&area, twist, p), super::super::fan::friction(&area, twist, p));
+            let (cut, whole) = (friction(&area, twist, p, false), super::super::fan::friction(&area, twist, p));
             for (a, b) in cut.gradient(p).into_iter().zip(whole.gradient(p)) {
                 assert!((a - b).abs() < 1e-11, "{s} {h}: {a} {b}");
             }
