@@ -17,7 +17,7 @@ use crate::error::Result;
 use crate::geometry::patch_area;
 use crate::load::wrench_in_grip;
 use crate::mechanics::twist_out::{self, TwistOut};
-use crate::mechanics::{Options, Pads, inverse, refused};
+use crate::mechanics::{Options, Pads, Search, inverse, refused};
 use crate::model::{Grip, Patch, Status, Wrench};
 use crate::part::MassProperties;
 use crate::rank::{self, Ranking, Weights};
@@ -155,7 +155,8 @@ impl Assessor<'_> {
     /// Adds what only the grips of the final list need: the gripping force needed and the largest multiple under the worst load.
     pub fn finish(&self, grips: &mut [RankedGrip]) {
         let Some(friction) = self.settings.pad_friction else { return };
-        let options = Options { separation: self.settings.score.separation, ..Options::default() };
+        // For thousands of grips only limit states on the branch from d = 0 count, which errs towards more force.
+        let options = Options { separation: self.settings.score.separation, search: Search::Off, ..Options::default() };
         grips.par_iter_mut().for_each(|ranked| {
             let grip = &ranked.grip;
             let Some(pads) = Pads::new(&grip.contact) else { return };

@@ -16,7 +16,8 @@ use super::{COUPLING_SEARCH, Options, Pads, Search, solve_pads};
 /// leaves of the last per cent). `None` when no force up to
 /// `1e9` times the load's size holds it (or `friction` is not positive).
 ///
-/// Limit states are those that [`super::solve_pads`] finds; [`Options::search`] counts for nothing.
+/// Limit states are those that [`super::solve_pads`] finds with these `options`; with [`Search::Off`] only those on the
+/// branch from `d = 0`, which errs towards more force.
 pub fn force_needed(pads: &Pads, distance: f64, wrench: &Wrench, friction: f64, options: &Options) -> Option<f64> {
     if friction.is_nan() || friction <= 0.0 {
         return None;
@@ -29,7 +30,7 @@ pub fn force_needed(pads: &Pads, distance: f64, wrench: &Wrench, friction: f64, 
         let with = |search: Search| solve_pads(pads, distance, size / k, wrench, &Options { search, ..*options });
         let score = with(Search::Off);
         // The path from d = 0 may end before the limit states do.
-        if score.status == Status::TwistedOut { with(Search::WhereNeeded) } else { score }
+        if score.status == Status::TwistedOut && options.search != Search::Off { with(Search::WhereNeeded) } else { score }
     };
     let search = Limit { friction, solve };
     let start = START.iter().copied().find(|&k| search.holds(k))?;
