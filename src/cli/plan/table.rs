@@ -180,8 +180,12 @@ fn rank(grip: &RankedGrip) -> String {
     if grip.merged.is_empty() { grip.rank.to_string() } else { format!("{} (+{})", grip.rank, grip.merged.len()) }
 }
 
+/// A slip centre farther off than this [m] is no different from a translation to anybody who reads a table.
+const SLIDES: f64 = 1e3;
+
 fn slip(grip: &RankedGrip) -> String {
     match grip.worst.slip {
+        Some(Slip::Rotation { c, .. }) if c[0].hypot(c[1]) > SLIDES => "slides".into(),
         Some(Slip::Rotation { c, .. }) => tuple(&[c[0] * 1e3, c[1] * 1e3]),
         Some(Slip::Translation { .. }) => "slides".into(),
         _ => "-".into(),
