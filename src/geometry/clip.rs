@@ -4,7 +4,7 @@
 //! clip line. Such a ring is exact for every integral over the region; where separate, proper polygons are wanted use
 //! [`crate::geometry::overlay`].
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use crate::model::Ring;
 
@@ -29,6 +29,24 @@ impl HalfPlane {
         let normal = (b - a).perp();
         Self { normal, offset: -normal.dot(a) }
     }
+}
+
+/// The part of a plane ring in space with `sign * point[axis] <= limit`; `sign` is 1 or -1. New corners lie on the limit.
+pub fn clip_ring_axis(ring: &[DVec3], axis: usize, sign: f64, limit: f64) -> Vec<DVec3> {
+    let value = |point: DVec3| limit - sign * point[axis];
+    let mut clipped = Vec::with_capacity(ring.len() + 1);
+    for (index, &a) in ring.iter().enumerate() {
+        let b = ring[(index + 1) % ring.len()];
+        if value(a) >= 0.0 {
+            clipped.push(a);
+        }
+        if (value(a) >= 0.0) != (value(b) >= 0.0) {
+            let mut point = a + (b - a) * (value(a) / (value(a) - value(b)));
+            point[axis] = sign * limit;
+            clipped.push(point);
+        }
+    }
+    clipped
 }
 
 /// The part of `ring` inside `half`, in the ring's own sense; empty when nothing is left.

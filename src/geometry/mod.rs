@@ -9,7 +9,7 @@ pub mod hull;
 pub mod overlay;
 pub mod polygon;
 
-pub use clip::{HalfPlane, clip_ring_convex, clip_ring_half_plane, clip_ring_half_plane_into, clip_rings_half_plane};
+pub use clip::{HalfPlane, clip_ring_axis, clip_ring_convex, clip_ring_half_plane, clip_ring_half_plane_into, clip_rings_half_plane};
 pub use hull::{convex_hull, is_convex, support};
 pub use overlay::{even_odd, intersect, intersect_convex, union};
 pub use polygon::{Bounds2, Moments, area, bounds, contains, moments, normalise, patch_area, patch_moments, ring_area, transform};

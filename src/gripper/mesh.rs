@@ -9,6 +9,7 @@ use glam::DVec3;
 use parry3d_f64::transformation::try_convex_hull;
 
 use crate::error::Result;
+use crate::geometry::clip_ring_axis;
 use crate::part::{Part, ReadOptions, Unit};
 
 /// Slices of a piece along its longest side, before those are joined whose common hull fills no more space.
@@ -94,24 +95,7 @@ fn hull(points: Vec<DVec3>) -> (Vec<DVec3>, f64) {
 
 /// The part of a triangle between two values of a coordinate.
 fn clip(triangle: [DVec3; 3], axis: usize, from: f64, to: f64) -> Vec<DVec3> {
-    let mut ring = triangle.to_vec();
-    for (sign, limit) in [(1.0, to), (-1.0, -from)] {
-        let value = |point: DVec3| limit - sign * point[axis];
-        let mut next = Vec::with_capacity(ring.len() + 1);
-        for (index, &a) in ring.iter().enumerate() {
-            let b = ring[(index + 1) % ring.len()];
-            if value(a) >= 0.0 {
-                next.push(a);
-            }
-            if (value(a) >= 0.0) != (value(b) >= 0.0) {
-                let mut point = a + (b - a) * (value(a) / (value(a) - value(b)));
-                point[axis] = sign * limit;
-                next.push(point);
-            }
-        }
-        ring = next;
-    }
-    ring
+    clip_ring_axis(&clip_ring_axis(&triangle, axis, 1.0, to), axis, -1.0, -from)
 }
 
 #[cfg(test)]

@@ -230,22 +230,12 @@ impl<'a> Solver<'a> {
 
     fn state_from(&mut self, target: DVec2, seed: Option<Vector3<f64>>, start: Option<[f64; 4]>) -> Option<Vector7> {
         let q = pressure::solve(self.pads, self.load.normal, target, start, &mut self.scratch[0])?;
-        let p = [face_pressure(&q, 0), face_pressure(&q, 1)];
-        for k in 0..2 {
-            self.pads.areas[k].clip_into(p[k], &mut self.scratch[k]);
-        }
-        let fields = [Field { area: &self.scratch[0], p: p[0] }, Field { area: &self.scratch[1], p: p[1] }];
+        let fields = slip::pressed_fields(self.pads, &q, &mut self.scratch);
         let slip = slip::solve(&fields, self.load.direction, seed, self.refiner);
         self.evaluations += slip.evaluations;
         self.iterations += slip.iterations;
         let v = slip.twist;
         Some(Vector7::from([v.x, v.y, v.z, q[0], q[1], q[2], q[3]]))
-    }
-
-    /// The contact moment `(X1, X2)` that the load asks for without friction coupling.
-    pub fn uncoupled_target(&self) -> DVec2 {
-        let [m1, m2] = self.load.moment;
-        DVec2::new(-m2, m1)
     }
 
     /// Newton's method on all seven equations from the pressure `q` without coupling and a rough slip under it. Only for a
@@ -262,12 +252,7 @@ impl<'a> Solver<'a> {
             self.iterations += slip.iterations;
             slip.twist
         } else {
-            for k in 0..2 {
-                if parted[k] {
-                    self.pads.areas[k].clip_into(p[k], &mut self.scratch[k]);
-                }
-            }
-            let fields = [0, 1].map(|k| Field { area: if parted[k] { &self.scratch[k] } else { &self.pads.areas[k] }, p: p[k] });
+            let fields = slip::pressed_fields(self.pads, &q, &mut self.scratch);
             self.evaluations += 1;
             slip::approach(&fields, w, seed)
         };
@@ -281,12 +266,12 @@ impl<'a> Solver<'a> {
     pub fn branch(&mut self, seed: Option<Vector3<f64>>) -> Option<State> {
         if self.refiner == Refiner::Newton {
             // None at the rim, where [`Solver::state_at`] knows the way.
-            let q = pressure::solve(self.pads, self.load.normal, self.uncoupled_target(), None, &mut self.scratch[0]);
+            let q = pressure::solve(self.pads, self.load.normal, self.load.contact_moment(), None, &mut self.scratch[0]);
             if let Some(state) = q.and_then(|q| self.direct(q, seed)) {
                 return Some(state);
             }
         }
-        let start = self.state_at(self.uncoupled_target(), seed)?;
+        let start = self.state_at(self.load.contact_moment(), seed)?;
         let polished = match self.refiner {
             Refiner::Newton => self.newton(start, 1.0, 25),
             Refiner::Shanno => self.conjugate(start),
@@ -296,7 +281,7 @@ impl<'a> Solver<'a> {
 
     /// The solution on the branch from `d = 0`, every step of the way checked; `None` as for [`Solver::branch`].
     pub fn from_uncoupled(&mut self, seed: Option<Vector3<f64>>) -> Option<State> {
-        let start = self.state_at(self.uncoupled_target(), seed)?;
+        let start = self.state_at(self.load.contact_moment(), seed)?;
         self.follow(start)
     }
 

@@ -22,7 +22,6 @@ use crate::model::{Contact, Score, Slip, Status, Wrench};
 use equilibrium::{Solver, State};
 pub use pads::{Load, Pads};
 use pressure::face_pressure;
-use slip::Field;
 pub use slip::Refiner;
 
 /// What to do with a grip whose pads separate under the load.
@@ -166,13 +165,8 @@ pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, optio
 fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, evaluations: u32, options: &Options) -> Score {
     let q = state.q();
     let separated = (0..2).any(|k| pressure::separates(&pads.areas[k], face_pressure(&q, k)));
-    let rotation = |v| {
-        let mut clipped = [Loops::default(), Loops::default()];
-        for k in 0..2 {
-            pads.areas[k].clip_into(face_pressure(&q, k), &mut clipped[k]);
-        }
-        slip::dissipation(&[0, 1].map(|k| Field { area: &clipped[k], p: face_pressure(&q, k) }), v).gradient
-    };
+    let rotation = |v| slip::dissipation(&slip::pressed_fields(pads, &q, &mut Default::default()), v).gradient;
+    let mu_s = state.mu_over_size * load.size;
     // Answers that are only compared need no certificate.
     let bounds = (options.search != Search::Off).then(|| slip::certificate(load.direction * load.size, state.twist(), &state.friction, rotation));
     let r = state.residual;
@@ -186,7 +180,7 @@ fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, eva
     Score {
         status,
         // Where the residual leaves more room than the certificate, the certificate knows better.
-        mu_s: Some(bounds.map_or(state.mu_over_size * load.size, |bounds| (state.mu_over_size * load.size).max(bounds.lower).min(bounds.upper))),
+        mu_s: Some(bounds.map_or(mu_s, |bounds| mu_s.max(bounds.lower).min(bounds.upper))),
         slip: Some(pads.slip(state.twist())),
         pressure: Some(pads.pressure(q, force)),
         contact_area_i: state.areas[0] * unit,
@@ -200,14 +194,13 @@ fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, eva
 /// Why no pressure was found without friction's help: there is none, or the contact left is too small for doubles
 /// (below about 1e-6 of the area).
 fn out_of_reach(pads: &Pads, load: &Load) -> Status {
-    let target = glam::DVec2::new(-load.moment[1], load.moment[0]);
-    if pressure::reach(pads, load.normal, target) > 0.0 { Status::NotConverged } else { Status::TwistedOut }
+    if pressure::reach(pads, load.normal, load.contact_moment()) > 0.0 { Status::NotConverged } else { Status::TwistedOut }
 }
 
 /// No load in the pad plane: only the pressure is asked for, and any friction holds.
 fn pressed_only(pads: &Pads, force: f64, load: &Load, options: &Options) -> Score {
     let mut scratch = Loops::default();
-    let target = glam::DVec2::new(-load.moment[1], load.moment[0]);
+    let target = load.contact_moment();
     let whole = pressure::solve(pads, load.normal, target, None, &mut scratch);
     let Some(q) = whole.or_else(|| pressure::solve_near_rim(pads, load.normal, target, &mut scratch)) else {
         return refused(out_of_reach(pads, load), 0);

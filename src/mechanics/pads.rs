@@ -104,3 +104,10 @@ pub struct Load {
     /// `d/2`, negative for a grip from inside.
     pub half_distance: f64,
 }
+
+impl Load {
+    /// The contact moment `(X1, X2)` that the load asks for without friction coupling.
+    pub fn contact_moment(&self) -> DVec2 {
+        DVec2::new(-self.moment[1], self.moment[0])
+    }
+}

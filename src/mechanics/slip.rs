@@ -10,7 +10,8 @@ use nalgebra::{Matrix3, Vector3};
 use crate::contact::{Friction, Loops, friction, moments};
 use crate::model::Bounds;
 
-use super::pressure::first_moment;
+use super::pads::Pads;
+use super::pressure::{face_pressure, first_moment, separates};
 use super::shanno;
 
 /// An area with its pressure `p0 + p1 x1 + p2 x2`, not negative on the area.
@@ -20,6 +21,19 @@ pub struct Field<'a> {
     pub area: &'a Loops,
     /// The pressure coefficients.
     pub p: [f64; 3],
+}
+
+/// Both areas as the pressure `q` leaves them in contact, with it; a face that is pressed all over is not cut.
+pub fn pressed_fields<'a>(pads: &'a Pads, q: &[f64; 4], scratch: &'a mut [Loops; 2]) -> [Field<'a>; 2] {
+    let p = [face_pressure(q, 0), face_pressure(q, 1)];
+    let parted = [0, 1].map(|k| separates(&pads.areas[k], p[k]));
+    for k in 0..2 {
+        if parted[k] {
+            pads.areas[k].clip_into(p[k], &mut scratch[k]);
+        }
+    }
+    let scratch = &*scratch;
+    [0, 1].map(|k| Field { area: if parted[k] { &scratch[k] } else { &pads.areas[k] }, p: p[k] })
 }
 
 /// `D`, its gradient and its Hessian at a twist.

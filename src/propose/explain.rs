@@ -8,6 +8,7 @@ use super::site::Site;
 use super::sweep::{Stage, Sweep};
 use super::{Prepared, Proposer, work};
 use crate::error::{Error, Result};
+use crate::geometry::clip_ring_axis;
 use crate::model::{Contact, Frame, Patch, Polygon};
 use crate::part::PairKind;
 
@@ -255,17 +256,7 @@ fn common_point(sweep: &Sweep, corners: [DVec3; 3]) -> DVec3 {
     let mut ring = corners.to_vec();
     for axis in 0..3 {
         for (sign, limit) in [(1.0, sweep.high[axis]), (-1.0, -sweep.low[axis])] {
-            let value = |point: DVec3| limit - sign * point[axis];
-            let mut next = Vec::with_capacity(ring.len() + 1);
-            for (index, &a) in ring.iter().enumerate() {
-                let b = ring[(index + 1) % ring.len()];
-                if value(a) >= 0.0 {
-                    next.push(a);
-                }
-                if (value(a) >= 0.0) != (value(b) >= 0.0) {
-                    next.push(a + (b - a) * (value(a) / (value(a) - value(b))));
-                }
-            }
+            let next = clip_ring_axis(&ring, axis, sign, limit);
             if !next.is_empty() {
                 ring = next;
             }
