@@ -20,7 +20,7 @@ use super::{Friction, Loops};
 const MOST: usize = 12;
 
 /// Gauss-Legendre rules on `[0, 1]`: nodes and weights of the rule with as many points as the index says.
-static RULES: LazyLock<[Vec<(f64, f64)>; MOST + 1]> = LazyLock::new(|| std::array::from_fn(rule));
+pub(super) static RULES: LazyLock<[Vec<(f64, f64)>; MOST + 1]> = LazyLock::new(|| std::array::from_fn(rule));
 
 /// Roots of the Legendre polynomial of degree `n` by Newton's method.
 fn rule(n: usize) -> Vec<(f64, f64)> {
@@ -46,7 +46,7 @@ fn rule(n: usize) -> Vec<(f64, f64)> {
 /// Points of a rule on an edge whose half-length goes `ratio` times into the distance of the slip centre from its middle:
 /// the error falls with `rho^(-2n)`, `rho` the sum of the half-axes of the largest ellipse around the edge in which the
 /// integrand is analytic.
-fn points(ratio: f64) -> usize {
+pub(super) fn points(ratio: f64) -> usize {
     let rho = ratio + (ratio * ratio - 1.0).max(0.0).sqrt();
     // ln(1e-15)/2, and two points for the polynomial in front of the roots.
     (17.3 / rho.ln() + 2.0).ceil().clamp(3.0, MOST as f64) as usize
@@ -68,38 +68,6 @@ pub(super) fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3]) -> Friction {
         Centre { o: [o.x, o.y], y: if omega < 0.0 { [-v2, v1] } else { [v2, -v1] }, omega: omega.abs(), p: [p[0] + p[1] * o.x + p[2] * o.y, p[1], p[2]] };
     let sums = sums(area.blocks(), centre, &RULES[points(ratio)]);
     assemble(&sums, centre, if omega < 0.0 { -1.0 } else { 1.0 })
-}
-
-/// The integrals by Gauss points on each triangle (middle, A, B), as they are defined: slower than [`friction`], but what
-/// is left of the error is a share of the pressure at the points. On a contact that is thin beside the slope of its pressure
-/// the edges' errors would not cancel as the pressure's coefficients do.
-pub(super) fn pointwise(area: &Loops, [u1, u2, omega]: [f64; 3], p: [f64; 3], points: usize) -> Friction {
-    let (o, rule) = (area.middle(), &RULES[points]);
-    let mut out = Friction::ZERO;
-    for (a, b) in area.edges() {
-        let (a, b) = (a - o, b - o);
-        for &(s, ws) in rule {
-            for &(t, wt) in rule {
-                let x = o + s * (a + t * (b - a));
-                let (v1, v2) = (u1 - omega * x.y, u2 + omega * x.x);
-                let inverse = 1.0 / (v1 * v1 + v2 * v2).sqrt();
-                let (t1, t2) = (v1 * inverse, v2 * inverse);
-                let weight = ws * wt * s * a.perp_dot(b);
-                let along = [t1, t2, x.x * t2 - x.y * t1];
-                let normal = [t2, -t1, -(x.x * t1 + x.y * t2)];
-                let pressed = weight * (p[0] + p[1] * x.x + p[2] * x.y) * inverse;
-                for i in 0..3 {
-                    for (m, phi) in [1.0, x.x, x.y].into_iter().enumerate() {
-                        out.g[m][i] += weight * phi * along[i];
-                    }
-                    for j in 0..3 {
-                        out.hessian[i][j] += pressed * normal[i] * normal[j];
-                    }
-                }
-            }
-        }
-    }
-    out
 }
 
 /// Where the sums are taken: the area's middle, `Y` there, `|omega|`, and the pressure there with its slopes.
@@ -207,6 +175,36 @@ mod tests {
                 assert!((sum * (degree + 1) as f64 - 1.0).abs() < 2e-14, "{n} points, degree {degree}: {sum}");
             }
         }
+    }
+
+    /// The integrals by Gauss points on each triangle (middle, A, B), as they are defined.
+    fn pointwise(area: &Loops, [u1, u2, omega]: [f64; 3], p: [f64; 3], points: usize) -> Friction {
+        let (o, rule) = (area.middle(), &RULES[points]);
+        let mut out = Friction::ZERO;
+        for (a, b) in area.edges() {
+            let (a, b) = (a - o, b - o);
+            for &(s, ws) in rule {
+                for &(t, wt) in rule {
+                    let x = o + s * (a + t * (b - a));
+                    let (v1, v2) = (u1 - omega * x.y, u2 + omega * x.x);
+                    let inverse = 1.0 / (v1 * v1 + v2 * v2).sqrt();
+                    let (t1, t2) = (v1 * inverse, v2 * inverse);
+                    let weight = ws * wt * s * a.perp_dot(b);
+                    let along = [t1, t2, x.x * t2 - x.y * t1];
+                    let normal = [t2, -t1, -(x.x * t1 + x.y * t2)];
+                    let pressed = weight * (p[0] + p[1] * x.x + p[2] * x.y) * inverse;
+                    for i in 0..3 {
+                        for (m, phi) in [1.0, x.x, x.y].into_iter().enumerate() {
+                            out.g[m][i] += weight * phi * along[i];
+                        }
+                        for j in 0..3 {
+                            out.hessian[i][j] += pressed * normal[i] * normal[j];
+                        }
+                    }
+                }
+            }
+        }
+        out
     }
 
     /// Right at every distance, for edges short and long, and for both senses.

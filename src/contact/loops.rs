@@ -19,6 +19,9 @@ pub struct Loops {
     moments: [f64; 6],
 }
 
+/// Areas smaller than this share of the square of their radius are summed from strips after a cut.
+const SMALL: f64 = 1e-3;
+
 impl Loops {
     /// From polygons in any sense of rotation; loops of fewer than three points are dropped.
     pub fn new(patch: &[Polygon]) -> Self {
@@ -159,6 +162,23 @@ impl Loops {
             }
         }
         out.measure();
+        if out.moments[0] < SMALL * out.radius * out.radius {
+            out.moments = out.moments_of_strips(p);
+        }
+    }
+
+    /// [`Self::moments`] from the strips between the edges and the line where `p` is zero. Triangles from one point to every
+    /// edge would be far larger than a thin contact, or than contacts far apart.
+    fn moments_of_strips(&self, p: [f64; 3]) -> [f64; 6] {
+        let slope = DVec2::new(p[1], p[2]);
+        let down = slope / -slope.length_squared();
+        let foot = |x: DVec2| x + (p[0] + slope.dot(x)) * down;
+        let mut sum = [0.0; 6];
+        for (a, b) in self.edges() {
+            let strip = quadrangle_moments([a, b, foot(b), foot(a)]);
+            sum = std::array::from_fn(|i| sum[i] + strip[i]);
+        }
+        sum
     }
 }
 
@@ -187,6 +207,12 @@ fn moments_of(edges: &mut [Block], o: DVec2) -> [f64; 6] {
     // About a point of the area, then moved: a sliver far from the origin keeps its relative accuracy.
     let sums = lanes.each_ref().map(total);
     let m = [sums[0] / 2.0, sums[1] / 6.0, sums[2] / 6.0, sums[3] / 12.0, sums[4] / 24.0, sums[5] / 12.0];
+    moved(m, o)
+}
+
+/// Moments about the origin from those about `o`.
+#[inline(always)]
+fn moved(m: [f64; 6], o: DVec2) -> [f64; 6] {
     [
         m[0],
         m[1] + o.x * m[0],
@@ -195,4 +221,21 @@ fn moments_of(edges: &mut [Block], o: DVec2) -> [f64; 6] {
         m[4] + o.x * m[2] + o.y * m[1] + o.x * o.y * m[0],
         m[5] + 2.0 * o.y * m[2] + o.y * o.y * m[0],
     ]
+}
+
+/// [`super::moments`] of a quadrangle, from its triangles at the first corner.
+fn quadrangle_moments([o, one, two, three]: [DVec2; 4]) -> [f64; 6] {
+    let mut m = [0.0; 6];
+    for [a, b] in [[one, two], [two, three]] {
+        let (a, b) = (a - o, b - o);
+        let cross = a.perp_dot(b);
+        let sum = a + b;
+        m[0] += cross / 2.0;
+        m[1] += cross * sum.x / 6.0;
+        m[2] += cross * sum.y / 6.0;
+        m[3] += cross * (a.x * sum.x + b.x * b.x) / 12.0;
+        m[4] += cross * (2.0 * (a.x * a.y + b.x * b.y) + (a.x * b.y + b.x * a.y)) / 24.0;
+        m[5] += cross * (a.y * sum.y + b.y * b.y) / 12.0;
+    }
+    moved(m, o)
 }

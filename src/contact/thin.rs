@@ -1,79 +1,180 @@
 //! Friction on a contact that is thin beside the slope of its pressure: a pad about to lift off along an edge.
 //!
 //! Over the fan each edge's triangle reaches to the slip centre, where the pressure plane is far larger than on the
-//! contact, and what is left after the triangles cancel loses `1e-16 (reach/width)^2`. Here the contact is cut across
-//! into pieces whose length grows with their distance from the slip centre: the near one sees it at some
-//! of its widths, far ones are smooth. The loss left is `1e-16 reach/width`, which the pressure's own coefficients have too.
+//! contact, and what is left after the triangles cancel loses `1e-16 (reach/width)^2`. Here the integrals are taken over
+//! the strips between the edges and the zero-pressure line, along it (`u`) and up from it (`y`), where the pressure is its
+//! slope times `y`: over the area `int f = -oint (int_0^h f dy) du`. Seen from the slip centre a strip is thin, so that
+//! four Gauss points across it are enough, and along it as many as its length in distances asks for. Only beside the
+//! slip centre the fan is used. The loss left is `1e-16 reach/width`, which the pressure's own coefficients have too.
 
 use glam::DVec2;
 
+use super::far::{RULES, points};
+use super::lanes::{LANES, total, widest};
 use super::{Friction, Loops};
 
-/// Half the length, in widths, of the piece beside the slip centre: the fan's loss on it, 3e-13, is still unseen.
-const NEAR: f64 = 50.0;
-/// Ratio of the distances of a piece's ends from the slip centre: small enough that [`super::FAR`] holds for it.
-const GROWTH: f64 = 1.75;
+/// Half the length, in widths, of the piece beside the slip centre that is left to the fan, whose loss on it, 4e-14, is
+/// not seen; from there on four points across the strip leave less than 1e-15.
+const NEAR: f64 = 20.0;
+/// Half the length of the piece beside a slip centre off the strip, in distances from it.
+const ABREAST: f64 = 0.4;
+/// Ratio of the distances of a piece's ends from the slip centre.
+const GROWTH: f64 = 2.5;
+/// Heights below this many roundings of the coordinates are those of the zero-pressure line itself.
+const ROUNDINGS: f64 = 8.0;
 
-/// Gauss points each way on a piece that is far from the slip centre.
-const POINTS: usize = 8;
+/// The edge above a strip: its ends along the zero-pressure line and up from it.
+#[derive(Clone, Copy)]
+struct Edge {
+    u: [f64; 2],
+    h: [f64; 2],
+}
+
+/// The zero-pressure line: where `u` begins on it, its direction and that of rising pressure; and the slip on it.
+#[derive(Clone, Copy)]
+struct Line {
+    origin: DVec2,
+    along: DVec2,
+    up: DVec2,
+    /// Velocity at the origin.
+    velocity: DVec2,
+    omega: f64,
+    /// Rise of the pressure with the height.
+    steep: f64,
+}
 
 /// See [`super::friction`]; the pressure has a slope, and `far` says whether the slip centre is out of reach.
 pub(super) fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3], far: bool) -> Friction {
     let [u1, u2, omega] = twist;
-    if far {
-        return super::far::pointwise(area, twist, p, POINTS);
-    }
-    let c = DVec2::new(-u2 / omega, u1 / omega);
     let slope = DVec2::new(p[1], p[2]);
     let steep = slope.length();
-    let along = slope.perp() / steep;
-    // Width of the contact and distance of the slip centre from it, across the zero-pressure line.
+    let up = slope / steep;
+    let along = -up.perp();
     let height = |x: DVec2| (p[0] + slope.dot(x)) / steep;
-    let (mut width, mut low, mut high) = (0.0f64, f64::INFINITY, f64::NEG_INFINITY);
-    for &point in area.points() {
-        width = width.max(height(point));
-        let s = along.dot(point - c);
-        (low, high) = (low.min(s), high.max(s));
-    }
-    let beside = (height(c) - width).max(-height(c)).max(0.0);
-    // Beside a far centre the first piece, too, is far from it.
-    let start = (NEAR * width).max(0.3 * beside);
-    if !(width > 0.0 && start.is_finite()) {
+    let width = area.points().iter().map(|&x| height(x)).fold(0.0, f64::max);
+    if !(width > 0.0 && width.is_finite()) {
         return Friction::ZERO;
     }
-    let mut sum = Friction::ZERO;
-    let (mut kept, mut piece) = (Loops::default(), Loops::default());
-    let mut add = |from: f64, to: f64| {
-        // Where along . (x - c) lies between.
-        let origin = along.dot(c);
-        area.clip_into([-origin - from, along.x, along.y], &mut kept);
-        kept.clip_into([origin + to, -along.x, -along.y], &mut piece);
-        if piece.is_empty() {
-            return;
+    let from = if far { area.middle() } else { DVec2::new(-u2 / omega, u1 / omega) };
+    let off = height(from);
+    let origin = from - off * up;
+    let velocity = if far { DVec2::new(u1 - omega * origin.y, u2 + omega * origin.x) } else { -omega * off * up.perp() };
+    let line = Line { origin, along, up, velocity, omega, steep };
+    let noise = ROUNDINGS * f64::EPSILON * (p[0].abs() / steep + area.radius() + area.middle().length());
+    let mut edges = Vec::with_capacity(area.len());
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for (a, b) in area.edges() {
+        let edge = Edge { u: [along.dot(a - origin), along.dot(b - origin)], h: [height(a), height(b)] };
+        if edge.h[0].abs().max(edge.h[1].abs()) > noise {
+            (low, high) = (low.min(edge.u[0]).min(edge.u[1]), high.max(edge.u[0]).max(edge.u[1]));
+            edges.push(edge);
         }
-        let part = if super::is_far(&piece, twist) { super::far::pointwise(&piece, twist, p, POINTS) } else { super::fan::friction(&piece, twist, p) };
-        for i in 0..3 {
-            for j in 0..3 {
-                sum.g[i][j] += part.g[i][j];
-                sum.hessian[i][j] += part.hessian[i][j];
-            }
-        }
-    };
-    if low < start && high > -start {
-        add(-start, start);
     }
-    for sign in [1.0, -1.0] {
-        let (near, far) = if sign > 0.0 { (low, high) } else { (-high, -low) };
-        let mut from = start;
-        while from < far {
-            let to = from * GROWTH;
-            if to > near {
-                if sign > 0.0 { add(from, to) } else { add(-to, -from) }
+    let mut lanes = [[0.0; LANES]; 15];
+    if far {
+        let distance = DVec2::new(u1 - omega * from.y, u2 + omega * from.x).length() / omega.abs();
+        strips(&edges, line, [low, high], &RULES[points(distance / area.radius())], &mut lanes);
+        return assemble(&lanes);
+    }
+    let mut sum = Friction::ZERO;
+    let beside = (off - width).max(-off).max(0.0);
+    let abreast = ABREAST * beside > NEAR * width;
+    let start = if abreast { ABREAST * beside } else { NEAR * width };
+    if low < start && high > -start {
+        if abreast {
+            let (from, to) = (low.max(-start), high.min(start));
+            strips(&edges, line, [from, to], &RULES[points((1.0 + ABREAST * ABREAST).sqrt() / ABREAST)], &mut lanes);
+        } else {
+            let (mut kept, mut piece) = (Loops::default(), Loops::default());
+            let origin = along.dot(origin);
+            area.clip_into([start - origin, along.x, along.y], &mut kept);
+            kept.clip_into([start + origin, -along.x, -along.y], &mut piece);
+            sum = if super::is_far(&piece, twist) { super::far::friction(&piece, twist, p) } else { super::fan::friction(&piece, twist, p) };
+        }
+    }
+    let rule = &RULES[points((GROWTH + 1.0) / (GROWTH - 1.0))];
+    let (mut from, most) = (start, high.max(-low));
+    while from < most {
+        let to = from * GROWTH;
+        for [from, to] in [[from.max(low), to.min(high)], [(-to).max(low), (-from).min(high)]] {
+            if from < to {
+                strips(&edges, line, [from, to], rule, &mut lanes);
             }
-            from = to;
+        }
+        from = to;
+    }
+    let strips = assemble(&lanes);
+    for i in 0..3 {
+        for j in 0..3 {
+            sum.g[i][j] += strips.g[i][j];
+            sum.hessian[i][j] += strips.hessian[i][j];
         }
     }
     sum
+}
+
+widest! {
+    /// Adds the integrals over the strips under the edges between two places along the line, a Gauss point across in each
+    /// lane: `t`, `x_i t_j`, `x cross t` with the weights `1, x1, x2`, and the Hessian.
+    fn strips(edges: &[Edge], line: Line, between: [f64; 2], rule: &[(f64, f64)], lanes: &mut [[f64; LANES]; 15]) -> () = strips_of
+}
+
+#[inline(always)]
+fn strips_of(edges: &[Edge], line: Line, [from, to]: [f64; 2], rule: &[(f64, f64)], lanes: &mut [[f64; LANES]; 15]) {
+    let across: [(f64, f64); LANES] = std::array::from_fn(|i| RULES[LANES][i]);
+    let Line { origin, along, up, velocity, omega, steep } = line;
+    for edge in edges {
+        let [a, b] = edge.u;
+        let length = b - a;
+        // The part of the edge between the two places.
+        let inside = |u: f64| u.clamp(from, to);
+        let (ua, ub) = (inside(a), inside(b));
+        if ua == ub {
+            continue;
+        }
+        let at = |u: f64| edge.h[0] + (edge.h[1] - edge.h[0]) * ((u - a) / length);
+        let (ha, hb) = (if ua == a { edge.h[0] } else { at(ua) }, if ub == b { edge.h[1] } else { at(ub) });
+        for &(s, share) in rule {
+            let (u, h) = (ua + s * (ub - ua), ha + s * (hb - ha));
+            let weight = -share * (ub - ua) * h;
+            let (x, v) = (origin + u * along, velocity + (omega * u) * along.perp());
+            for i in 0..LANES {
+                let (node, part) = across[i];
+                let y = node * h;
+                let (x1, x2) = (x.x + y * up.x, x.y + y * up.y);
+                let (v1, v2) = (v.x - omega * y * up.y, v.y + omega * y * up.x);
+                let inverse = 1.0 / (v1 * v1 + v2 * v2).sqrt();
+                let (t1, t2) = (v1 * inverse, v2 * inverse);
+                let area = weight * part;
+                let (a1, a2) = (area * t1, area * t2);
+                let (turn, slide) = (x1 * a2 - x2 * a1, x1 * t1 + x2 * t2);
+                lanes[0][i] += a1;
+                lanes[1][i] += a2;
+                lanes[2][i] += turn;
+                lanes[3][i] += x1 * a1;
+                lanes[4][i] += x1 * a2;
+                lanes[5][i] += x1 * turn;
+                lanes[6][i] += x2 * a1;
+                lanes[7][i] += x2 * a2;
+                lanes[8][i] += x2 * turn;
+                // The normal of the velocity, lifted to the twist: (t2, -t1, -x.t).
+                let pressed = area * (steep * y * inverse);
+                let (n1, n2, n3) = (pressed * t2, -pressed * t1, -pressed * slide);
+                lanes[9][i] += n1 * t2;
+                lanes[10][i] -= n1 * t1;
+                lanes[11][i] -= n2 * t1;
+                lanes[12][i] -= n1 * slide;
+                lanes[13][i] -= n2 * slide;
+                lanes[14][i] -= n3 * slide;
+            }
+        }
+    }
+}
+
+fn assemble(lanes: &[[f64; LANES]; 15]) -> Friction {
+    let n = lanes.each_ref().map(total);
+    let [h11, h12, h22, h13, h23, h33] = [n[9], n[10], n[11], n[12], n[13], n[14]];
+    Friction { g: [[n[0], n[1], n[2]], [n[3], n[4], n[5]], [n[6], n[7], n[8]]], hessian: [[h11, h12, h13], [h12, h22, h23], [h13, h23, h33]] }
 }
 
 #[cfg(test)]

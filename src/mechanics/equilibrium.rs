@@ -4,7 +4,7 @@
 //! Residuals: `w - D grad D` (three), the two normal forces, the two out-of-plane moments. The Jacobian is analytic;
 //! a zero-pressure line that moves adds nothing to it because the pressure is zero there.
 
-use glam::DVec2;
+use glam::{DMat2, DVec2};
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use crate::contact::{Loops, friction, moments};
@@ -13,6 +13,7 @@ use super::pads::{Load, Pads};
 use super::pressure::{self, face_pressure, separates};
 use super::shanno;
 use super::slip::{self, Field, Refiner, Support};
+use super::states::Node;
 
 pub(super) type Vector7 = SVector<f64, 7>;
 pub(super) type Matrix7 = SMatrix<f64, 7, 7>;
@@ -256,9 +257,8 @@ impl<'a> Solver<'a> {
             self.evaluations += 1;
             slip::approach(&fields, w, seed)
         };
-        let state = self.newton(Vector7::from([v.x, v.y, v.z, q[0], q[1], q[2], q[3]]), 1.0, 25)?;
-        let coupling = state.mu_over_size * self.load.size * 2.0 * self.load.half_distance.abs();
-        (coupling <= super::COUPLING_SEARCH).then_some(state)
+        let state = self.newton(Vector7::from([v.x, v.y, v.z, q[0], q[1], q[2], q[3]]), 1.0, 12)?;
+        (!super::strong(&state, &self.load)).then_some(state)
     }
 
     /// The solution on the branch that starts at `d = 0` without coupling; `None` when that branch does not exist, or
@@ -272,10 +272,7 @@ impl<'a> Solver<'a> {
             }
         }
         let start = self.state_at(self.load.contact_moment(), seed)?;
-        let polished = match self.refiner {
-            Refiner::Newton => self.newton(start, 1.0, 25),
-            Refiner::Shanno => self.conjugate(start),
-        };
+        let polished = if self.refiner == Refiner::Shanno { self.conjugate(start) } else { None };
         polished.or_else(|| self.follow(start))
     }
 
@@ -285,31 +282,49 @@ impl<'a> Solver<'a> {
         self.follow(start)
     }
 
-    /// Follows the branch from coupling 0 to 1: along its tangent, then Newton's method, in steps short enough that each
-    /// ends close to where the tangent led. `None` where the branch turns back or ends.
+    /// The solution close to `z`, that of another load, by Newton's method from there; where the coupling is so strong that
+    /// there may be others, only a short way off and on the same side of any turning point.
+    pub(super) fn next_to(&mut self, z: &Vector7) -> Option<State> {
+        let found = self.newton(*z, 1.0, 6)?;
+        if super::strong(&found, &self.load) {
+            let to = self.node(&found.z)?;
+            let x = pressure::carried(self.pads, &[z[3], z[4], z[5], z[6]], &mut self.scratch[0]);
+            if to.x.distance(x) > FOLLOW_STEP / 2.0 || to.slope.determinant() <= 0.0 {
+                return None;
+            }
+        }
+        Some(found)
+    }
+
+    /// Follows the branch from coupling 0 to 1, in the plane of contact moments where even the last of a contact has room:
+    /// along its tangent, then Newton's method, in steps short enough that each ends close to where the tangent led.
+    /// `None` where the branch turns back or ends.
     pub fn follow(&mut self, start: Vector7) -> Option<State> {
         let mut at = self.newton(start, 0.0, 25)?;
-        let (mut reached, mut step) = (0.0, 0.1);
+        let (mut reached, mut step) = (if self.load.half_distance == 0.0 { 1.0 } else { 0.0 }, 1.0);
         while reached < 1.0 {
-            let mut jacobian = Matrix7::zeros();
-            let here = self.evaluate(&at.z, reached, Some(&mut jacobian));
-            // The residual is linear in the coupling.
-            let change = (self.evaluate(&at.z, 1.0, None).residual - here.residual) / (1.0 - reached);
-            let tangent = -jacobian.lu().solve(&change)?;
+            let here = self.node(&at.z)?;
+            // `g` is linear in the coupling, `x - x_0` without it.
+            let friction = here.g - (here.x - self.load.contact_moment());
+            let slope = Self::slope_at(&here, reached);
+            let tangent = -(slope.inverse() * friction);
+            let room = pressure::reach(self.pads, self.load.normal, here.x);
             loop {
                 let next = f64::min(1.0, reached + step);
                 let moved = (next - reached) * tangent;
-                let close = |found: &State| (found.z - at.z - moved).norm() <= (0.3 * moved.norm()).max(FOLLOW_KINK * at.z.norm());
-                let short = moved.norm() <= FOLLOW_STEP * at.z.norm();
-                match if short { self.newton(at.z + moved, next, 8) } else { None } {
-                    Some(found) if close(&found) && self.before_turning(&found, next) => {
+                let left = pressure::reach(self.pads, self.load.normal, here.x + moved);
+                let short = moved.length() <= FOLLOW_STEP && left >= FOLLOW_SHARE * room;
+                let found = if short { self.onwards(&at, here.x + moved, next) } else { None };
+                let close = |node: &Node| (node.x - here.x - moved).length() <= (0.3 * moved.length()).max(FOLLOW_KINK);
+                match found {
+                    Some((found, node)) if close(&node) && Self::slope_at(&node, next).determinant() > 0.0 => {
                         (at, reached) = (found, next);
                         step *= 2.0;
                         break;
                     }
                     _ => step /= 2.0,
                 }
-                if step < 1e-5 {
+                if step < FOLLOW_LEAST {
                     return None;
                 }
             }
@@ -317,19 +332,50 @@ impl<'a> Solver<'a> {
         Some(at)
     }
 
-    /// Whether the determinant still has the sign with which the branch starts: past a turning point, or on another
-    /// limit state that a long step has led to, it has the other.
-    fn before_turning(&mut self, state: &State, coupling: f64) -> bool {
-        let mut jacobian = Matrix7::zeros();
-        self.evaluate(&state.z, coupling, Some(&mut jacobian));
-        jacobian.determinant() < 0.0
+    /// The solution at a coupling near the contact moment `x`, found from the solution `at`, and its point of the map:
+    /// Newton's method on the map until what is left is small beside the room there, then on all seven equations.
+    fn onwards(&mut self, at: &State, mut x: DVec2, coupling: f64) -> Option<(State, Node)> {
+        let (mut z, mut before) = (at.z, f64::INFINITY);
+        loop {
+            z = self.state_near(x, Some(&z))?;
+            let node = self.node(&z)?;
+            let left = coupling * node.g + (1.0 - coupling) * (node.x - self.load.contact_moment());
+            let (size, room) = (left.length(), pressure::reach(self.pads, self.load.normal, x));
+            if size <= FOLLOW_CLOSE * room
+                && let Some(found) = self.newton(z, coupling, 8)
+            {
+                let node = self.node(&found.z)?;
+                return Some((found, node));
+            }
+            let step = Self::slope_at(&node, coupling).inverse() * left;
+            if size > 0.5 * before || !step.is_finite() {
+                return None;
+            }
+            (x, before) = (x - step, size);
+        }
+    }
+
+    /// Derivative of `g` at a coupling. Its determinant is positive where the branch starts and changes its sign at a
+    /// turning point; another limit state that a long step has led to most often has the other sign, too.
+    fn slope_at(node: &Node, coupling: f64) -> DMat2 {
+        DMat2::IDENTITY + coupling * (node.slope - DMat2::IDENTITY)
+    }
+
+    pub(super) fn scratch(&mut self) -> &mut Loops {
+        &mut self.scratch[0]
     }
 }
 
-/// Longest step of [`Solver::follow`], relative to the state.
-const FOLLOW_STEP: f64 = 0.1;
-/// How far from the tangent's end a step may lead, relative to the state, however short it is: where a pad begins to
-/// separate the branch turns sharply.
+/// Longest step of [`Solver::follow`] in contact moment, of force times the pads' length.
+const FOLLOW_STEP: f64 = 0.25;
+/// Shortest step in coupling.
+const FOLLOW_LEAST: f64 = 1e-9;
+/// Share that a step leaves of the way to the region's rim, where no contact is left.
+const FOLLOW_SHARE: f64 = 0.25;
+/// What [`Solver::follow`] leaves to Newton's method on all equations, as a share of the way to the rim.
+const FOLLOW_CLOSE: f64 = 1e-3;
+/// How far from the tangent's end a step may lead, however short it is: where a pad begins to separate the branch turns
+/// sharply.
 const FOLLOW_KINK: f64 = 1e-3;
 /// Residual at rounding level: no further step is taken.
 const ROUNDING: f64 = 1e-14;

@@ -19,7 +19,7 @@ use crate::contact::Loops;
 use crate::error::{Error, Result};
 use crate::model::{Contact, Score, Slip, Status, Wrench};
 
-use equilibrium::{Solver, State};
+use equilibrium::{Solver, State, Vector7};
 pub use pads::{Load, Pads};
 use pressure::face_pressure;
 pub use slip::Refiner;
@@ -143,9 +143,8 @@ pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, optio
     let seed = options.seed.map(|twist| pads.scaled_twist(twist));
     let mut solver = Solver::new(pads, load, options.refiner);
     let branch = solver.branch(seed);
-    let strong = |state: &State| state.mu_over_size * load.size * 2.0 * load.half_distance.abs() > COUPLING_SEARCH;
     let (state, unique) = match branch {
-        Some(state) if options.search == Search::Off || !strong(&state) => (state, true),
+        Some(state) if options.search == Search::Off || !strong(&state, &load) => (state, true),
         None if load.half_distance == 0.0 => return refused(out_of_reach(pads, &load), solver.evaluations),
         None if options.search == Search::Off => return refused(Status::TwistedOut, solver.evaluations),
         branch => {
@@ -159,6 +158,30 @@ pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, optio
         }
     };
     finish(pads, force, &load, &state, unique, solver.evaluations, options)
+}
+
+/// [`solve_pads`] with [`Search::Off`] for one load after the other, each close to the one before: `near` holds the limit
+/// state of that one, from which Newton's method starts.
+fn solve_next(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, options: &Options, near: &mut Option<Vector7>) -> Score {
+    let options = &Options { search: Search::Off, ..*options };
+    let load = pads.load(distance, force, wrench);
+    if load.normal.iter().any(|&n| n <= 0.0) || load.size == 0.0 {
+        return solve_pads(pads, distance, force, wrench, options);
+    }
+    let mut solver = Solver::new(pads, load, options.refiner);
+    match near.and_then(|z| solver.next_to(&z)).or_else(|| solver.branch(None)) {
+        Some(state) => {
+            *near = Some(state.z);
+            finish(pads, force, &load, &state, true, solver.evaluations, options)
+        }
+        None if load.half_distance == 0.0 => refused(out_of_reach(pads, &load), solver.evaluations),
+        None => refused(Status::TwistedOut, solver.evaluations),
+    }
+}
+
+/// Whether there may be other limit states than this one.
+fn strong(state: &State, load: &Load) -> bool {
+    state.mu_over_size * load.size * 2.0 * load.half_distance.abs() > COUPLING_SEARCH
 }
 
 /// Turns a solved state into an answer with its certificate.

@@ -32,6 +32,12 @@ pub fn pressed_moments(pads: &Pads, q: &[f64; 4], scratch: &mut Loops) -> [[f64;
     })
 }
 
+/// The contact moment `(X1, X2)` that the pressure `q` carries.
+pub fn carried(pads: &Pads, q: &[f64; 4], scratch: &mut Loops) -> DVec2 {
+    let [one, two] = pressed_moments(pads, q, scratch);
+    first_moment(&one, face_pressure(q, 0)) - first_moment(&two, face_pressure(q, 1))
+}
+
 /// `int p x` over an area with these moments.
 pub fn first_moment(m: &[f64; 6], p: [f64; 3]) -> DVec2 {
     DVec2::new(p[0] * m[1] + p[1] * m[3] + p[2] * m[4], p[0] * m[2] + p[1] * m[4] + p[2] * m[5])

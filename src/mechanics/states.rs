@@ -30,13 +30,15 @@ const PIECES: usize = 8;
 /// Corners of the rim up to which each gets a ray of its own.
 const CORNERS: usize = 16;
 /// Rings at the start.
-const RINGS: u32 = 3;
+const RINGS: u32 = 4;
 /// Halvings of a starting cell along each coordinate.
 const HALVINGS: u32 = 6;
-/// The outermost ring, in the coordinate whose fourth power is the distance from the rim: 3e-3 of the way to the middle.
-/// There a contact is down to about 1e-2 of its width; the map hardly changes from there to the rim, where the pressure
+/// The outermost ring, in the coordinate whose fourth power is the distance from the rim: 1e-4 of the way to the middle.
+/// There a contact is down to about 3e-4 of its width; the map hardly changes from there to the rim, where the pressure
 /// is left on an edge or a corner, and Newton's method is started from every point of this ring with a small value.
-const OUTERMOST: f64 = 0.77;
+const OUTERMOST: f64 = 0.9;
+/// The innermost ring within which the zeros must be counted to call the search complete: 1 % of the way from the rim.
+const WITHIN: u32 = RINGS - 1;
 /// A cell holds no zero when its corners' values stay this many times the bend away from zero. Inside a cell a quadratic
 /// map strays by at most half the bend from the values between its corners.
 const BEND: f64 = 0.75;
@@ -44,19 +46,25 @@ const BEND: f64 = 0.75;
 const BEND_AGAIN: f64 = 3.0;
 /// Value on the outermost ring, in units of force times the pads' length, from which a zero beyond it is sought.
 const BEYOND: f64 = 0.05;
+/// Newton's step on the outermost ring, in its distances from the rim, up to which the same.
+const BEYOND_STEPS: f64 = 30.0;
+/// The same, up to which there should be one.
+const EXPECTED_STEPS: f64 = 5.0;
 /// Residual of the slip's equations up to which a point of the map is drawn; the states themselves are solved in full.
 const LOOSE: f64 = 1e-4;
 /// Most points looked at, and most starts of Newton's method.
-const MOST_NODES: usize = 400;
+const MOST_NODES: usize = 500;
 const MOST_STARTS: usize = 60;
 
 /// A point of the map.
 #[derive(Debug, Clone, Copy)]
-struct Node {
-    x: DVec2,
-    g: DVec2,
+pub(super) struct Node {
+    /// Contact moment.
+    pub(super) x: DVec2,
+    /// What (6)(7) leave over.
+    pub(super) g: DVec2,
     /// Derivative of `g`.
-    slope: DMat2,
+    pub(super) slope: DMat2,
     z: Vector7,
 }
 
@@ -88,6 +96,29 @@ impl Solver<'_> {
         };
         states.sort_by(|a, b| a.mu_over_size.total_cmp(&b.mu_over_size));
         LimitStates { states, complete }
+    }
+
+    /// The point of the map whose pressure and slip are those of `z`; `None` where they do not fit each other.
+    pub(super) fn node(&mut self, z: &Vector7) -> Option<Node> {
+        let mut jacobian = Matrix7::zeros();
+        let state = self.evaluate(z, 1.0, Some(&mut jacobian));
+        if state.residual.fixed_rows::<5>(0).amax() > LOOSE {
+            return None;
+        }
+        let g = DVec2::new(state.residual[6], -state.residual[5]);
+        // Moving along the states of given contact moment: the first five equations stay, X moves.
+        let stiffness = pressure::stiffness(&pressure::pressed_moments(self.pads, &state.q(), self.scratch()));
+        let carried = stiffness * nalgebra::Vector4::from(state.q());
+        let mut along = jacobian;
+        along.fixed_view_mut::<2, 7>(5, 0).fill(0.0);
+        along.fixed_view_mut::<2, 4>(5, 3).copy_from(&stiffness.fixed_view::<2, 4>(2, 0));
+        let mut unit = SMatrix::<f64, 7, 2>::zeros();
+        unit[(5, 0)] = 1.0;
+        unit[(6, 1)] = 1.0;
+        let moved = along.lu().solve(&unit)?;
+        let change = jacobian.fixed_view::<2, 7>(5, 0) * moved;
+        let slope = DMat2::from_cols(DVec2::new(change[(1, 0)], -change[(0, 0)]), DVec2::new(change[(1, 1)], -change[(0, 1)]));
+        (g.is_finite() && slope.is_finite()).then_some(Node { x: DVec2::new(carried[2], carried[3]), g, slope, z: *z })
     }
 
     /// `1` or `-1`: how often `g` turns about the state.
@@ -146,37 +177,23 @@ impl<'s, 'a> Map<'s, 'a> {
     }
 
     fn look(&mut self, x: DVec2, near: Option<&Node>) -> Option<Node> {
-        let z = self.solver.state_near(x, near.map(|near| &near.z))?;
-        let mut jacobian = Matrix7::zeros();
-        let state = self.solver.evaluate(&z, 1.0, Some(&mut jacobian));
-        if state.residual.fixed_rows::<5>(0).amax() > LOOSE {
-            return None;
-        }
-        let g = DVec2::new(state.residual[6], -state.residual[5]);
-        // Moving along the states of given contact moment: the first five equations stay, X moves.
-        let moments = pressure::pressed_moments(self.solver.pads, &state.q(), &mut self.scratch);
-        let mut along = jacobian;
-        along.fixed_view_mut::<2, 7>(5, 0).fill(0.0);
-        along.fixed_view_mut::<2, 4>(5, 3).copy_from(&pressure::stiffness(&moments).fixed_view::<2, 4>(2, 0));
-        let mut unit = SMatrix::<f64, 7, 2>::zeros();
-        unit[(5, 0)] = 1.0;
-        unit[(6, 1)] = 1.0;
-        let moved = along.lu().solve(&unit)?;
-        let change = jacobian.fixed_view::<2, 7>(5, 0) * moved;
-        let slope = DMat2::from_cols(DVec2::new(change[(1, 0)], -change[(0, 0)]), DVec2::new(change[(1, 1)], -change[(0, 1)]));
-        (g.is_finite() && slope.is_finite()).then_some(Node { x, g, slope, z })
+        let z = match near {
+            Some(near) => self.solver.state_near(x, Some(&near.z)),
+            None => self.solver.state_at(x, None),
+        }?;
+        self.solver.node(&z)
     }
 
     /// Adds the zeros found to `states`; whether their signs add up.
     fn search(&mut self, states: &mut Vec<State>) -> bool {
         self.cells(BEND, MOST_NODES, states);
-        self.beyond(states);
+        let open = self.beyond(states);
         // On slivers the outermost points can be beyond what doubles resolve: then the next ring in.
         let Some((ring, turns)) = (1..=RINGS).rev().find_map(|ring| Some((ring, self.winding(ring << HALVINGS)?))) else { return false };
         if self.signs(states, ring) != turns {
             self.cells(BEND_AGAIN, 2 * MOST_NODES, states);
         }
-        self.signs(states, ring) == turns
+        ring >= WITHIN && !open && self.signs(states, ring) == turns
     }
 
     /// Goes through the mesh, coarse cells first, so that the budget is spent evenly.
@@ -210,9 +227,7 @@ impl<'s, 'a> Map<'s, 'a> {
 
     /// How far out a state's contact moment lies: 0 in the middle, 1 on the rim.
     fn share(&mut self, state: &State) -> f64 {
-        let moments = pressure::pressed_moments(self.solver.pads, &state.q(), &mut self.scratch);
-        let carried = pressure::stiffness(&moments) * nalgebra::Vector4::from(state.q());
-        let x = DVec2::new(carried[2], carried[3]) - self.middle;
+        let x = pressure::carried(self.solver.pads, &state.q(), &mut self.scratch) - self.middle;
         let outward = |edge: &[DVec2]| {
             let normal = -(edge[1] - edge[0]).perp();
             normal.dot(x) / normal.dot(edge[0]).max(f64::MIN_POSITIVE)
@@ -252,15 +267,21 @@ impl<'s, 'a> Map<'s, 'a> {
         at
     }
 
-    /// Zeros between the outermost ring and the rim: the value on the ring is small beside them.
-    fn beyond(&mut self, states: &mut Vec<State>) {
+    /// Zeros between the outermost ring and the rim: the value on the ring is small beside them. Whether there should be
+    /// one, but none was found.
+    fn beyond(&mut self, states: &mut Vec<State>) -> bool {
         let ring = RINGS << HALVINGS;
         let mut near: Vec<Node> = self.nodes.iter().filter(|(key, _)| key.1 == ring).filter_map(|(_, node)| *node).collect();
-        near.retain(|node| node.g.length() < BEYOND);
-        near.sort_by(|a, b| a.g.length().total_cmp(&b.g.length()));
+        let step = |node: &Node| (node.slope.inverse() * node.g).length();
+        let room = (1.0 - OUTERMOST).powi(4) * self.pieces.iter().flatten().map(|corner| corner.length()).fold(0.0, f64::max);
+        near.retain(|node| node.g.length() < BEYOND || step(node) < BEYOND_STEPS * room);
+        near.sort_by(|a, b| step(a).total_cmp(&step(b)));
         for node in near.iter().take(8) {
             self.start(node, states);
         }
+        let expected = near.first().is_some_and(|node| step(node) < EXPECTED_STEPS * room);
+        let outermost = 1.0 - (1.0 - OUTERMOST).powi(4);
+        expected && !states.iter().any(|state| self.share(state) > outermost)
     }
 
     /// Sets the cell aside, finds its zero, or cuts it.

@@ -5,7 +5,7 @@ use gripfast::contact::friction;
 use gripfast::model::{Score, Slip};
 
 use super::cases::Case;
-use super::{Rings, loops, moments, pressed, rings};
+use super::{Rings, loops, moments, precise, pressed, rings};
 
 /// What the equations say of an answer.
 #[derive(Debug, Clone, Copy)]
@@ -38,13 +38,15 @@ pub(crate) fn check(case: &Case, score: &Score) -> Option<Check> {
     for k in 0..2 {
         let p = planes[k];
         let contact = pressed(&whole[k], p);
-        let m = moments(&contact);
-        areas[k] = m[0];
-        normal[k] = p[0] * m[0] + p[1] * m[1] + p[2] * m[2];
+        let [area, force, x1, x2] = precise::pressed(&whole[k], p);
+        areas[k] = area;
+        normal[k] = force;
         let sign = [1.0, -1.0][k];
-        x += sign * DVec2::new(p[0] * m[1] + p[1] * m[3] + p[2] * m[4], p[0] * m[2] + p[1] * m[4] + p[2] * m[5]);
+        x += sign * DVec2::new(x1, x2);
         let reach = contact.iter().flatten().map(|x| p[0].abs() + (p[1] * x.x).abs() + (p[2] * x.y).abs()).fold(0.0, f64::max);
-        rounding += f64::EPSILON * reach * m[0] / case.force;
+        // In the moments each part counts with its lever.
+        let lever = contact.iter().flatten().map(|x| x.length() / length).fold(1.0, f64::max);
+        rounding += f64::EPSILON * reach * area * lever / case.force;
         if twist != [0.0; 3] {
             // Force -mu p t on the body, moment about the origin.
             friction_on_body[k] = friction(&loops(&contact), twist, p).gradient(p).map(|g| -mu * g);
@@ -67,5 +69,7 @@ pub(crate) fn check(case: &Case, score: &Score) -> Option<Check> {
     // Where the load is far larger than Fn, the equations' own terms are.
     let load = f.truncate().length().max(m.z.abs() / length) / case.force;
     let largest = 1.0 + load * (1.0 + d.abs() / length);
-    Some(Check { residual: residual / largest, rounding: 16.0 * rounding, areas, coupling })
+    // The pressures' rounding enters as it is, and as friction with its lever.
+    let terms = 1.0 + mu * (1.0 + d.abs() / 2.0 / length);
+    Some(Check { residual: residual / largest, rounding: 16.0 * rounding * terms / largest, areas, coupling })
 }

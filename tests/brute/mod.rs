@@ -10,6 +10,7 @@
 
 pub(crate) mod cases;
 mod equations;
+mod precise;
 
 use glam::DVec2;
 use gripfast::contact::{Loops, friction};
