@@ -12,17 +12,16 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::gripper::Gripper;
 use crate::model::{Frame, Grip};
-use crate::propose::obstacle::{Course, MeshObstacle, Volumes};
+use crate::propose::nearby::Nearby;
+use crate::propose::obstacle::{Course, MeshObstacle, Room, Volumes};
 use crate::results::GripSet;
 
 pub use crate::propose::obstacle::Phase;
 pub use scene::{Obstacle, Opening, Reach, Retreat, Scene, Solid};
 
-/// Grips that one thread tests after each other. What a piece remembers of earlier collisions stays within it, so that reasons do not
+/// Grips that one thread tests after each other. What a piece remembers of the last collision stays within it, so that reasons do not
 /// depend on the number of threads.
 const PIECE: usize = 64;
-/// Collisions remembered within a piece: the grips of a list are often neighbours and meet the same triangle.
-const MEMORY: usize = 6;
 
 /// Way of each jaw for lists that do not say how they were planned [m].
 const PLANNED_OPENING: f64 = 5e-3;
@@ -71,13 +70,12 @@ pub struct Picker<'a> {
     scene: &'a Scene,
     gripper: Gripper,
     obstacles: Vec<Ready>,
+    /// Of the meshes among them.
+    nearby: Option<Nearby>,
     /// Swept bodies for each width that occurs, and the number of those of each grip; without them the stroke does not suffice.
     volumes: Vec<Volumes>,
     volumes_of: Vec<std::result::Result<u32, f64>>,
 }
-
-/// What a piece remembers of a collision: obstacle, volume, triangle.
-type Memory = Vec<(usize, usize, [DVec3; 3])>;
 
 impl<'a> Picker<'a> {
     /// Prepares to pick from `set` in `scene`.
@@ -87,8 +85,14 @@ impl<'a> Picker<'a> {
     pub fn new(set: &'a GripSet, scene: &'a Scene) -> Result<Self> {
         let gripper: Gripper = serde_json::from_value(set.gripper.clone())
             .map_err(|error| Error::input("gripper in the result file", format!("cannot be read: {error}"), "write the result anew with `gripfast plan`"))?;
-        let obstacles = scene.obstacles.iter().map(ready).collect();
-        let mut picker = Self { set, scene, gripper, obstacles, volumes: Vec::new(), volumes_of: Vec::with_capacity(set.grips.len()) };
+        let obstacles: Vec<Ready> = scene.obstacles.iter().map(ready).collect();
+        let nearby = Nearby::new(|| {
+            obstacles.iter().enumerate().flat_map(|(obstacle, ready)| {
+                let mesh = if let Ready::Mesh { tree, .. } = ready { Some(tree) } else { None };
+                mesh.into_iter().flat_map(MeshObstacle::triangles).map(move |(triangle, corners)| (obstacle as u32, triangle, corners))
+            })
+        });
+        let mut picker = Self { set, scene, gripper, obstacles, nearby, volumes: Vec::new(), volumes_of: Vec::with_capacity(set.grips.len()) };
         let mut known: HashMap<(u64, bool), std::result::Result<u32, f64>> = HashMap::new();
         for ranked in &set.grips {
             let entry = known.entry((ranked.grip.width.to_bits(), ranked.grip.inside)).or_insert_with(|| {
@@ -151,15 +155,15 @@ impl<'a> Picker<'a> {
         if index >= self.set.grips.len() {
             return None;
         }
-        self.reason(index, world_from_part, &mut Memory::new(), &mut Vec::new())
+        self.reason(index, world_from_part, &mut Room::default())
     }
 
     /// Reasons of a run of grips up to the first free one, and whether there is one.
     fn piece(&self, grips: std::ops::Range<usize>, world_from_part: &Frame) -> (Vec<Reason>, bool) {
         let mut reasons = Vec::with_capacity(grips.len());
-        let (mut memory, mut near) = (Memory::new(), Vec::new());
+        let mut room = Room::default();
         for index in grips {
-            match self.reason(index, world_from_part, &mut memory, &mut near) {
+            match self.reason(index, world_from_part, &mut room) {
                 Some(reason) => reasons.push(reason),
                 None => return (reasons, true),
             }
@@ -168,7 +172,7 @@ impl<'a> Picker<'a> {
     }
 
     /// Why a grip is not free, cheapest questions first.
-    fn reason(&self, index: usize, world_from_part: &Frame, memory: &mut Memory, near: &mut Vec<u32>) -> Option<Reason> {
+    fn reason(&self, index: usize, world_from_part: &Frame, room: &mut Room) -> Option<Reason> {
         let world_from_grip = world_from_part.compose(&self.set.grips[index].grip.part_from_grip);
         let approach = world_from_grip.rotation.x_axis;
         if let Some((axis, half_angle)) = self.scene.cone {
@@ -188,7 +192,7 @@ impl<'a> Picker<'a> {
             Ok(volumes) => &self.volumes[volumes as usize],
             Err(gap) => return Some(Reason::Stroke(gap)),
         };
-        if let Some((obstacle, volume)) = self.collision(volumes, &world_from_grip, memory, near) {
+        if let Some((obstacle, volume)) = self.collision(volumes, &world_from_grip, room) {
             return Some(explain(obstacle, volumes, volume));
         }
         let Retreat::Along(way) = self.scene.retreat else { return None };
@@ -196,11 +200,11 @@ impl<'a> Picker<'a> {
         let course = self.course(grip).ok()?;
         let retreat = world_from_grip.rotation.transpose() * way;
         let volumes = Volumes::new(&self.gripper, &Course { approach: 0.0, opening: 0.0, retreat, ..course });
-        self.collision(&volumes, &world_from_grip, &mut Memory::new(), near).map(|(obstacle, volume)| explain(obstacle, &volumes, volume))
+        self.collision(&volumes, &world_from_grip, room).map(|(obstacle, volume)| explain(obstacle, &volumes, volume))
     }
 
     /// An obstacle and the first volume that meets it.
-    fn collision(&self, volumes: &Volumes, world_from_grip: &Frame, memory: &mut Memory, near: &mut Vec<u32>) -> Option<(usize, usize)> {
+    fn collision(&self, volumes: &Volumes, world_from_grip: &Frame, room: &mut Room) -> Option<(usize, usize)> {
         for (obstacle, ready) in self.obstacles.iter().enumerate() {
             let volume = match ready {
                 Ready::HalfSpace { normal, offset } => volumes.below(world_from_grip, *normal, *offset),
@@ -211,18 +215,17 @@ impl<'a> Picker<'a> {
                 return Some((obstacle, volume));
             }
         }
-        let known = memory.iter().position(|(_, volume, corners)| volumes.meets(*volume, world_from_grip, *corners));
-        if let Some(place) = known {
-            let (obstacle, volume, _) = memory[place];
-            // What met last meets next.
-            memory[..=place].rotate_right(1);
-            return Some((obstacle, volume));
+        let triangle = |obstacle: u32, triangle: u32| match &self.obstacles[obstacle as usize] {
+            Ready::Mesh { tree, .. } => Some(tree.triangle(triangle)),
+            _ => None,
+        };
+        // Most collisions are guessed; that there is none only the whole search says.
+        if let Some(found) = self.nearby.as_ref().and_then(|nearby| volumes.guess(nearby, triangle, world_from_grip, room)) {
+            return Some(found);
         }
         for (obstacle, ready) in self.obstacles.iter().enumerate() {
             let Ready::Mesh { tree, .. } = ready else { continue };
-            if let Some((volume, corners)) = tree.first_met(volumes, world_from_grip, near) {
-                memory.truncate(MEMORY - 1);
-                memory.insert(0, (obstacle, volume, corners));
+            if let Some(volume) = tree.first_met(volumes, world_from_grip, room) {
                 return Some((obstacle, volume));
             }
         }

@@ -12,7 +12,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::backend::{Backend, Batch, Best, Problem, ScoreOptions, Scored, SeedSet};
+use crate::backend::{Backend, Batch, Best, Polish, Problem, ScoreOptions, Scored, SeedSet};
 use crate::error::Result;
 use crate::geometry::patch_area;
 use crate::load::wrench_in_grip;
@@ -150,6 +150,23 @@ impl Assessor<'_> {
             mu_by_load: scored.all.iter().map(|score| score.mu_s).collect(),
             grip,
         }
+    }
+
+    /// Solves every load exactly for the grips that do not have all of them yet, and keeps each load's `mu_s`. Nothing else changes.
+    ///
+    /// # Errors
+    /// As [`Backend::score`].
+    pub fn solve_every_load(&self, grips: &mut [&mut RankedGrip]) -> Result<()> {
+        let options = ScoreOptions { polish: Polish::All, ..self.settings.score };
+        // A grip at a time, which bounds the memory; its loads are shared among the threads.
+        for ranked in grips.iter_mut().filter(|ranked| ranked.mu_by_load.len() != self.loads.len()) {
+            let grip = &ranked.grip;
+            let wrenches: Vec<Wrench> = self.loads.iter().map(|load| wrench_in_grip(&load.wrench, self.mass.centre_of_mass, &grip.part_from_grip)).collect();
+            let problem = Problem { contact: &grip.contact, distance: grip.distance(), force: self.settings.force, wrenches: &wrenches };
+            let scored = self.backend.score(&Batch { problems: vec![problem] }, self.seeds, &options)?;
+            ranked.mu_by_load = scored.iter().flat_map(|scored| &scored.all).map(|score| score.mu_s).collect();
+        }
+        Ok(())
     }
 
     /// Adds what only the grips of the final list need: the gripping force needed and the largest multiple under the worst load.

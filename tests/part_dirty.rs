@@ -199,7 +199,7 @@ fn defects_that_leave_the_shape_alone_change_nothing() {
         let t = load(&folder.join(name));
         let n = t.len();
         let clean = read(scratch.path(), &plain(&t), None).unwrap();
-        assert!(clean.health.watertight, "{name}");
+        assert!(clean.health.watertight && clean.health.warnings.is_empty(), "{name}: {:?}", clean.health.lines());
         let mut random = Random(7);
         let order = if RANKED.contains(&name) { ranking(&clean) } else { Vec::new() };
         assert!(!RANKED.contains(&name) || order.len() > 30, "{name}: {} grips", order.len());
@@ -304,7 +304,15 @@ fn defects_that_change_the_shape_are_reported() {
             if mode == "jitter5" {
                 assert!(part.health.warnings.iter().any(|warning| warning.contains("rough")), "{name}: {:?}", part.health.lines());
             }
-            // A thousandth of the size is beyond what is taken for flat: the part still reads, as the facets that it has become.
+            // A thousandth of the size is beyond what is taken for flat: the part still reads, as the facets that it has become, and says so.
+            let noisy = part.health.warnings.iter().find(|warning| warning.contains("flat faces are noisy"));
+            assert_eq!(noisy.is_some(), mode == "jitter3", "{name} {mode}: {:?}", part.health.lines());
+            if let Some(warning) = noisy {
+                // Moved evenly by up to e along each axis, corners lie e / sqrt 3 off their planes; planes fitted to few corners follow them.
+                let told: f64 = warning.split("corners lie ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+                let moved = 1e3 * share * size / 3.0_f64.sqrt();
+                assert!((0.5 * moved..2.0 * moved).contains(&told), "{name}: {told} um told, {moved} um moved: {warning}");
+            }
             assert!(part.health.watertight && !part.faces.is_empty(), "{name} {mode}: {:?}", part.health.lines());
         }
 
@@ -338,6 +346,43 @@ fn defects_that_change_the_shape_are_reported() {
         assert!(message.contains(&format!("states {} triangles", n + 5)), "{message}");
         let message = read(binary(&t, b"", u32::MAX, 0)).unwrap_err().to_string();
         assert!(message.contains("states 4294967295 triangles"), "{message}");
+    }
+}
+
+/// What a user reads about noise: from `part` and from `plan`, for a bracket and for a box of twelve triangles.
+#[test]
+fn noise_is_told_with_its_size_and_a_remedy() {
+    let scratch = tempfile::tempdir().unwrap();
+    for name in ["l_bracket", "shaft_key"] {
+        let t = load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("data/parts/{name}.stl")));
+        let size = diagonal(&t);
+        let mut random = Random(5);
+        let mut moves = std::collections::HashMap::new();
+        let spoiled: Vec<Triangle> = t
+            .iter()
+            .map(|triangle| {
+                triangle.map(|corner| {
+                    let by = moves
+                        .entry(corner.to_array().map(f64::to_bits))
+                        .or_insert_with(|| DVec3::new(random.unit() - 0.5, random.unit() - 0.5, random.unit() - 0.5) * 2e-3 * size);
+                    corner + *by
+                })
+            })
+            .collect();
+        let (clean, noisy) = (scratch.path().join("clean.stl"), scratch.path().join("noisy.stl"));
+        std::fs::write(&clean, plain(&t)).unwrap();
+        std::fs::write(&noisy, plain(&spoiled)).unwrap();
+        let run = |args: &[&str]| {
+            let output = assert_cmd::Command::cargo_bin("gripfast").unwrap().current_dir(scratch.path()).args(args).output().unwrap();
+            [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat()
+        };
+        let plan = |file| run(&["plan", file, "--gripper", "generic", "--mass", "300g", "--loads", "gravity:-z", "--spacing", "20mm", "--angle-step", "90deg"]);
+        for text in [run(&["part", "noisy.stl"]), plan("noisy.stl")] {
+            assert!(text.contains("flat faces are noisy") && text.contains("times the") && text.contains("CAD model"), "{name}: {text}");
+        }
+        for text in [run(&["part", "clean.stl"]), plan("clean.stl")] {
+            assert!(!text.contains("noisy:"), "{name}: {text}");
+        }
     }
 }
 

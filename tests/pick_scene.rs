@@ -276,6 +276,144 @@ proptest! {
     }
 }
 
+/// Everything that a body of the test gripper passes through on its ways, as the corners of a box: phase, jaw, index.
+fn swept(gripper: &Gripper, width: f64, scene: &Scene) -> Vec<(Phase, &'static str, usize, [DVec3; 2])> {
+    let mut found: Vec<(Phase, &'static str, usize, [DVec3; 2])> = Vec::new();
+    // Boxes that move along their own axes: the union of all places is the box around them.
+    for (phase, jaw, body, frame, half) in places(gripper, width, scene) {
+        let half = (frame.rotation * half).abs();
+        let (low, high) = (frame.origin - half, frame.origin + half);
+        match found.iter_mut().find(|known| (known.0, known.1, known.2) == (phase, jaw, body)) {
+            Some((.., bounds)) => *bounds = [bounds[0].min(low), bounds[1].max(high)],
+            None => found.push((phase, jaw, body, [low, high])),
+        }
+    }
+    found
+}
+
+/// By how much a box and a triangle are apart at least, or how deep they overlap (negative), over the 13 axes that can separate them.
+fn apart([low, high]: [DVec3; 2], triangle: [DVec3; 3]) -> f64 {
+    let [a, b, c] = triangle;
+    let edges = [b - a, c - b, a - c];
+    let axes = DVec3::AXES.into_iter().chain([edges[0].cross(edges[1])]).chain(edges.into_iter().flat_map(|edge| DVec3::AXES.map(|axis| edge.cross(axis))));
+    axes.filter_map(DVec3::try_normalize)
+        .map(|axis| {
+            let corners = (0..8).map(|corner: u8| axis.dot(DVec3::select(glam::BVec3::new(corner & 1 > 0, corner & 2 > 0, corner & 4 > 0), high, low)));
+            let (least, most) = corners.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| (least.min(x), most.max(x)));
+            let along = triangle.map(|corner| axis.dot(corner));
+            let (first, last) = (along[0].min(along[1]).min(along[2]), along[0].max(along[1]).max(along[2]));
+            (first - most).max(least - last)
+        })
+        .fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// A random number of this seed and index in `0..1`.
+fn share(seed: u64, index: u64) -> f64 {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index.wrapping_mul(0xbf58_476d_1ce4_e5b9));
+    for _ in 0..3 {
+        state = (state ^ (state >> 30)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    }
+    (state >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+fn somewhere(seed: u64, index: u64, around: f64) -> Frame {
+    let number = |k: u64| 2.0 * share(seed, 6 * index + k) - 1.0;
+    let turn = DQuat::from_scaled_axis(DVec3::new(number(0), number(1), number(2)) * 3.0);
+    Frame { rotation: DMat3::from_quat(turn), origin: DVec3::new(number(3), number(4), number(5)) * around }
+}
+
+/// Separate triangles of all sizes from 1 to 200 mm.
+fn loose(seed: u64, count: u64) -> Mesh {
+    let vertices = (0..count)
+        .flat_map(|index| {
+            let frame = somewhere(seed, index, 0.3);
+            let size = 0.001 * 200_f64.powf(share(seed + 1, index).powi(3));
+            [DVec3::ZERO, DVec3::X, DVec3::new(0.3, 0.6, 0.0)].map(|corner| frame.point(corner * size))
+        })
+        .collect();
+    Mesh { vertices, triangles: (0..count as u32).map(|index| [3 * index, 3 * index + 1, 3 * index + 2]).collect() }
+}
+
+#[test]
+fn verdicts_on_random_meshes_agree_with_all_triangles_and_with_single_checks() {
+    let gripper = grips::gripper();
+    let (mut free_ones, mut blocked_ones) = (0, 0);
+    for seed in 0..12_u64 {
+        // Scenes of one mesh or three, near the world's origin and 20 m away, where single precision is 2 um.
+        let away = if seed % 4 == 3 { DVec3::new(20.0, -13.0, 7.0) } else { DVec3::ZERO };
+        let meshes = match seed % 3 {
+            0 => vec![terrain(40)],
+            1 => vec![loose(seed, 30 + 20 * seed)],
+            _ => vec![terrain(12), loose(seed, 60), box_mesh(DVec3::new(0.02, 0.05, 0.1))],
+        };
+        let placed = |index: usize| {
+            let frame = somewhere(seed + 50, index as u64, 0.05);
+            Frame { origin: frame.origin + away, ..frame }
+        };
+        let obstacles = meshes.iter().enumerate().map(|(index, mesh)| Obstacle {
+            name: format!("o{index}"),
+            solid: Solid::Mesh { mesh: mesh.clone(), closed: false },
+            world_from_obstacle: placed(index),
+        });
+        let scene = Scene { obstacles: obstacles.collect(), ..Scene::default() };
+        let world_from_part = Frame { rotation: DMat3::from_rotation_z(0.1 * seed as f64), origin: away };
+        let mut list = set((0..120)
+            .map(|id| {
+                let mut grip = grips::grip(id, somewhere(seed + 100, id, 0.3), 0.1);
+                grip.grip.width = 0.02 + 0.005 * (id % 5) as f64;
+                grip
+            })
+            .collect());
+        // An obstacle's triangles in the grip frame, and how far a body is from them all.
+        let seen = |grip: &RankedGrip, obstacle: usize| -> Vec<[DVec3; 3]> {
+            let world_from_grip = world_from_part.compose(&grip.grip.part_from_grip);
+            let corner = |corner: DVec3| world_from_grip.point_inverse(placed(obstacle).point(corner));
+            (0..meshes[obstacle].triangles.len() as u32).map(|index| meshes[obstacle].corners(index).map(corner)).collect()
+        };
+        let distance = |triangles: &[[DVec3; 3]], bounds: [DVec3; 2]| {
+            triangles.iter().fold(f64::INFINITY, |least: f64, &triangle| {
+                // The distance along the box's own axes is a part of what `apart` looks at, and cheap.
+                let (low, high) = (triangle[0].min(triangle[1]).min(triangle[2]), triangle[0].max(triangle[1]).max(triangle[2]));
+                if (low - bounds[1]).max(bounds[0] - high).max_element() >= least { least } else { least.min(apart(bounds, triangle)) }
+            })
+        };
+        let nearest = |grip: &RankedGrip| {
+            let triangles: Vec<_> = (0..meshes.len()).flat_map(|obstacle| seen(grip, obstacle)).collect();
+            swept(&gripper, grip.grip.width, &scene).iter().map(|body| distance(&triangles, body.3)).fold(f64::INFINITY, f64::min)
+        };
+        // Rounding of poses 20 m away is 4e-15 m; what touches within 1e-12 m may go either way.
+        let gaps: Vec<f64> = list.grips.iter().map(nearest).collect();
+        assert!(gaps.iter().all(|gap| gap.abs() > 1e-12), "seed {seed}: a grip touches");
+        let is_true = |grip: &RankedGrip, reason: &Reason| match *reason {
+            Reason::Collision { obstacle, phase, jaw, body } => {
+                let swept = swept(&gripper, grip.grip.width, &scene);
+                let named = swept.iter().find(|known| (known.0, known.1, known.2) == (phase, jaw, body)).unwrap();
+                distance(&seen(grip, obstacle), named.3) < 1e-12
+            }
+            _ => false,
+        };
+        let picker = Picker::new(&list, &scene).unwrap();
+        for (index, gap) in gaps.iter().enumerate() {
+            let reason = picker.check(index, &world_from_part);
+            assert_eq!(reason.is_none(), *gap > 0.0, "seed {seed}, grip {index}: {reason:?}, {gap} m apart");
+            assert!(reason.iter().all(|reason| is_true(&list.grips[index], reason)), "seed {seed}, grip {index}: {reason:?}");
+        }
+        // One after the other, what earlier grips met being remembered: each free one is found, and none before it.
+        let mut gaps = gaps;
+        while !list.grips.is_empty() {
+            let found = Picker::new(&list, &scene).unwrap().pick(&world_from_part);
+            assert_eq!(found.chosen, gaps.iter().position(|gap| *gap > 0.0), "seed {seed}");
+            assert!(found.passed.iter().zip(&list.grips).all(|(reason, grip)| is_true(grip, reason)), "seed {seed}");
+            blocked_ones += found.passed.len();
+            free_ones += usize::from(found.chosen.is_some());
+            let done = found.passed.len() + usize::from(found.chosen.is_some());
+            list.grips.drain(..done);
+            gaps.drain(..done);
+        }
+    }
+    assert!(free_ones > 200 && blocked_ones > 200, "{free_ones} free, {blocked_ones} not: scenes that test both");
+}
+
 /// A bumpy sheet of 2 n^2 triangles with walls, 0.6 m wide.
 fn terrain(n: usize) -> Mesh {
     let height = |i: usize, j: usize| {

@@ -136,6 +136,37 @@ fn poor_results_still_make_a_page() {
     assert_eq!(header(&report::render(&set, None).unwrap())["grips"]["total"], 0);
 }
 
+/// A page of `plan`, or one made of its result file later, has all loads of the best grips and of those printed; nothing else in the file
+/// depends on the page.
+#[test]
+fn the_best_grips_have_every_load() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let output = cargo_bin_cmd!("gripfast").current_dir(folder.path()).args(args).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    let bracket = data("parts/l_bracket.stl").display().to_string();
+    let plan =
+        ["plan", &bracket, "--gripper", "robotiq-2f85", "--mass", "350g", "--loads", "ball:40", "--spacing", "12mm", "--angle-step", "45deg", "--diverse"];
+    run(&[&plan[..], &["-o", "paged.json", "--report", "paged.html"]].concat());
+    run(&[&plan[..], &["-o", "bare.json"]].concat());
+    run(&["report", "bare.json", "-o", "later.html"]);
+    let [mut paged, bare] = ["paged.json", "bare.json"].map(|name| GripSet::read(&folder.path().join(name)).unwrap());
+    assert!(paged.grips.len() > 40 && bare.grips.iter().all(|grip| grip.mu_by_load.is_empty()));
+    let whole: Vec<usize> = (0..paged.grips.len()).filter(|&place| !paged.grips[place].mu_by_load.is_empty()).collect();
+    assert!(whole[..20].iter().copied().eq(0..20) && whole.len() > 20 && whole.len() <= 40, "the best ones and those that differ: {whole:?}");
+    for grip in paged.grips.iter().filter(|grip| !grip.mu_by_load.is_empty()) {
+        let mu = grip.worst.mu_s.unwrap();
+        let most = grip.mu_by_load.iter().flatten().fold(0.0_f64, |most, mu| most.max(*mu));
+        assert!(grip.mu_by_load.len() == 40 && (most - mu).abs() <= 1e-9 * mu, "grip {}: {most}, {mu}", grip.grip.id);
+        assert!((grip.mu_by_load[grip.worst.load as usize].unwrap() - mu).abs() <= 1e-9 * mu);
+    }
+    let [page, later] = ["paged.html", "later.html"].map(|name| std::fs::read_to_string(folder.path().join(name)).unwrap());
+    assert_eq!((&header(&page)["by_load"]["rows"], &header(&later)["by_load"]["rows"]), (&Value::from(whole.len()), &Value::from(20)));
+    paged.grips.iter_mut().for_each(|grip| grip.mu_by_load.clear());
+    assert_eq!(paged.grips, bare.grips);
+}
+
 #[test]
 fn a_grip_under_an_unknown_load_is_refused() {
     let (mut set, _) = fixture();

@@ -27,6 +27,7 @@ use gripfast::units::Quantity;
 use super::backend::{self, BackendArgs};
 use super::candidates::CandidateArgs;
 use super::export::GLB_TOP;
+use super::report::WHOLE;
 use super::solve::{RefinerArg, SeparationArg};
 use super::why;
 use flags::{check_force, finite, not_negative};
@@ -117,7 +118,8 @@ pub(crate) struct Args {
     /// Result file; its ending says the format: .json (read by the other subcommands), .jsonl, .csv, .parquet, .npz, ... as `export`.
     #[arg(long, short, value_name = "FILE", help_heading = "Output")]
     output: Option<PathBuf>,
-    /// Self-contained page to look at.
+    /// Self-contained page to look at; for its picture of the friction over all loads these are solved for the best 20 grips and the first 20
+    /// printed (and kept in the result file).
     #[arg(long, value_name = "FILE.html", help_heading = "Output")]
     report: Option<PathBuf>,
     /// The result as JSON on standard output instead of the table.
@@ -275,6 +277,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             ("pose_noise_rad".into(), noise.turn.into()),
             ("noise_samples".into(), noise.samples.into()),
         ]);
+    }
+    if args.report.is_some() {
+        let printed = &shown[..shown.len().min(WHOLE)];
+        let chosen = grips.iter_mut().enumerate().filter(|(place, ranked)| *place < WHOLE || printed.contains(&ranked.grip.id));
+        assessor.solve_every_load(&mut chosen.map(|(_, ranked)| ranked).collect::<Vec<&mut RankedGrip>>())?;
     }
     described.extend(CandidateArgs::settings(&propose, &gripper).into_iter().map(|(name, value)| (name.to_owned(), value)));
     described.insert("complete".into(), found.complete.into());

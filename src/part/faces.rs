@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::facets::Facets;
+use super::noise::{self, Noise};
 use super::orient::Role;
 use super::regions::{self, Flatness, Regions};
 use super::repair::Repaired;
@@ -19,7 +20,8 @@ const JITTER: [f64; 2] = [1e-7, 1e-5];
 const NARROWEST: f64 = 5e-4;
 
 /// All planar faces of the part by falling area; facets of curved surfaces ([`Facets`]) and regions narrower than 5e-4 of
-/// the part's diagonal are left out. Says so in the part's warnings when faces had to be found with wider tolerances.
+/// the part's diagonal are left out. Says so in the part's warnings when faces had to be found with wider tolerances, and when noise has
+/// broken planes up.
 pub(super) fn planar_faces(part: &mut Repaired) -> Vec<PlanarFace> {
     let [fine, rough] = [0, 1].map(|level| {
         let factor = [1.0, 2.0][level];
@@ -30,13 +32,26 @@ pub(super) fn planar_faces(part: &mut Repaired) -> Vec<PlanarFace> {
     });
     let mut regions = regions::grow(part, fine);
     let mut facets = Facets::new(part, &regions);
-    if facets.are_rough(part, &regions, rough.distance) {
+    let is_rough = facets.are_rough(part, &regions, rough.distance);
+    if is_rough {
         regions = regions::grow(part, rough);
         facets = Facets::new(part, &regions);
         part.health.warnings.push(format!(
             "flat faces are rough: corners up to {:.2} um off a plane were taken for flat (a clean mesh of this size needs {:.2})",
             rough.distance * 1e6,
             fine.distance * 1e6
+        ));
+    }
+    if let Some(Noise { share, distance }) = noise::measure(part, &regions) {
+        let taken = if is_rough { rough } else { fine }.distance;
+        part.health.warnings.push(format!(
+            "flat faces are noisy: on {:.0} % of the surface corners lie {:.1} um (root mean square) off the planes that fit them, {:.1} times the {:.2} um \
+             up to which they count as flat, so planes have fallen into single triangles and grips on them are missing or tilted; export the part \
+             from its CAD model, or smooth a scan or fit planes to it first",
+            share * 100.0,
+            distance * 1e6,
+            distance / taken,
+            taken * 1e6
         ));
     }
     outline(part, &regions, &facets)

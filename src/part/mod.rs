@@ -19,6 +19,7 @@ mod faces;
 mod facets;
 pub mod health;
 mod mass;
+mod noise;
 mod orient;
 mod pairs;
 mod read;

@@ -9,6 +9,7 @@ mod displace;
 mod environment;
 mod explain;
 mod interference;
+pub(crate) mod nearby;
 pub(crate) mod obstacle;
 mod options;
 mod patch;

@@ -176,6 +176,21 @@ impl Tree {
             .map(|index| (self.shape.order[index], self.shape.corners[index].map(|vertex| self.vertex(vertex))))
     }
 
+    /// Smallest and largest coordinates of a node's box.
+    pub(super) fn corners(&self, node: u32) -> [Vec3A; 2] {
+        self.boxes[node as usize].map(Vec3A::from_array)
+    }
+
+    /// Number of triangles.
+    pub(super) fn len(&self) -> usize {
+        self.shape.corners.len()
+    }
+
+    /// Corners of the triangle at this place in the tree's order.
+    pub(super) fn triangle(&self, place: u32) -> [DVec3; 3] {
+        self.shape.corners[place as usize].map(|vertex| self.vertex(vertex))
+    }
+
     fn vertex(&self, vertex: u32) -> DVec3 {
         self.axes_from_part * self.shape.vertices[vertex as usize]
     }

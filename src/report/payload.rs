@@ -203,12 +203,13 @@ fn key(contact: &Contact) -> Vec<u64> {
 /// A `mu_s` below this share of the largest one is shown as zero: a colour scale has no use for more.
 const LEAST_SHARE: f64 = 1e-6;
 
-/// `mu_s` of each load on a logarithmic scale of 65,533 steps (0: no limit state, 1: zero), for as many grips as fit.
+/// `mu_s` of each load on a logarithmic scale of 65,533 steps (0: no limit state, 1: zero), for the grips all of whose loads are known,
+/// as many as fit; their places in the list are a column of their own.
 fn loads(columns: &mut Columns, set: &GripSet, grips: &[RankedGrip]) -> Value {
     let n = set.loads.len();
-    let whole = |grip: &&RankedGrip| n > 0 && grip.mu_by_load.len() == n;
-    let rows = grips.iter().take_while(whole).count().min(MAX_LOAD_VALUES / n.max(1));
-    let finite = || grips[..rows].iter().flat_map(|g| &g.mu_by_load).filter_map(|mu| *mu).filter(|mu| mu.is_finite());
+    let whole = |grip: &RankedGrip| n > 0 && grip.mu_by_load.len() == n;
+    let rows: Vec<usize> = (0..grips.len()).filter(|&index| whole(&grips[index])).take(MAX_LOAD_VALUES / n.max(1)).collect();
+    let finite = || rows.iter().flat_map(|&row| &grips[row].mu_by_load).filter_map(|mu| *mu).filter(|mu| mu.is_finite());
     // A load along the closing axis needs no friction but for rounding; many decades of that would leave few steps for the rest.
     let zero = LEAST_SHARE * finite().fold(0.0, f64::max);
     let positive = || finite().filter(|mu| *mu > zero);
@@ -219,8 +220,9 @@ fn loads(columns: &mut Columns, set: &GripSet, grips: &[RankedGrip]) -> Value {
         Some(mu) if mu <= zero => 1,
         _ => 0,
     };
-    columns.add("by_load", "u16", &grips[..rows].iter().flat_map(|g| g.mu_by_load.iter().map(|&mu| code(mu))).collect::<Vec<_>>());
-    json!({ "rows": rows, "low": low, "high": high })
+    columns.u32("by_load_grip", rows.iter().map(|&row| row as u32));
+    columns.add("by_load", "u16", &rows.iter().flat_map(|&row| grips[row].mu_by_load.iter().map(|&mu| code(mu))).collect::<Vec<_>>());
+    json!({ "rows": rows.len(), "low": low, "high": high })
 }
 
 /// The drawable part; answers with what the page needs to read and to say about it.

@@ -41,6 +41,7 @@ export class Report {
     this.header = header;
     this.column = column;
     this.n = header.grips.shown;
+    this.rowOf = new Map(Array.from(column.by_load_grip, (grip, row) => [grip, row]));
     this.indexOfId = new Map(Array.from(column.id, (id, i) => [id, i]));
   }
 
@@ -86,11 +87,12 @@ export class Report {
 
   /** mu_s of every load for grip `i` (NaN: no limit state), or null where the table was not stored. */
   byLoad(i) {
-    const { rows, low, high } = this.header.by_load;
-    if (i >= rows) return null;
+    const { low, high } = this.header.by_load;
+    const row = this.rowOf.get(i);
+    if (row === undefined) return null;
     const n = this.header.loads.length;
     const factor = Math.log(high / low) / 65533;
-    const values = Float64Array.from(this.column.by_load.subarray(i * n, (i + 1) * n), (code) => (code === 0 ? NaN : code === 1 ? 0 : low * Math.exp((code - 2) * factor)));
+    const values = Float64Array.from(this.column.by_load.subarray(row * n, (row + 1) * n), (code) => (code === 0 ? NaN : code === 1 ? 0 : low * Math.exp((code - 2) * factor)));
     // The worst one is known to all its digits.
     values[this.column.load[i]] = this.column.mu[i];
     return values;

@@ -137,7 +137,7 @@ export class Detail {
     const sizes = header.loads.map((load) => Math.hypot(...load.wrench.force)).filter((size) => size > 0);
     const [least, most] = [Math.min(...sizes), Math.max(...sizes)];
     const strength = most > 1.02 * least ? ` The loads differ in size: ${number(least)} to ${newtons(most)}.` : '';
-    this.find('.ball-note').textContent = values ? `A point of the ball is the direction in which a load pushes the part; it turns with the view.${strength}` : 'Only the worst load of this grip was stored; gripfast plan --polish all keeps every load.';
+    this.find('.ball-note').textContent = values ? `A point of the ball is the direction in which a load pushes the part; it turns with the view.${strength}` : 'Only the worst load of this grip was stored: a page has every load of the best 20 grips, with gripfast plan --polish all of every grip.';
     const body = this.find('.loads tbody');
     body.replaceChildren();
     const order = values ? [...values.keys()].sort((a, b) => (Number.isFinite(values[b]) ? values[b] : Infinity) - (Number.isFinite(values[a]) ? values[a] : Infinity) || (a === worst ? -1 : b === worst ? 1 : a - b)) : [worst];

@@ -59,7 +59,7 @@ export function limits(report) {
   }
   if (grips.shown < grips.total) notes.push(`The best ${count(grips.shown)} of ${count(grips.total)} grips are listed.`);
   if (!gripper) notes.push(`The gripper could not be drawn: ${problem}.`);
-  if (byLoad.rows > 0 && byLoad.rows < grips.shown && loads.length > 1) notes.push(`The table of all loads is kept for the best ${count(byLoad.rows)} grips.`);
+  if (byLoad.rows > 0 && byLoad.rows < grips.shown && loads.length > 1) notes.push(`The friction over all loads was solved for ${count(byLoad.rows)} of the grips, the best ones first; for the others only the worst load.`);
   return notes;
 }
 
