@@ -257,9 +257,7 @@ fn defects_that_leave_the_shape_alone_change_nothing() {
             let part = read(scratch.path(), &plain(&scaled), Some(unit)).unwrap();
             assert_same(name, mode, &clean, &part, DVec3::ZERO, 1e-6);
             if !order.is_empty() {
-                // Rounded anew, edges that are equally long may be taken for approach directions in another order: the best is the same.
-                let (best, found) = (order[0].score.unwrap(), ranking(&part)[0].score.unwrap());
-                assert!((best - found).abs() < 1e-4 * best, "{name} {mode}: best {best}, then {found}");
+                assert_same_ranking(name, mode, &order, &part, 1e-6);
             }
             let warned = read(scratch.path(), &plain(&scaled), None).unwrap().health.warnings.join(" ");
             let (low, high) = clean.mesh.bounding_box();

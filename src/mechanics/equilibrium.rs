@@ -272,14 +272,14 @@ impl<'a> Solver<'a> {
             }
         }
         let start = self.state_at(self.load.contact_moment(), seed)?;
-        let polished = if self.refiner == Refiner::Shanno { self.conjugate(start) } else { None };
-        polished.or_else(|| self.follow(start))
-    }
-
-    /// The solution on the branch from `d = 0`, every step of the way checked; `None` as for [`Solver::branch`].
-    pub fn from_uncoupled(&mut self, seed: Option<Vector3<f64>>) -> Option<State> {
-        let start = self.state_at(self.load.contact_moment(), seed)?;
-        self.follow(start)
+        if self.refiner == Refiner::Newton {
+            return self.follow(start);
+        }
+        let direct = self.conjugate(start).filter(|state| !super::strong(state, &self.load));
+        direct.or_else(|| {
+            let followed = self.follow(start)?;
+            Some(self.conjugate(followed.z).unwrap_or(followed))
+        })
     }
 
     /// The solution close to `z`, that of another load, by Newton's method from there; where the coupling is so strong that

@@ -14,9 +14,8 @@ use crate::model::{Score, Status, Wrench};
 use super::{COUPLING_SEARCH, Options, Pads, Search, solve_next, solve_pads};
 
 /// The gripping force [N] needed to hold `wrench` with the pad friction `friction`: every larger force holds it too, and
-/// just below it the load slips (`mu_s` equals `friction`, to 1e-9), twists out or pulls a pad off (to 1e-4, or what the solver
-/// leaves of the last per cent). `None` when no force up to
-/// `1e9` times the load's size holds it (or `friction` is not positive).
+/// just below it the load slips (`mu_s` equals `friction`, to 1e-9), twists out or pulls a pad off (to 1e-4). `None` when no
+/// force up to `1e9` times the load's size holds it (or `friction` is not positive).
 ///
 /// Limit states are those that [`super::solve_pads`] finds with these `options`; with [`Search::Off`] only those on the
 /// branch from `d = 0`, which errs towards more force.
@@ -72,8 +71,8 @@ const GROWTH: f64 = 1.05;
 const PARTS: u32 = 8;
 /// Relative width at which the limit counts as found where the load slips.
 const FOUND: f64 = 1e-9;
-/// The same where it twists out or pulls a pad off. The solver does not find every equilibrium of the last per cent before
-/// that, where hardly any contact is left, so a sharper limit would mean nothing; the load returned is one that it found held.
+/// The same where it twists out or pulls a pad off. The last of a contact is smaller than doubles resolve, so a much sharper
+/// limit would mean nothing; the load returned is one that was found held.
 const FOUND_LOST: f64 = 1e-4;
 /// Relative difference at which `mu_s` counts as the pad friction.
 const EQUAL: f64 = 1e-10;

@@ -153,7 +153,7 @@ pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, optio
                 ([], true) => return refused(Status::TwistedOut, solver.evaluations),
                 ([], false) => return refused(Status::NotConverged, solver.evaluations),
                 ([only], complete) => (*only, complete),
-                ([least, ..], _) => (solver.from_uncoupled(seed).unwrap_or(*least), false),
+                ([least, ..], _) => (branch.unwrap_or(*least), false),
             }
         }
     };

@@ -42,10 +42,12 @@ fn edge_directions(patch: &[Polygon]) -> Vec<(f64, f64)> {
             _ => merged.push((angle, length)),
         }
     }
-    // Equal lengths must not be told apart by rounding: compared in steps of a millionth of the longest.
-    let longest = merged.iter().map(|direction| direction.1).fold(0.0, f64::max);
-    let step = |length: f64| (length / longest.max(f64::MIN_POSITIVE) * 1e6).round();
-    merged.sort_by(|a, b| step(b.1).total_cmp(&step(a.1)).then(a.0.abs().total_cmp(&b.0.abs())));
+    // Equal lengths, and turns to either side, must not be told apart by rounding.
+    merged.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let turn = |angle: f64| (angle.abs() * 1e5).round();
+    for equal in merged.chunk_by_mut(|a, b| b.1 > a.1 * (1.0 - 1e-5)) {
+        equal.sort_by(|a, b| turn(a.0).total_cmp(&turn(b.0)).then(b.0.total_cmp(&a.0)));
+    }
     merged
 }
 
