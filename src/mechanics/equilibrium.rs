@@ -302,7 +302,10 @@ impl<'a> Solver<'a> {
     pub fn follow(&mut self, start: Vector7) -> Option<State> {
         let mut at = self.newton(start, 0.0, 25)?;
         let (mut reached, mut step) = (if self.load.half_distance == 0.0 { 1.0 } else { 0.0 }, 1.0);
-        while reached < 1.0 {
+        for _ in 0..FOLLOW_MOST {
+            if reached == 1.0 {
+                return Some(at);
+            }
             let here = self.node(&at.z)?;
             // `g` is linear in the coupling, `x - x_0` without it.
             let friction = here.g - (here.x - self.load.contact_moment());
@@ -329,7 +332,7 @@ impl<'a> Solver<'a> {
                 }
             }
         }
-        Some(at)
+        None
     }
 
     /// The solution at a coupling near the contact moment `x`, found from the solution `at`, and its point of the map:
@@ -368,8 +371,9 @@ impl<'a> Solver<'a> {
 
 /// Longest step of [`Solver::follow`] in contact moment, of force times the pads' length.
 const FOLLOW_STEP: f64 = 0.25;
-/// Shortest step in coupling.
+/// Shortest step in coupling, and most steps.
 const FOLLOW_LEAST: f64 = 1e-9;
+const FOLLOW_MOST: usize = 1000;
 /// Share that a step leaves of the way to the region's rim, where no contact is left.
 const FOLLOW_SHARE: f64 = 0.25;
 /// What [`Solver::follow`] leaves to Newton's method on all equations, as a share of the way to the rim.

@@ -390,13 +390,15 @@ impl Problem {
         (at.g.length() < 1e-8).then_some(at)
     }
 
-    /// The zero on the branch that starts at `d = 0`, followed in small steps of `d` (Euler's rule and Newton's method);
-    /// `None` where the branch ends before the real `d`.
+    /// The zero on the branch that starts at `d = 0`, followed in small steps of `d` (Newton's method from the step before), the
+    /// first of which changes nothing much, each longer than the one before by the same factor; `None` where the branch ends before
+    /// the real `d`.
     pub(crate) fn branch(&self, steps: usize) -> Option<Sample> {
         let with = |share: f64| Self { half_distance: share * self.half_distance, areas: self.areas.clone(), rim: self.rim.clone(), ..*self };
         let mut at = with(0.0).sample(self.uncoupled, None)?;
-        for step in 1..=steps {
-            let problem = with(step as f64 / steps as f64);
+        let first = 0.01 / (1.0 + 2.0 * at.mu * self.half_distance.abs());
+        for step in 0..=steps {
+            let problem = with(first.powf(1.0 - step as f64 / steps as f64));
             let here = problem.sample(at.x, Some(&at))?;
             let next = problem.polish(here)?;
             if next.x.distance(at.x) > 40.0 / steps as f64 {
