@@ -1,8 +1,8 @@
 //! Reading, proposing and memory against the number of triangles: `cargo bench --bench parts`.
 //!
 //! Shipped parts are refined as a finer export of the same part would be, straight into a file, so that the bench itself needs no
-//! memory to speak of. `GRIPFAST_TRIANGLES=400000` stops earlier. Times are those of one thread (processor time where the system
-//! tells it), so that other work on the machine disturbs little.
+//! memory to speak of. `GRIPFAST_TRIANGLES=400000` stops earlier, `GRIPFAST_PART=FILE.stl` takes another part. Times are those of
+//! one thread (processor time where the system tells it), so that other work on the machine disturbs little.
 
 #![allow(clippy::unwrap_used, reason = "a bench stops by panicking")]
 
@@ -105,7 +105,9 @@ fn main() {
 
     println!("one thread; candidates: position grid of 2 mm (gear 1 mm), angles every 15 degrees and along the edges, generic gripper");
     println!("part                 triangles   read, weld, faces   set-up    candidates    grips   proposed and checked");
-    for (name, spacing) in [("pocket_plate.stl", 2e-3), ("spur_gear.stl", 1e-3), ("t_slot_bar.stl", 1e-3)] {
+    let other = std::env::var("GRIPFAST_PART");
+    let shipped_parts = [("pocket_plate.stl", 2e-3), ("spur_gear.stl", 1e-3), ("t_slot_bar.stl", 1e-3)];
+    for (name, spacing) in other.as_deref().map_or(shipped_parts.to_vec(), |file| vec![(file, 2e-3)]) {
         let mut first: Option<(u64, f64)> = None;
         for times in 0.. {
             let path = folder.path().join("part.stl");
@@ -128,6 +130,9 @@ fn main() {
         }
     }
 
+    if other.is_ok() {
+        return;
+    }
     println!("\nparts as shipped, one thread, 1 mm");
     for name in ["pocket_plate.stl", "l_bracket.stl", "hex_nut.stl", "spur_gear.stl", "t_slot_bar.stl"] {
         let part = Part::read(&shipped(name), &ReadOptions::default()).unwrap();
