@@ -12,7 +12,7 @@ use super::{Backend, Batch, F32_TOLERANCE, Problem, Seed, SeedSet, SeedStatus};
 use crate::error::Result;
 use crate::mechanics::slip::{self, Field};
 use crate::mechanics::twist_out::TwistOut;
-use crate::mechanics::{Options, Pads, Refiner, Search, Separation, refused, solve_pads};
+use crate::mechanics::{Options, Pads, Refiner, Search, Separation, Start, refused, solve_next, solve_pads};
 use crate::model::{Contact, Score, Status};
 
 /// Values of `mu_s` that differ by less than this share count as equal, and the first load is taken as the worst:
@@ -186,7 +186,7 @@ impl Case<'_> {
             let worst = self.settle(self.worst(&answers));
             return Scored { worst, solved: all.len(), compared: 0, all, outranked: false };
         }
-        let mut work = Work { case: self, solved: Vec::new(), compared: 0 };
+        let mut work = Work { case: self, solved: Vec::new(), compared: 0, states: Vec::new() };
         let out = |mu: f64| beaten.is_some_and(|beaten| beaten(mu));
         if beaten.is_some() && out(self.lower()) {
             return work.outranked();
@@ -201,7 +201,7 @@ impl Case<'_> {
         open = order.into_iter().map(|place| open[place]).collect();
         let mut largest: f64 = 0.0;
         for load in open {
-            match usable(&work.solve(load)) {
+            match usable(&work.solve_like(load)) {
                 Some(mu) => largest = largest.max(mu),
                 None => return work.refused(),
             }
@@ -256,10 +256,14 @@ impl Case<'_> {
         loads.iter().map(|&load| lever.margin(self.problem.force, &self.problem.wrenches[load])).collect()
     }
 
-    fn full(&self, load: usize, search: Search) -> Score {
+    fn options(&self, load: usize, search: Search) -> Options {
         let seed = &self.seeds[load];
         let searched = matches!(seed.status, SeedStatus::Bounded | SeedStatus::Coupled | SeedStatus::Unbounded);
-        let options = Options { separation: self.options.separation, refiner: self.options.refiner, seed: searched.then_some(seed.twist), search };
+        Options { separation: self.options.separation, refiner: self.options.refiner, seed: searched.then_some(seed.twist), search }
+    }
+
+    fn full(&self, load: usize, search: Search) -> Score {
+        let options = self.options(load, search);
         match self.pads {
             Some(pads) => solve_pads(pads, self.problem.distance, self.problem.force, &self.problem.wrenches[load], &options),
             None => refused(Status::NoContact, 0),
@@ -293,9 +297,32 @@ struct Work<'a> {
     case: &'a Case<'a>,
     solved: Vec<(usize, Score)>,
     compared: usize,
+    /// Loads, scaled, and the limit states found for them.
+    states: Vec<([f64; 6], Start)>,
 }
 
+/// Loads farther apart than this, in units of the gripping force, do not help each other.
+const LIKE: f64 = 0.5;
+
 impl Work<'_> {
+    /// As [`Self::solve`], beginning at the limit state of the load most like this one.
+    fn solve_like(&mut self, load: usize) -> Score {
+        let (problem, Some(pads), Refiner::Newton) = (self.case.problem, self.case.pads, self.case.options.refiner) else { return self.solve(load) };
+        let wrench = &problem.wrenches[load];
+        let scaled = pads.load(problem.distance, problem.force, wrench);
+        let place = [scaled.direction.x, scaled.direction.y, scaled.direction.z, scaled.moment[0], scaled.moment[1], scaled.normal[0]];
+        let apart = |other: &[f64; 6]| (0..6).map(|i| (place[i] - other[i]).powi(2)).sum::<f64>();
+        let nearest = self.states.iter().map(|(other, start)| (apart(other), start)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let mut near = nearest.filter(|(apart, _)| *apart < LIKE * LIKE).map(|(_, start)| *start);
+        let score = solve_next(pads, problem.distance, problem.force, wrench, &self.case.options(load, Search::Off), &mut near);
+        if usable(&score).is_none() {
+            return self.solve(load);
+        }
+        self.states.extend(near.map(|start| (place, start)));
+        self.solved.push((load, score));
+        score
+    }
+
     fn solve(&mut self, load: usize) -> Score {
         let score = self.case.solve(load);
         self.solved.push((load, score));

@@ -160,18 +160,23 @@ pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, optio
     finish(pads, force, &load, &state, unique, solver.evaluations, options)
 }
 
-/// [`solve_pads`] with [`Search::Off`] for one load after the other, each close to the one before: `near` holds the limit
-/// state of that one, from which Newton's method starts.
-fn solve_next(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, options: &Options, near: &mut Option<Vector7>) -> Score {
+/// The limit state of a load, from which that of another one like it is found sooner.
+#[derive(Debug, Clone, Copy)]
+pub struct Start(Vector7);
+
+/// [`solve_pads`] with [`Search::Off`] from the limit state `near` of a load like this one; afterwards `near` is this load's, if
+/// it has one.
+pub fn solve_next(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, options: &Options, near: &mut Option<Start>) -> Score {
     let options = &Options { search: Search::Off, ..*options };
     let load = pads.load(distance, force, wrench);
     if load.normal.iter().any(|&n| n <= 0.0) || load.size == 0.0 {
         return solve_pads(pads, distance, force, wrench, options);
     }
     let mut solver = Solver::new(pads, load, options.refiner);
-    match near.and_then(|z| solver.next_to(&z)).or_else(|| solver.branch(None)) {
+    let seed = options.seed.map(|twist| pads.scaled_twist(twist));
+    match near.and_then(|Start(z)| solver.next_to(&z)).or_else(|| solver.branch(seed)) {
         Some(state) => {
-            *near = Some(state.z);
+            *near = Some(Start(state.z));
             finish(pads, force, &load, &state, true, solver.evaluations, options)
         }
         None if load.half_distance == 0.0 => refused(out_of_reach(pads, &load), solver.evaluations),
