@@ -57,6 +57,8 @@ pub struct Assessor<'a> {
 
 /// Loads of one call of the backend: bounds the memory whatever the number of grips and loads.
 const LOADS_AT_ONCE: usize = 1 << 20;
+/// The same where the answer of every load is kept for a while, some 250 bytes each.
+const ANSWERS_AT_ONCE: usize = 1 << 17;
 
 impl Assessor<'_> {
     /// Scores every grip under its worst load, in order. The answers depend neither on the number of threads nor on the
@@ -88,13 +90,8 @@ impl Assessor<'_> {
     }
 
     fn assess_block(&self, grips: Vec<Grip>, best: Option<&mut Best>) -> Result<Vec<RankedGrip>> {
-        let in_grip = |grip: &Grip| -> Vec<Wrench> {
-            self.loads.iter().map(|load| wrench_in_grip(&load.wrench, self.mass.centre_of_mass, &grip.part_from_grip)).collect()
-        };
-        let wrenches: Vec<Vec<Wrench>> = grips.par_iter().map(in_grip).collect();
-        let problems = grips.iter().zip(&wrenches);
-        let problems = problems.map(|(grip, wrenches)| Problem { contact: &grip.contact, distance: grip.distance(), force: self.settings.force, wrenches });
-        let batch = Batch { problems: problems.collect() };
+        let wrenches: Vec<Vec<Wrench>> = grips.par_iter().map(|grip| self.wrenches(grip)).collect();
+        let batch = Batch { problems: grips.iter().zip(&wrenches).map(|(grip, wrenches)| self.problem(grip, wrenches)).collect() };
         let scored = match best {
             None => self.backend.score(&batch, self.seeds, &self.settings.score)?,
             Some(best) => {
@@ -105,6 +102,15 @@ impl Assessor<'_> {
         };
         let jobs = grips.into_par_iter().zip(wrenches.par_iter()).zip(scored).filter(|(_, scored)| !scored.outranked);
         Ok(jobs.map(|((grip, wrenches), scored)| self.measure(grip, wrenches, &scored)).collect())
+    }
+
+    /// The loads as a grip sees them.
+    fn wrenches(&self, grip: &Grip) -> Vec<Wrench> {
+        self.loads.iter().map(|load| wrench_in_grip(&load.wrench, self.mass.centre_of_mass, &grip.part_from_grip)).collect()
+    }
+
+    fn problem<'a>(&self, grip: &'a Grip, wrenches: &'a [Wrench]) -> Problem<'a> {
+        Problem { contact: &grip.contact, distance: grip.distance(), force: self.settings.force, wrenches }
     }
 
     /// Alpha [rad] and the least lever [m].
@@ -158,13 +164,14 @@ impl Assessor<'_> {
     /// As [`Backend::score`].
     pub fn solve_every_load(&self, grips: &mut [&mut RankedGrip]) -> Result<()> {
         let options = ScoreOptions { polish: Polish::All, ..self.settings.score };
-        // A grip at a time, which bounds the memory; its loads are shared among the threads.
-        for ranked in grips.iter_mut().filter(|ranked| ranked.mu_by_load.len() != self.loads.len()) {
-            let grip = &ranked.grip;
-            let wrenches: Vec<Wrench> = self.loads.iter().map(|load| wrench_in_grip(&load.wrench, self.mass.centre_of_mass, &grip.part_from_grip)).collect();
-            let problem = Problem { contact: &grip.contact, distance: grip.distance(), force: self.settings.force, wrenches: &wrenches };
-            let scored = self.backend.score(&Batch { problems: vec![problem] }, self.seeds, &options)?;
-            ranked.mu_by_load = scored.iter().flat_map(|scored| &scored.all).map(|score| score.mu_s).collect();
+        let mut open: Vec<&mut &mut RankedGrip> = grips.iter_mut().filter(|ranked| ranked.mu_by_load.len() != self.loads.len()).collect();
+        for block in open.chunks_mut((ANSWERS_AT_ONCE / self.loads.len().max(1)).max(1)) {
+            let wrenches: Vec<Vec<Wrench>> = block.par_iter().map(|ranked| self.wrenches(&ranked.grip)).collect();
+            let problems = block.iter().zip(&wrenches).map(|(ranked, wrenches)| self.problem(&ranked.grip, wrenches));
+            let scored = self.backend.score(&Batch { problems: problems.collect() }, self.seeds, &options)?;
+            for (ranked, scored) in block.iter_mut().zip(scored) {
+                ranked.mu_by_load = scored.all.iter().map(|score| score.mu_s).collect();
+            }
         }
         Ok(())
     }

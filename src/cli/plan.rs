@@ -197,7 +197,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         mu_c: not_negative("--closing-friction", args.closing_friction)?,
         pad_friction: args.pad_friction.map(|mu| not_negative("--pad-friction", mu)).transpose()?.or(gripper.pad_friction),
         score: ScoreOptions {
-            polish: if args.polish == PolishArg::All { Polish::All } else { Polish::Worst },
+            // The other loads of grips that are kept come after the ranking.
+            polish: Polish::Worst,
             separation: args.separation.into(),
             refiner: args.refiner.into(),
         },
@@ -278,9 +279,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             ("noise_samples".into(), noise.samples.into()),
         ]);
     }
-    if args.report.is_some() {
+    let every = args.polish == PolishArg::All;
+    if every || args.report.is_some() {
         let printed = &shown[..shown.len().min(WHOLE)];
-        let chosen = grips.iter_mut().enumerate().filter(|(place, ranked)| *place < WHOLE || printed.contains(&ranked.grip.id));
+        let chosen = grips.iter_mut().enumerate().filter(|(place, ranked)| every || *place < WHOLE || printed.contains(&ranked.grip.id));
         assessor.solve_every_load(&mut chosen.map(|(_, ranked)| ranked).collect::<Vec<&mut RankedGrip>>())?;
     }
     described.extend(CandidateArgs::settings(&propose, &gripper).into_iter().map(|(name, value)| (name.to_owned(), value)));
