@@ -28,8 +28,8 @@ pub struct State {
     pub residual: Vector7,
     /// `mu` over the load's size.
     pub mu_over_size: f64,
-    /// Areas left in contact, scaled.
-    pub areas: [f64; 2],
+    /// Moments of the areas left in contact, scaled: see [`crate::contact::moments`].
+    pub moments: [[f64; 6]; 2],
     /// What the friction can do at this twist.
     pub friction: Support,
 }
@@ -142,7 +142,7 @@ impl<'a> Solver<'a> {
         let (first_i, first_ii) = (pressure::first_moment(&m[0], face_pressure(&q, 0)), pressure::first_moment(&m[1], face_pressure(&q, 1)));
         let normal = carried[0] + carried[1];
         let friction = Support { gradient: g, normal, centre: (first_i + first_ii) / normal };
-        State { z: *z, residual, mu_over_size: d, areas: [m[0][0], m[1][0]], friction }
+        State { z: *z, residual, mu_over_size: d, moments: m, friction }
     }
 
     /// Damped semi-smooth Newton from `z`; `None` when it does not come below [`TOLERANCE`] in `most` steps.
@@ -164,7 +164,7 @@ impl<'a> Solver<'a> {
             let mut next = None;
             for _ in 0..8 {
                 let tried = self.evaluate(&(at.z + t * step), coupling, Some(&mut jacobians[1 - current]));
-                let pressed = tried.areas[0] > 0.0 && tried.areas[1] > 0.0;
+                let pressed = tried.moments.iter().all(|m| m[0] > 0.0);
                 if pressed && tried.residual.norm() <= (1.0 - 0.1 * t) * at.residual.norm() {
                     next = Some(tried);
                     break;
@@ -185,7 +185,7 @@ impl<'a> Solver<'a> {
     fn tolerance(&self, at: &State) -> f64 {
         let q = at.q();
         let coefficients = |k: usize| q[k].abs() + q[2].hypot(q[3]) * self.pads.areas[k].radius();
-        let rounding = (0..2).map(|k| coefficients(k) * at.areas[k]).sum::<f64>();
+        let rounding = (0..2).map(|k| coefficients(k) * at.moments[k][0]).sum::<f64>();
         TOLERANCE.max(8.0 * f64::EPSILON * rounding * (1.0 + self.load.half_distance.abs() * self.load.size * at.mu_over_size))
     }
 
@@ -212,7 +212,7 @@ impl<'a> Solver<'a> {
                 break;
             }
         }
-        let pressed = at.areas[0] > 0.0 && at.areas[1] > 0.0;
+        let pressed = at.moments.iter().all(|m| m[0] > 0.0);
         (pressed && at.residual.amax() < self.tolerance(&at) && at.mu_over_size > 0.0).then_some(at)
     }
 
@@ -288,7 +288,8 @@ impl<'a> Solver<'a> {
         let found = self.newton(*z, 1.0, 6)?;
         if super::strong(&found, &self.load) {
             let to = self.node(&found.z)?;
-            let x = pressure::carried(self.pads, &[z[3], z[4], z[5], z[6]], &mut self.scratch[0]);
+            let q = [z[3], z[4], z[5], z[6]];
+            let x = pressure::carried(&pressure::pressed_moments(self.pads, &q, &mut self.scratch[0]), &q);
             if to.x.distance(x) > FOLLOW_STEP / 2.0 || to.slope.determinant() <= 0.0 {
                 return None;
             }
@@ -362,10 +363,6 @@ impl<'a> Solver<'a> {
     /// turning point; another limit state that a long step has led to most often has the other sign, too.
     fn slope_at(node: &Node, coupling: f64) -> DMat2 {
         DMat2::IDENTITY + coupling * (node.slope - DMat2::IDENTITY)
-    }
-
-    pub(super) fn scratch(&mut self) -> &mut Loops {
-        &mut self.scratch[0]
     }
 }
 

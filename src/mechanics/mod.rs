@@ -90,11 +90,7 @@ pub fn limit_states(contact: &Contact, distance: f64, force: f64, wrench: &Wrenc
     check(contact, distance, force, wrench)?;
     let Some(pads) = Pads::new(contact) else { return Ok(Vec::new()) };
     let load = pads.load(distance, force, wrench);
-    if load.normal.iter().any(|&n| n <= 0.0) {
-        return Ok(Vec::new());
-    }
-    if load.size == 0.0 {
-        let only = pressed_only(&pads, force, &load, options);
+    if let Some(only) = at_once(&pads, force, &load, options) {
         return Ok(only.mu_s.map(|_| only).into_iter().collect());
     }
     let mut solver = Solver::new(&pads, load, options.refiner);
@@ -133,20 +129,18 @@ pub fn refused(status: Status, evaluations: u32) -> Score {
 
 /// [`solve`] for a contact already made ready; the numbers must be finite, `force` positive.
 pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, options: &Options) -> Score {
-    let load = pads.load(distance, force, wrench);
-    if load.normal.iter().any(|&n| n <= 0.0) {
-        return refused(Status::NoNormalForce, 0);
+    if options.search == Search::Off {
+        return solve_next(pads, distance, force, wrench, options, &mut None);
     }
-    if load.size == 0.0 {
-        return pressed_only(pads, force, &load, options);
+    let load = pads.load(distance, force, wrench);
+    if let Some(score) = at_once(pads, force, &load, options) {
+        return score;
     }
     let seed = options.seed.map(|twist| pads.scaled_twist(twist));
     let mut solver = Solver::new(pads, load, options.refiner);
-    let branch = solver.branch(seed);
-    let (state, unique) = match branch {
-        Some(state) if options.search == Search::Off || !strong(&state, &load) => (state, true),
+    let (state, unique) = match solver.branch(seed) {
+        Some(state) if !strong(&state, &load) => (state, true),
         None if load.half_distance == 0.0 => return refused(out_of_reach(pads, &load), solver.evaluations),
-        None if options.search == Search::Off => return refused(Status::TwistedOut, solver.evaluations),
         branch => {
             let found = solver.limit_states(branch.as_slice());
             match (found.states.as_slice(), found.complete) {
@@ -160,6 +154,14 @@ pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, optio
     finish(pads, force, &load, &state, unique, solver.evaluations, options)
 }
 
+/// The answer to a load that needs no slip: without normal force on a pad, or without a part in the pad plane.
+fn at_once(pads: &Pads, force: f64, load: &Load, options: &Options) -> Option<Score> {
+    if load.normal.iter().any(|&n| n <= 0.0) {
+        return Some(refused(Status::NoNormalForce, 0));
+    }
+    (load.size == 0.0).then(|| pressed_only(pads, force, load, options))
+}
+
 /// The limit state of a load, from which that of another one like it is found sooner.
 #[derive(Debug, Clone, Copy)]
 pub struct Start(Vector7);
@@ -169,8 +171,8 @@ pub struct Start(Vector7);
 pub fn solve_next(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, options: &Options, near: &mut Option<Start>) -> Score {
     let options = &Options { search: Search::Off, ..*options };
     let load = pads.load(distance, force, wrench);
-    if load.normal.iter().any(|&n| n <= 0.0) || load.size == 0.0 {
-        return solve_pads(pads, distance, force, wrench, options);
+    if let Some(score) = at_once(pads, force, &load, options) {
+        return score;
     }
     let mut solver = Solver::new(pads, load, options.refiner);
     let seed = options.seed.map(|twist| pads.scaled_twist(twist));
@@ -211,8 +213,8 @@ fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, eva
         mu_s: Some(bounds.map_or(mu_s, |bounds| mu_s.max(bounds.lower).min(bounds.upper))),
         slip: Some(pads.slip(state.twist())),
         pressure: Some(pads.pressure(q, force)),
-        contact_area_i: state.areas[0] * unit,
-        contact_area_ii: state.areas[1] * unit,
+        contact_area_i: state.moments[0][0] * unit,
+        contact_area_ii: state.moments[1][0] * unit,
         residual: slip_residual.max(r.fixed_rows::<4>(3).amax()),
         bounds,
         evaluations,

@@ -32,10 +32,9 @@ pub fn pressed_moments(pads: &Pads, q: &[f64; 4], scratch: &mut Loops) -> [[f64;
     })
 }
 
-/// The contact moment `(X1, X2)` that the pressure `q` carries.
-pub fn carried(pads: &Pads, q: &[f64; 4], scratch: &mut Loops) -> DVec2 {
-    let [one, two] = pressed_moments(pads, q, scratch);
-    first_moment(&one, face_pressure(q, 0)) - first_moment(&two, face_pressure(q, 1))
+/// The contact moment `(X1, X2)` that the pressure `q` carries on pressed areas with these moments.
+pub fn carried([one, two]: &[[f64; 6]; 2], q: &[f64; 4]) -> DVec2 {
+    first_moment(one, face_pressure(q, 0)) - first_moment(two, face_pressure(q, 1))
 }
 
 /// `int p x` over an area with these moments.

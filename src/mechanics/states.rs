@@ -11,8 +11,6 @@ use glam::{DMat2, DVec2};
 use nalgebra::SMatrix;
 use rustc_hash::FxHashMap;
 
-use crate::contact::Loops;
-
 use super::equilibrium::{Matrix7, Solver, State, Vector7, same};
 use super::pressure;
 
@@ -83,7 +81,6 @@ struct Map<'s, 'a> {
     pieces: Vec<Vec<DVec2>>,
     nodes: FxHashMap<(u32, u32), Option<Node>>,
     starts: usize,
-    scratch: Loops,
 }
 
 impl Solver<'_> {
@@ -107,7 +104,7 @@ impl Solver<'_> {
         }
         let g = DVec2::new(state.residual[6], -state.residual[5]);
         // Moving along the states of given contact moment: the first five equations stay, X moves.
-        let stiffness = pressure::stiffness(&pressure::pressed_moments(self.pads, &state.q(), self.scratch()));
+        let stiffness = pressure::stiffness(&state.moments);
         let carried = stiffness * nalgebra::Vector4::from(state.q());
         let mut along = jacobian;
         along.fixed_view_mut::<2, 7>(5, 0).fill(0.0);
@@ -149,7 +146,7 @@ impl<'s, 'a> Map<'s, 'a> {
                 pieces.extend((0..cuts).map(|cut| vec![at(cut), at(cut + 1)]));
             }
         }
-        Some(Self { solver, middle, pieces, nodes: FxHashMap::default(), starts: 0, scratch: Loops::default() })
+        Some(Self { solver, middle, pieces, nodes: FxHashMap::default(), starts: 0 })
     }
 
     /// Contact moment of a mesh point.
@@ -226,8 +223,8 @@ impl<'s, 'a> Map<'s, 'a> {
     }
 
     /// How far out a state's contact moment lies: 0 in the middle, 1 on the rim.
-    fn share(&mut self, state: &State) -> f64 {
-        let x = pressure::carried(self.solver.pads, &state.q(), &mut self.scratch) - self.middle;
+    fn share(&self, state: &State) -> f64 {
+        let x = pressure::carried(&state.moments, &state.q()) - self.middle;
         let outward = |edge: &[DVec2]| {
             let normal = -(edge[1] - edge[0]).perp();
             normal.dot(x) / normal.dot(edge[0]).max(f64::MIN_POSITIVE)
