@@ -1,5 +1,6 @@
-//! The mechanics on one thread: the slip problem alone, all seven equations in every kind of contact, and the methods
-//! side by side on the same cases. `cargo bench --bench mechanics`; names after `--` choose groups.
+//! The mechanics on one thread: the slip problem alone, all seven equations in every kind of
+//! contact, and the methods side by side on the same cases. `cargo bench --bench mechanics`; names
+//! after `--` choose groups.
 
 #![allow(clippy::unwrap_used, reason = "a bench stops by panicking")]
 #![allow(missing_docs, reason = "criterion's macros make undocumented functions")]
@@ -39,18 +40,27 @@ impl Random {
     /// Eight corners about the origin, 10 mm out and more or less: convex and notched.
     fn patch(&mut self) -> Patch {
         let turn = self.signed();
-        let corner = |i: usize, r: f64| r * DVec2::from_angle(turn + std::f64::consts::TAU * i as f64 / 8.0);
-        vec![Polygon { outer: (0..8).map(|i| corner(i, self.between(0.007, 0.013))).collect(), holes: Vec::new() }]
+        let corner =
+            |i: usize, r: f64| r * DVec2::from_angle(turn + std::f64::consts::TAU * i as f64 / 8.0);
+        vec![Polygon {
+            outer: (0..8).map(|i| corner(i, self.between(0.007, 0.013))).collect(),
+            holes: Vec::new(),
+        }]
     }
 }
 
-/// Slip problems on one 8-edge area each: pressure planes from level to zero at a corner, loads in all directions.
+/// Slip problems on one 8-edge area each: pressure planes from level to zero at a corner, loads in
+/// all directions.
 fn slip_problems(count: usize) -> Vec<(Loops, [f64; 3], Vector3<f64>)> {
     let mut random = Random(1);
     let problem = |_| {
         let area = Loops::mapped(&random.patch(), |point| point * 100.0);
         let tilt = [random.signed(), random.signed()];
-        let lowest = area.points().iter().map(|x| tilt[0] * x.x + tilt[1] * x.y).fold(f64::INFINITY, f64::min);
+        let lowest = area
+            .points()
+            .iter()
+            .map(|x| tilt[0] * x.x + tilt[1] * x.y)
+            .fold(f64::INFINITY, f64::min);
         let p = [random.between(0.0, 1.0) - lowest, tilt[0], tilt[1]];
         (area, p, Vector3::new(random.signed(), random.signed(), random.signed()))
     };
@@ -59,14 +69,28 @@ fn slip_problems(count: usize) -> Vec<(Loops, [f64; 3], Vector3<f64>)> {
 
 fn slips(criterion: &mut Criterion) {
     let problems = slip_problems(256);
-    let solve = |(area, p, w): &(Loops, [f64; 3], Vector3<f64>), refiner| slip::solve(&[Field { area, p: *p }], *w, None, refiner);
+    let solve = |(area, p, w): &(Loops, [f64; 3], Vector3<f64>), refiner| {
+        slip::solve(&[Field { area, p: *p }], *w, None, refiner)
+    };
     let mut group = criterion.benchmark_group("slip, 8 edges");
-    group.throughput(Throughput::Elements(problems.len() as u64)).measurement_time(Duration::from_secs(3)).warm_up_time(Duration::from_secs(1));
+    group
+        .throughput(Throughput::Elements(problems.len() as u64))
+        .measurement_time(Duration::from_secs(3))
+        .warm_up_time(Duration::from_secs(1));
     for (name, refiner) in [("newton", Refiner::Newton), ("shanno", Refiner::Shanno)] {
         let answers = problems.iter().map(|problem| solve(problem, refiner));
-        let (evaluations, worst) = answers.fold((0, 0.0_f64), |(sum, worst), slip| (sum + slip.evaluations, worst.max(slip.residual)));
-        println!("slip, {name}: {:.2} evaluations a solve, largest residual {worst:.1e}", f64::from(evaluations) / problems.len() as f64);
-        group.bench_function(name, |bench| bench.iter(|| problems.iter().map(|problem| solve(black_box(problem), refiner).mu).sum::<f64>()));
+        let (evaluations, worst) = answers.fold((0, 0.0_f64), |(sum, worst), slip| {
+            (sum + slip.evaluations, worst.max(slip.residual))
+        });
+        println!(
+            "slip, {name}: {:.2} evaluations a solve, largest residual {worst:.1e}",
+            f64::from(evaluations) / problems.len() as f64
+        );
+        group.bench_function(name, |bench| {
+            bench.iter(|| {
+                problems.iter().map(|problem| solve(black_box(problem), refiner).mu).sum::<f64>()
+            })
+        });
     }
     group.finish();
 }
@@ -94,7 +118,8 @@ impl Case {
     fn separated(&self, score: &Score) -> usize {
         let unit = self.pads.length * self.pads.length;
         let part = |left: f64, m: &[f64; 6]| left < m[0] * unit * (1.0 - 1e-9);
-        usize::from(part(score.contact_area_i, &self.pads.moments[0])) + usize::from(part(score.contact_area_ii, &self.pads.moments[1]))
+        usize::from(part(score.contact_area_i, &self.pads.moments[0]))
+            + usize::from(part(score.contact_area_ii, &self.pads.moments[1]))
     }
 }
 
@@ -104,19 +129,56 @@ struct Kind {
     congruent: bool,
     /// Distance of the faces [m].
     distance: f64,
-    /// Sizes of in-plane force [N], force along the closing axis [N], moment about it and moments across it [N m].
+    /// Sizes of in-plane force [N], force along the closing axis [N], moment about it and moments
+    /// across it [N m].
     load: [f64; 4],
     /// Faces that separate.
     separated: usize,
 }
 
 const KINDS: [Kind; 6] = [
-    Kind { name: "full contact, congruent faces", congruent: true, distance: 0.02, load: [10.0, 0.0, 0.1, 0.02], separated: 0 },
-    Kind { name: "full contact, different faces", congruent: false, distance: 0.02, load: [10.0, 0.0, 0.1, 0.02], separated: 0 },
-    Kind { name: "with F3, different faces", congruent: false, distance: 0.02, load: [10.0, 40.0, 0.1, 0.02], separated: 0 },
-    Kind { name: "one face separates", congruent: false, distance: 0.02, load: [10.0, 10.0, 0.1, 0.2], separated: 1 },
-    Kind { name: "both faces separate", congruent: false, distance: 0.02, load: [10.0, 10.0, 0.1, 0.4], separated: 2 },
-    Kind { name: "strong coupling (other solutions searched)", congruent: false, distance: 0.06, load: [20.0, 0.0, 0.4, 0.02], separated: 0 },
+    Kind {
+        name: "full contact, congruent faces",
+        congruent: true,
+        distance: 0.02,
+        load: [10.0, 0.0, 0.1, 0.02],
+        separated: 0,
+    },
+    Kind {
+        name: "full contact, different faces",
+        congruent: false,
+        distance: 0.02,
+        load: [10.0, 0.0, 0.1, 0.02],
+        separated: 0,
+    },
+    Kind {
+        name: "with F3, different faces",
+        congruent: false,
+        distance: 0.02,
+        load: [10.0, 40.0, 0.1, 0.02],
+        separated: 0,
+    },
+    Kind {
+        name: "one face separates",
+        congruent: false,
+        distance: 0.02,
+        load: [10.0, 10.0, 0.1, 0.2],
+        separated: 1,
+    },
+    Kind {
+        name: "both faces separate",
+        congruent: false,
+        distance: 0.02,
+        load: [10.0, 10.0, 0.1, 0.4],
+        separated: 2,
+    },
+    Kind {
+        name: "strong coupling (other solutions searched)",
+        congruent: false,
+        distance: 0.06,
+        load: [20.0, 0.0, 0.4, 0.02],
+        separated: 0,
+    },
 ];
 
 fn cases(kind: &Kind, count: usize) -> Vec<Case> {
@@ -134,7 +196,10 @@ fn cases(kind: &Kind, count: usize) -> Vec<Case> {
         let case = Case::new(Contact { face_i, face_ii }, kind.distance, wrench);
         let score = case.solve(&Options::default());
         let coupling = score.mu_s.unwrap_or(0.0) * kind.distance / case.pads.length;
-        if score.status.holds() && case.separated(&score) == kind.separated && (kind.distance < 0.05 || coupling > 1.2) {
+        if score.status.holds()
+            && case.separated(&score) == kind.separated
+            && (kind.distance < 0.05 || coupling > 1.2)
+        {
             cases.push(case);
         }
     }
@@ -147,14 +212,27 @@ fn full(criterion: &mut Criterion) {
     for kind in &KINDS {
         let cases = cases(kind, 64);
         group.throughput(Throughput::Elements(cases.len() as u64));
-        let evaluations: u32 = cases.iter().map(|case| case.solve(&Options::default()).evaluations).sum();
-        println!("{}: {:.1} evaluations a solve", kind.name, f64::from(evaluations) / cases.len() as f64);
-        group.bench_function(kind.name, |bench| bench.iter(|| cases.iter().map(|case| black_box(case).solve(&Options::default()).evaluations).sum::<u32>()));
+        let evaluations: u32 =
+            cases.iter().map(|case| case.solve(&Options::default()).evaluations).sum();
+        println!(
+            "{}: {:.1} evaluations a solve",
+            kind.name,
+            f64::from(evaluations) / cases.len() as f64
+        );
+        group.bench_function(kind.name, |bench| {
+            bench.iter(|| {
+                cases
+                    .iter()
+                    .map(|case| black_box(case).solve(&Options::default()).evaluations)
+                    .sum::<u32>()
+            })
+        });
     }
     group.finish();
 }
 
-/// Cases for all methods: loads off the axes, along an axis, and turning about the closing axis alone.
+/// Cases for all methods: loads off the axes, along an axis, and turning about the closing axis
+/// alone.
 fn shared_cases() -> Vec<Case> {
     let mut random = Random(3);
     let case = |i: usize| {
@@ -162,8 +240,14 @@ fn shared_cases() -> Vec<Case> {
         let face_ii = if i.is_multiple_of(2) { face_i.clone() } else { random.patch() };
         let (force, moment) = (random.vector(10.0), random.vector(0.1));
         let wrench = match i % 4 {
-            0 | 1 => Wrench { force: DVec3::new(force.x, force.y, 0.0), moment: DVec3::new(0.2 * moment.x, 0.2 * moment.y, moment.z) },
-            2 => Wrench { force: DVec3::new(0.0, force.y, 0.0), moment: DVec3::new(0.0, 0.0, moment.z) },
+            0 | 1 => Wrench {
+                force: DVec3::new(force.x, force.y, 0.0),
+                moment: DVec3::new(0.2 * moment.x, 0.2 * moment.y, moment.z),
+            },
+            2 => Wrench {
+                force: DVec3::new(0.0, force.y, 0.0),
+                moment: DVec3::new(0.0, 0.0, moment.z),
+            },
             _ => Wrench { force: DVec3::ZERO, moment: DVec3::new(0.0, 0.0, moment.z) },
         };
         Case::new(Contact { face_i, face_ii }, 0.02, wrench)
@@ -173,28 +257,63 @@ fn shared_cases() -> Vec<Case> {
 
 fn methods(criterion: &mut Criterion) {
     let cases = shared_cases();
-    let default = |case: &Case, refiner| solve(&case.contact, case.distance, FORCE, &case.wrench, &Options { refiner, ..Options::default() }).unwrap();
+    let default = |case: &Case, refiner| {
+        solve(
+            &case.contact,
+            case.distance,
+            FORCE,
+            &case.wrench,
+            &Options { refiner, ..Options::default() },
+        )
+        .unwrap()
+    };
     type Method<'a> = (&'static str, Box<dyn Fn(&Case) -> Score + 'a>);
     let all: [Method<'_>; 4] = [
         ("default (Newton)", Box::new(|case| default(case, Refiner::Newton))),
         ("Shanno refiner", Box::new(|case| default(case, Refiner::Shanno))),
         (
             "the paper's E (17) and Shanno",
-            Box::new(|case| paper::solve(&case.contact, case.distance, FORCE, &case.wrench, &paper::Options::default()).unwrap().score),
+            Box::new(|case| {
+                paper::solve(
+                    &case.contact,
+                    case.distance,
+                    FORCE,
+                    &case.wrench,
+                    &paper::Options::default(),
+                )
+                .unwrap()
+                .score
+            }),
         ),
-        ("centroid method", Box::new(|case| wolter::solve(&case.contact, case.distance, FORCE, &case.wrench).unwrap())),
+        (
+            "centroid method",
+            Box::new(|case| {
+                wolter::solve(&case.contact, case.distance, FORCE, &case.wrench).unwrap()
+            }),
+        ),
     ];
     for (name, method) in &all {
         let right = |case: &&Case| {
             let (truth, score) = (default(case, Refiner::Newton).mu_s.unwrap(), method(case));
-            score.status == Status::Ok && score.mu_s.is_some_and(|mu| (mu / truth - 1.0).abs() <= 1e-6)
+            score.status == Status::Ok
+                && score.mu_s.is_some_and(|mu| (mu / truth - 1.0).abs() <= 1e-6)
         };
-        println!("{name}: right in {} of {} cases", cases.iter().filter(right).count(), cases.len());
+        println!(
+            "{name}: right in {} of {} cases",
+            cases.iter().filter(right).count(),
+            cases.len()
+        );
     }
     let mut group = criterion.benchmark_group("methods, same cases");
-    group.throughput(Throughput::Elements(cases.len() as u64)).sample_size(10).measurement_time(Duration::from_secs(4)).warm_up_time(Duration::from_secs(1));
+    group
+        .throughput(Throughput::Elements(cases.len() as u64))
+        .sample_size(10)
+        .measurement_time(Duration::from_secs(4))
+        .warm_up_time(Duration::from_secs(1));
     for (name, method) in &all {
-        group.bench_function(*name, |bench| bench.iter(|| cases.iter().map(|case| method(black_box(case)).evaluations).sum::<u32>()));
+        group.bench_function(*name, |bench| {
+            bench.iter(|| cases.iter().map(|case| method(black_box(case)).evaluations).sum::<u32>())
+        });
     }
     group.finish();
 }

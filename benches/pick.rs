@@ -1,4 +1,5 @@
-//! Picking from 10,000 grips in a scene of 100,000 triangles, after loading: the first grip free, only the last one free, and none.
+//! Picking from 10,000 grips in a scene of 100,000 triangles, after loading: the first grip free,
+//! only the last one free, and none.
 
 #![allow(clippy::unwrap_used, reason = "a bench stops by panicking")]
 
@@ -20,11 +21,25 @@ fn bin(n: usize) -> Mesh {
         let (x, y) = (i as f64 / n as f64 - 0.5, j as f64 / n as f64 - 0.5);
         0.03 * (31.0 * x).sin() * (27.0 * y).cos() + 1.5 * (x.abs().max(y.abs()) - 0.4).max(0.0)
     };
-    let point = |i: usize, j: usize| DVec3::new(0.6 * (i as f64 / n as f64 - 0.5), 0.6 * (j as f64 / n as f64 - 0.5), height(i, j));
+    let point = |i: usize, j: usize| {
+        DVec3::new(
+            0.6 * (i as f64 / n as f64 - 0.5),
+            0.6 * (j as f64 / n as f64 - 0.5),
+            height(i, j),
+        )
+    };
     let vertices = (0..=n).flat_map(|i| (0..=n).map(move |j| point(i, j))).collect();
     let at = |i: usize, j: usize| u32::try_from(i * (n + 1) + j).unwrap();
-    let triangles =
-        (0..n).flat_map(|i| (0..n).flat_map(move |j| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]])).collect();
+    let triangles = (0..n)
+        .flat_map(|i| {
+            (0..n).flat_map(move |j| {
+                [
+                    [at(i, j), at(i + 1, j), at(i + 1, j + 1)],
+                    [at(i, j), at(i + 1, j + 1), at(i, j + 1)],
+                ]
+            })
+        })
+        .collect();
     Mesh { vertices, triangles }
 }
 
@@ -34,8 +49,13 @@ fn list(count: u64) -> GripSet {
     set.grips = (0..count)
         .map(|id| {
             let turn = |step: f64| (id as f64 * step).fract();
-            let spin = DQuat::from_rotation_z(std::f64::consts::TAU * turn(0.618_033_988_749_895)) * DQuat::from_rotation_y(3.0 * turn(0.754_877_666_246_693));
-            let origin = DVec3::new(turn(0.569_840_290_998_053) - 0.5, turn(0.324_717_957_244_746) - 0.5, turn(0.819_172_513_396_164) - 0.5) * 0.06;
+            let spin = DQuat::from_rotation_z(std::f64::consts::TAU * turn(0.618_033_988_749_895))
+                * DQuat::from_rotation_y(3.0 * turn(0.754_877_666_246_693));
+            let origin = DVec3::new(
+                turn(0.569_840_290_998_053) - 0.5,
+                turn(0.324_717_957_244_746) - 0.5,
+                turn(0.819_172_513_396_164) - 0.5,
+            ) * 0.06;
             let mut grip = grips::grip(id, Frame { rotation: DMat3::from_quat(spin), origin }, 0.1);
             grip.grip.width = 0.02 + 0.001 * (id % 20) as f64;
             grip
@@ -50,15 +70,24 @@ fn pick(criterion: &mut Criterion) {
     let table = Obstacle {
         name: "table".into(),
         solid: Solid::HalfSpace,
-        world_from_obstacle: Frame { rotation: DMat3::IDENTITY, origin: DVec3::new(0.0, 0.0, -0.05) },
+        world_from_obstacle: Frame {
+            rotation: DMat3::IDENTITY,
+            origin: DVec3::new(0.0, 0.0, -0.05),
+        },
     };
-    let bin = Obstacle { name: "bin".into(), solid: Solid::Mesh { mesh, closed: false }, world_from_obstacle: Frame::IDENTITY };
+    let bin = Obstacle {
+        name: "bin".into(),
+        solid: Solid::Mesh { mesh, closed: false },
+        world_from_obstacle: Frame::IDENTITY,
+    };
     let scene = Scene { obstacles: vec![table, bin], ..Scene::default() };
-    let mut group = criterion.benchmark_group(format!("pick from 10000 grips, {triangles} triangles"));
+    let mut group =
+        criterion.benchmark_group(format!("pick from 10000 grips, {triangles} triangles"));
     group.throughput(Throughput::Elements(10_000));
     let at = |z: f64| Frame { rotation: DMat3::IDENTITY, origin: DVec3::new(0.05, -0.02, z) };
 
-    // A part on the floor of the bin: as many as are blocked before the first free one, then a list of blocked ones only.
+    // A part on the floor of the bin: as many as are blocked before the first free one, then a list
+    // of blocked ones only.
     let set = list(40_000);
     let picker = Picker::new(&set, &scene).unwrap();
     let (mut blocked, mut free) = (list(0), None);
@@ -72,8 +101,14 @@ fn pick(criterion: &mut Criterion) {
     blocked.grips.truncate(10_000);
     assert_eq!(blocked.grips.len(), 10_000);
     let first = picker.pick(&at(0.02));
-    println!("{} blocked grips; in the mixed list the first free one is number {:?}", blocked.grips.len(), first.chosen.map(|index| index + 1));
-    group.bench_function("part in the bin, good and bad grips mixed", |bench| bench.iter(|| black_box(picker.pick(&at(0.02)))));
+    println!(
+        "{} blocked grips; in the mixed list the first free one is number {:?}",
+        blocked.grips.len(),
+        first.chosen.map(|index| index + 1)
+    );
+    group.bench_function("part in the bin, good and bad grips mixed", |bench| {
+        bench.iter(|| black_box(picker.pick(&at(0.02))))
+    });
     let none = Picker::new(&blocked, &scene).unwrap();
     group.bench_function("none free", |bench| {
         bench.iter(|| {
@@ -93,7 +128,9 @@ fn pick(criterion: &mut Criterion) {
         });
     });
     group.finish();
-    criterion.bench_function("prepare 10000 grips and 100000 triangles", |bench| bench.iter(|| black_box(Picker::new(&blocked, &scene).is_ok())));
+    criterion.bench_function("prepare 10000 grips and 100000 triangles", |bench| {
+        bench.iter(|| black_box(Picker::new(&blocked, &scene).is_ok()))
+    });
 }
 
 criterion_group!(benches, pick);

@@ -1,5 +1,5 @@
-//! The main job on a shipped part, on one thread and on all: candidates proposed and checked, and the whole plan from
-//! the file to the ranked list. `cargo bench --bench plan`
+//! The main job on a shipped part, on one thread and on all: candidates proposed and checked, and
+//! the whole plan from the file to the ranked list. `cargo bench --bench plan`
 
 #![allow(clippy::unwrap_used, reason = "a bench stops by panicking")]
 #![allow(missing_docs, reason = "criterion's macros make undocumented functions")]
@@ -22,20 +22,33 @@ fn read() -> Part {
     Part::read(&file, &ReadOptions::default()).unwrap()
 }
 
-/// What `gripfast plan l_bracket.stl --mass 350g` does, but for printing; the number of grips ranked.
+/// What `gripfast plan l_bracket.stl --mass 350g` does, but for printing; the number of grips
+/// ranked.
 fn plan(gripper: &Gripper, loads: &LoadSet, seeds: &SeedSet) -> u64 {
     let part = read();
     let mass = part.mass_properties(0.35 / part.mass_properties(1.0).volume);
     let cases = loads.cases(&mass).unwrap();
     let weights = Weights { k1: 1.0, k2: 1.0 };
-    let settings = Settings { force: gripper.force[1], weights, delta: 0.0, mu_c: 0.0, pad_friction: gripper.pad_friction, score: ScoreOptions::default() };
-    let assessor = Assessor { loads: &cases, mass, settings: &settings, backend: &Backend::Cpu, seeds };
+    let settings = Settings {
+        force: gripper.force[1],
+        weights,
+        delta: 0.0,
+        mu_c: 0.0,
+        pad_friction: gripper.pad_friction,
+        score: ScoreOptions::default(),
+    };
+    let assessor =
+        Assessor { loads: &cases, mass, settings: &settings, backend: &Backend::Cpu, seeds };
     let mut collector = Collector::default();
     for chunk in Proposer::new(&part, gripper, &ProposeOptions::default()).unwrap() {
         collector.add(assessor.assess(chunk.grips).unwrap(), 10_000, weights);
     }
     let (low, high) = part.mesh.bounding_box();
-    let mut ranking = collector.finish(mass.centre_of_mass, (high - low).length(), &rank::Options { weights, top: Some(10_000), ..rank::Options::default() });
+    let mut ranking = collector.finish(
+        mass.centre_of_mass,
+        (high - low).length(),
+        &rank::Options { weights, top: Some(10_000), ..rank::Options::default() },
+    );
     assessor.finish(&mut ranking.grips);
     ranking.ranked
 }
@@ -52,17 +65,25 @@ fn l_bracket(criterion: &mut Criterion) {
     let ball = LoadSet::parse("ball", "ball:500").unwrap();
     let seeds = SeedSet::default();
     let mut group = criterion.benchmark_group("l_bracket.stl, robotiq-2f85");
-    group.sample_size(10).sampling_mode(SamplingMode::Flat).measurement_time(Duration::from_secs(5)).warm_up_time(Duration::from_secs(1));
+    group
+        .sample_size(10)
+        .sampling_mode(SamplingMode::Flat)
+        .measurement_time(Duration::from_secs(5))
+        .warm_up_time(Duration::from_secs(1));
     let all = rayon::current_num_threads();
     for threads in if all > 1 { vec![1, all] } else { vec![1] } {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let (candidates, _) = pool.install(propose);
         group.throughput(Throughput::Elements(candidates));
-        group.bench_function(format!("candidates, {threads} thread(s)"), |bench| pool.install(|| bench.iter(propose)));
+        group.bench_function(format!("candidates, {threads} thread(s)"), |bench| {
+            pool.install(|| bench.iter(propose))
+        });
         for (name, loads) in [("gravity + 2g", &gravity), ("ball:500", &ball)] {
             let ranked = pool.install(|| plan(&gripper, loads, &seeds));
             group.throughput(Throughput::Elements(ranked));
-            group.bench_function(format!("plan, {name}, {threads} thread(s)"), |bench| pool.install(|| bench.iter(|| plan(&gripper, loads, &seeds))));
+            group.bench_function(format!("plan, {name}, {threads} thread(s)"), |bench| {
+                pool.install(|| bench.iter(|| plan(&gripper, loads, &seeds)))
+            });
         }
     }
     group.finish();

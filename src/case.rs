@@ -1,4 +1,5 @@
-//! Contact-pair files: one case, a list, `{"cases": [..]}` or JSON Lines; in SI, about the origin midway between the faces.
+//! Contact-pair files: one case, a list, `{"cases": [..]}` or JSON Lines; in SI, about the origin
+//! midway between the faces.
 
 use std::io::Read;
 use std::path::Path;
@@ -24,7 +25,8 @@ pub struct Case {
     pub wrench: Wrench,
 }
 
-/// As written in a file; keys that are not ours are ignored so that files can carry notes and expected answers.
+/// As written in a file; keys that are not ours are ignored so that files can carry notes and
+/// expected answers.
 #[derive(Deserialize)]
 struct Raw {
     id: Option<serde_json::Value>,
@@ -46,11 +48,14 @@ const SHAPE: &str = r#"a case is {"A_I":[{"outer":[[x,y],..],"holes":[..]}],"A_I
 /// Reads all cases of a file, or of standard input for `-`, in order.
 ///
 /// # Errors
-/// When the file cannot be read or a case is not of the form; the message names the file and the place in it.
+/// When the file cannot be read or a case is not of the form; the message names the file and the
+/// place in it.
 pub fn read(path: &Path) -> Result<Vec<Case>> {
     let text = if path == Path::new("-") {
         let mut text = String::new();
-        std::io::stdin().read_to_string(&mut text).map_err(|error| Error::io(path, "read", error))?;
+        std::io::stdin()
+            .read_to_string(&mut text)
+            .map_err(|error| Error::io(path, "read", error))?;
         text
     } else {
         std::fs::read_to_string(path).map_err(|error| Error::io(path, "read", error))?
@@ -61,20 +66,23 @@ pub fn read(path: &Path) -> Result<Vec<Case>> {
     let mut stream = serde_json::Deserializer::from_str(&text).into_iter::<serde_json::Value>();
     while let Some(value) = stream.next() {
         let line = text[..stream.byte_offset().min(text.len())].lines().count();
-        let value = value.map_err(|error| Error::input(&name, format!("is not JSON: {error}"), SHAPE))?;
+        let value =
+            value.map_err(|error| Error::input(&name, format!("is not JSON: {error}"), SHAPE))?;
         let mut take = |place: String, value: serde_json::Value| -> Result<()> {
             cases.push(parse(&place, value)?);
             Ok(())
         };
         match value {
-            serde_json::Value::Object(mut object) if object.contains_key("cases") => match object.remove("cases") {
-                Some(serde_json::Value::Array(list)) => {
-                    for (index, item) in list.into_iter().enumerate() {
-                        take(format!("{name}: cases[{index}]"), item)?;
+            serde_json::Value::Object(mut object) if object.contains_key("cases") => {
+                match object.remove("cases") {
+                    Some(serde_json::Value::Array(list)) => {
+                        for (index, item) in list.into_iter().enumerate() {
+                            take(format!("{name}: cases[{index}]"), item)?;
+                        }
                     }
+                    _ => return Err(Error::input(&name, "\"cases\" is not a list", SHAPE)),
                 }
-                _ => return Err(Error::input(&name, "\"cases\" is not a list", SHAPE)),
-            },
+            }
             serde_json::Value::Array(list) => {
                 for (index, item) in list.into_iter().enumerate() {
                     take(format!("{name}: [{index}]"), item)?;
@@ -94,8 +102,15 @@ pub fn read(path: &Path) -> Result<Vec<Case>> {
 /// # Errors
 /// When the value is not of the form.
 pub fn parse(place: &str, value: serde_json::Value) -> Result<Case> {
-    let raw: Raw = serde_json::from_value(value).map_err(|error| Error::input(place, error.to_string(), SHAPE))?;
+    let raw: Raw = serde_json::from_value(value)
+        .map_err(|error| Error::input(place, error.to_string(), SHAPE))?;
     let id = raw.id.map(|id| id.as_str().map_or_else(|| id.to_string(), str::to_string));
     let contact = Contact { face_i: raw.a_i, face_ii: raw.a_ii };
-    Ok(Case { id, contact, distance: raw.d, force: raw.force, wrench: Wrench { force: raw.f, moment: raw.m } })
+    Ok(Case {
+        id,
+        contact,
+        distance: raw.d,
+        force: raw.force,
+        wrench: Wrench { force: raw.f, moment: raw.m },
+    })
 }

@@ -1,4 +1,5 @@
-//! The library's error type: bad input and outside failures, never a hard grip (that is a [`crate::model::Status`]).
+//! The library's error type: bad input and outside failures, never a hard grip (that is a
+//! [`crate::model::Status`]).
 
 use std::path::{Path, PathBuf};
 
@@ -36,7 +37,11 @@ pub enum Error {
 
 impl Error {
     /// Bad input at `place`.
-    pub fn input(place: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+    pub fn input(
+        place: impl Into<String>,
+        problem: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
         Self::Input { place: place.into(), problem: problem.into(), remedy: remedy.into() }
     }
 

@@ -6,14 +6,18 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 
-/// Writes a file so that its name never stands for a part of it: the content goes to a temporary file in the same folder, is
-/// forced to the disk and takes the name at the end. A failure or a kill on the way leaves an older file as it was.
+/// Writes a file so that its name never stands for a part of it: the content goes to a temporary
+/// file in the same folder, is forced to the disk and takes the name at the end. A failure or a
+/// kill on the way leaves an older file as it was.
 ///
 /// Something that is no regular file (a pipe, `/dev/stdout`) is written directly.
 ///
 /// # Errors
 /// When the folder cannot be written, the disk is full, or `content` fails.
-pub fn write(path: &Path, content: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>) -> Result<()> {
+pub fn write(
+    path: &Path,
+    content: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+) -> Result<()> {
     let failed = |source| Error::io(path, "write", source);
     if std::fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir()) {
         let mut writer = BufWriter::new(File::options().write(true).open(path).map_err(failed)?);
@@ -30,7 +34,10 @@ pub fn write(path: &Path, content: impl FnOnce(&mut BufWriter<File>) -> std::io:
     };
     let temporary = builder().tempfile_in(folder).map_err(failed)?;
     let mut writer = BufWriter::new(temporary.as_file().try_clone().map_err(failed)?);
-    content(&mut writer).and_then(|()| writer.flush()).and_then(|()| temporary.as_file().sync_all()).map_err(failed)?;
+    content(&mut writer)
+        .and_then(|()| writer.flush())
+        .and_then(|()| temporary.as_file().sync_all())
+        .map_err(failed)?;
     drop(writer);
     temporary.persist(&target).map_err(|error| failed(error.error))?;
     // The new name is on the disk once its folder is; not every file system allows to ask for this.
@@ -43,7 +50,8 @@ pub fn write(path: &Path, content: impl FnOnce(&mut BufWriter<File>) -> std::io:
 fn builder() -> tempfile::Builder<'static, 'static> {
     use std::os::unix::fs::PermissionsExt;
     let mut builder = tempfile::Builder::new();
-    // As any new file, less the user's mask; the default of temporary files would shut other users out of results.
+    // As any new file, less the user's mask; the default of temporary files would shut other users
+    // out of results.
     builder.prefix(".gripfast-").permissions(std::fs::Permissions::from_mode(0o666));
     builder
 }

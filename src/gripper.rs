@@ -1,4 +1,5 @@
-//! The gripper file: stroke, force, pads, finger and palm bodies, frames; and the shipped catalogue.
+//! The gripper file: stroke, force, pads, finger and palm bodies, frames; and the shipped
+//! catalogue.
 
 pub mod catalogue;
 pub mod check;
@@ -17,7 +18,8 @@ pub use catalogue::find;
 pub use check::check;
 pub use file::{parse, read};
 
-/// A two-finger gripper in SI units, in the grip frame (x1 approach, x3 closing; origin midway between the pads).
+/// A two-finger gripper in SI units, in the grip frame (x1 approach, x3 closing; origin midway
+/// between the pads).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Gripper {
     /// Display name.
@@ -35,21 +37,24 @@ pub struct Gripper {
     /// Young's modulus of the rubber [Pa], where stated.
     #[serde(default)]
     pub pad_modulus: Option<f64>,
-    /// Distance from the pad face to the finger's outer gripping face [m], where the gripper can grip from inside,
-    /// opening into a slot; that face has the pad's outline.
+    /// Distance from the pad face to the finger's outer gripping face [m], where the gripper can
+    /// grip from inside, opening into a slot; that face has the pad's outline.
     #[serde(default)]
     pub outer_pad: Option<f64>,
-    /// Bodies that move with the finger at `x3 > 0`, placed for pads touching at zero width: the pad face lies at
-    /// `x3 = 0` and the body at `x3 >= 0`. The other finger's bodies are these turned by 180 degrees about `x1`.
+    /// Bodies that move with the finger at `x3 > 0`, placed for pads touching at zero width: the
+    /// pad face lies at `x3 = 0` and the body at `x3 >= 0`. The other finger's bodies are these
+    /// turned by 180 degrees about `x1`.
     pub fingers: Vec<Body>,
     /// Bodies fixed to the palm.
     pub palm: Vec<Body>,
     /// Flange frame (robot mounting) in the grip frame, where stated.
     pub grip_from_flange: Option<Frame>,
-    /// Tool frame in the grip frame, where it is not the usual one (z approach, y closing, origin between the pads).
+    /// Tool frame in the grip frame, where it is not the usual one (z approach, y closing, origin
+    /// between the pads).
     #[serde(default)]
     pub grip_from_tool: Option<Frame>,
-    /// Where each dimension comes from, by its name in the file, e.g. `pad.friction` or `finger.fingertip`.
+    /// Where each dimension comes from, by its name in the file, e.g. `pad.friction` or
+    /// `finger.fingertip`.
     #[serde(default)]
     pub sources: BTreeMap<String, Source>,
 }
@@ -106,7 +111,11 @@ impl Shape {
                 let flat = direction.truncate().normalize_or_zero() * *radius;
                 flat.extend(half_height.copysign(direction.z))
             }
-            Self::Hull { points } => points.iter().copied().max_by(|a, b| a.dot(direction).total_cmp(&b.dot(direction))).unwrap_or(DVec3::ZERO),
+            Self::Hull { points } => points
+                .iter()
+                .copied()
+                .max_by(|a, b| a.dot(direction).total_cmp(&b.dot(direction)))
+                .unwrap_or(DVec3::ZERO),
         }
     }
 }
@@ -120,14 +129,20 @@ impl Body {
 
     /// Smallest and largest coordinates in the grip frame [m].
     pub fn bounds(&self) -> [DVec3; 2] {
-        let reach = |sign: f64| DVec3::from_array(DVec3::AXES.map(|axis| self.support_point(axis * sign).dot(axis)));
+        let reach = |sign: f64| {
+            DVec3::from_array(DVec3::AXES.map(|axis| self.support_point(axis * sign).dot(axis)))
+        };
         [reach(-1.0), reach(1.0)]
     }
 
     /// The body under a rigid map of the grip frame.
     #[must_use]
     pub fn moved(&self, map: &Frame) -> Self {
-        Self { name: self.name.clone(), shape: self.shape.clone(), grip_from_body: map.compose(&self.grip_from_body) }
+        Self {
+            name: self.name.clone(),
+            shape: self.shape.clone(),
+            grip_from_body: map.compose(&self.grip_from_body),
+        }
     }
 }
 
@@ -142,22 +157,31 @@ impl Gripper {
         self.fingers.iter().map(|body| body.moved(&map)).collect()
     }
 
-    /// Distance of the pads in a grip [m]: the faces' own, or less by the fingers where these spread into a slot.
+    /// Distance of the pads in a grip [m]: the faces' own, or less by the fingers where these
+    /// spread into a slot.
     pub fn jaw_gap(&self, grip: &Grip) -> f64 {
         if grip.inside { grip.width - 2.0 * self.outer_pad.unwrap_or(0.0) } else { grip.width }
     }
 
-    /// Distance of the pads before they close on a grip [m], each jaw having `opening` to go or as much as the stroke leaves.
+    /// Distance of the pads before they close on a grip [m], each jaw having `opening` to go or as
+    /// much as the stroke leaves.
     pub fn opened_gap(&self, grip: &Grip, opening: f64) -> f64 {
         let (gap, [least, most]) = (self.jaw_gap(grip), self.stroke);
-        if grip.inside { (gap - 2.0 * opening).max(least).min(gap) } else { (gap + 2.0 * opening).min(most).max(gap) }
+        if grip.inside {
+            (gap - 2.0 * opening).max(least).min(gap)
+        } else {
+            (gap + 2.0 * opening).min(most).max(gap)
+        }
     }
 
-    /// Whether exchanging the jaws (half a turn about the approach axis) changes nothing but the names: the pad is
-    /// mirror-symmetric in `x2`, and the half turn maps the set of palm bodies to itself.
+    /// Whether exchanging the jaws (half a turn about the approach axis) changes nothing but the
+    /// names: the pad is mirror-symmetric in `x2`, and the half turn maps the set of palm bodies to
+    /// itself.
     pub fn is_symmetric(&self) -> bool {
         let close = 1e-9;
-        let mirrored = |point: &DVec2| self.pad.iter().any(|other| other.distance(DVec2::new(point.x, -point.y)) < close);
+        let mirrored = |point: &DVec2| {
+            self.pad.iter().any(|other| other.distance(DVec2::new(point.x, -point.y)) < close)
+        };
         let turn = Frame { rotation: half_turn(), origin: DVec3::ZERO };
         let has_twin = |body: &Body| {
             let [min, max] = body.moved(&turn).bounds();
@@ -181,5 +205,10 @@ pub fn half_turn() -> DMat3 {
 /// A rectangle of the given sizes along `(x1, x2)`, centred.
 pub fn rectangle(size: DVec2) -> Ring {
     let half = size / 2.0;
-    vec![DVec2::new(-half.x, -half.y), DVec2::new(half.x, -half.y), half, DVec2::new(-half.x, half.y)]
+    vec![
+        DVec2::new(-half.x, -half.y),
+        DVec2::new(half.x, -half.y),
+        half,
+        DVec2::new(-half.x, half.y),
+    ]
 }

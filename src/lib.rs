@@ -1,7 +1,8 @@
-//! Finds and ranks every two-finger grip on a CAD part by the smallest friction coefficient that holds it.
+//! Finds and ranks every two-finger grip on a CAD part by the smallest friction coefficient that
+//! holds it.
 //!
-//! `ARCHITECTURE.md` shows the pipeline and which module may import which. Start at [`plan`] for the whole job, at
-//! [`mechanics::solve`] for one contact pair.
+//! `ARCHITECTURE.md` shows the pipeline and which module may import which. Start at [`plan`] for
+//! the whole job, at [`mechanics::solve`] for one contact pair.
 
 pub mod backend;
 pub mod case;

@@ -1,7 +1,9 @@
-//! Plain data shared by every floor: polygons, wrenches, pressures, slips, scores, grips. SI units, no mathematics.
+//! Plain data shared by every floor: polygons, wrenches, pressures, slips, scores, grips. SI units,
+//! no mathematics.
 //!
-//! Grip frame: origin midway between the jaws; `x3` is the closing axis; `x1` is the approach axis (palm towards
-//! fingertips); `x2 = x3 x x1`. Face I lies at `x3 = +d/2` (the jaw pushes the body along `-x3`), face II at `x3 = -d/2`.
+//! Grip frame: origin midway between the jaws; `x3` is the closing axis; `x1` is the approach axis
+//! (palm towards fingertips); `x2 = x3 x x1`. Face I lies at `x3 = +d/2` (the jaw pushes the body
+//! along `-x3`), face II at `x3 = -d/2`.
 
 use std::sync::Arc;
 
@@ -37,8 +39,8 @@ pub struct Contact {
     pub face_ii: Patch,
 }
 
-/// A force [N] and a moment [N m] ON the body. The frame and the point of the moment are the holder's to state;
-/// in mechanics it is the grip frame and its origin.
+/// A force [N] and a moment [N m] ON the body. The frame and the point of the moment are the
+/// holder's to state; in mechanics it is the grip frame and its origin.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Wrench {
     /// Force [N].
@@ -47,8 +49,8 @@ pub struct Wrench {
     pub moment: DVec3,
 }
 
-/// Pressure planes of equations (1)(2): `p_I = a_i0 + a1 x1 + a2 x2`, `p_II = a_ii0 - a1 x1 - a2 x2`,
-/// both `max(0, .)` where a pad separates (19)(20).
+/// Pressure planes of equations (1)(2): `p_I = a_i0 + a1 x1 + a2 x2`, `p_II = a_ii0 - a1 x1 - a2
+/// x2`, both `max(0, .)` where a pad separates (19)(20).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pressure {
     /// Value of `p_I` at the origin [Pa].
@@ -67,7 +69,8 @@ pub struct Pressure {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "lowercase")]
 pub enum Slip {
-    /// Rotation about `x3` through `c` [m]; `sense` is +1 (the paper's) or -1 (there a negative mu).
+    /// Rotation about `x3` through `c` [m]; `sense` is +1 (the paper's) or -1 (there a negative
+    /// mu).
     Rotation {
         /// Slip centre in `(x1, x2)` [m].
         c: [f64; 2],
@@ -90,7 +93,8 @@ pub enum Slip {
 pub enum Status {
     /// A limit state exists; no other was found.
     Ok,
-    /// A limit state exists with part of the pads separated, and the caller asked to discard such grips.
+    /// A limit state exists with part of the pads separated, and the caller asked to discard such
+    /// grips.
     Separating,
     /// A limit state was found, but another one exists or could not be excluded.
     Ambiguous,
@@ -138,7 +142,8 @@ pub struct Score {
     /// Area of face II still in contact [m^2].
     #[serde(rename = "contact_area_II")]
     pub contact_area_ii: f64,
-    /// Largest of the seven equilibrium equations' residuals, forces over Fn and moments over Fn sqrt(A).
+    /// Largest of the seven equilibrium equations' residuals, forces over Fn and moments over Fn
+    /// sqrt(A).
     #[serde(with = "null_is_infinite")]
     pub residual: f64,
     /// Certificate on `mu_s` for the found pressure.
@@ -147,7 +152,8 @@ pub struct Score {
     pub evaluations: u32,
 }
 
-/// A rigid frame: `point_in_outer = rotation * point_in_inner + origin`. Columns of `rotation` are the inner axes.
+/// A rigid frame: `point_in_outer = rotation * point_in_inner + origin`. Columns of `rotation` are
+/// the inner axes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     /// Orthonormal, right-handed.
@@ -197,12 +203,13 @@ pub struct Grip {
     pub face_i: u32,
     /// Planar face of the part under pad II.
     pub face_ii: u32,
-    /// Angle of the approach axis about the closing axis, from the face pair's reference direction [rad].
+    /// Angle of the approach axis about the closing axis, from the face pair's reference direction
+    /// [rad].
     pub angle: f64,
     /// Contact areas in the grip frame; shared by grips whose areas are the same in the pad frame.
     pub contact: Arc<Contact>,
-    /// The jaws open against the faces from inside (a slot): face I then lies at `x3 = -width/2`, still pushed along
-    /// `-x3`, and the `d` of the mechanics is `-width`.
+    /// The jaws open against the faces from inside (a slot): face I then lies at `x3 = -width/2`,
+    /// still pushed along `-x3`, and the `d` of the mechanics is `-width`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub inside: bool,
     /// The grip with the same pose and the jaws exchanged, when that one is the representative.
@@ -216,7 +223,11 @@ pub(crate) mod null_is_infinite {
 
     #[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
     pub(crate) fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-        if value.is_finite() { serializer.serialize_f64(*value) } else { serializer.serialize_none() }
+        if value.is_finite() {
+            serializer.serialize_f64(*value)
+        } else {
+            serializer.serialize_none()
+        }
     }
 
     pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
@@ -225,7 +236,8 @@ pub(crate) mod null_is_infinite {
 }
 
 impl Grip {
-    /// Height of face I over face II along `x3`, the `d` of the mechanics [m]: the width, negative for an inside grip.
+    /// Height of face I over face II along `x3`, the `d` of the mechanics [m]: the width, negative
+    /// for an inside grip.
     pub fn distance(&self) -> f64 {
         if self.inside { -self.width } else { self.width }
     }

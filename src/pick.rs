@@ -1,6 +1,8 @@
-//! The run-time choice: the first grip of a ranked list that is free in a scene, and why each one before it was passed over.
+//! The run-time choice: the first grip of a ranked list that is free in a scene, and why each one
+//! before it was passed over.
 //!
-//! A [`Picker`] holds what does not change between picks (obstacles in a tree, swept gripper bodies); [`Picker::pick`] takes the part's pose.
+//! A [`Picker`] holds what does not change between picks (obstacles in a tree, swept gripper
+//! bodies); [`Picker::pick`] takes the part's pose.
 
 mod scene;
 
@@ -19,8 +21,8 @@ use crate::results::GripSet;
 pub use crate::propose::obstacle::Phase;
 pub use scene::{Obstacle, Opening, Reach, Retreat, Scene, Solid};
 
-/// Grips that one thread tests after each other. What a piece remembers of the last collision stays within it, so that reasons do not
-/// depend on the number of threads.
+/// Grips that one thread tests after each other. What a piece remembers of the last collision stays
+/// within it, so that reasons do not depend on the number of threads.
 const PIECE: usize = 64;
 
 /// Way of each jaw for lists that do not say how they were planned [m].
@@ -33,7 +35,8 @@ pub enum Reason {
     Cone(f64),
     /// The flange (or, without one, the grip) is this far from the robot's base [m].
     Reach(f64),
-    /// It needs jaws opened this far, less than the smallest or more than the largest distance of the pads [m].
+    /// It needs jaws opened this far, less than the smallest or more than the largest distance of
+    /// the pads [m].
     Stroke(f64),
     /// A body of the gripper meets an obstacle.
     Collision {
@@ -72,7 +75,8 @@ pub struct Picker<'a> {
     obstacles: Vec<Ready>,
     /// Of the meshes among them.
     nearby: Option<Nearby>,
-    /// Swept bodies for each width that occurs, and the number of those of each grip; without them the stroke does not suffice.
+    /// Swept bodies for each width that occurs, and the number of those of each grip; without them
+    /// the stroke does not suffice.
     volumes: Vec<Volumes>,
     volumes_of: Vec<std::result::Result<u32, f64>>,
 }
@@ -83,23 +87,40 @@ impl<'a> Picker<'a> {
     /// # Errors
     /// When the gripper in `set` cannot be read.
     pub fn new(set: &'a GripSet, scene: &'a Scene) -> Result<Self> {
-        let gripper: Gripper = serde_json::from_value(set.gripper.clone())
-            .map_err(|error| Error::input("gripper in the result file", format!("cannot be read: {error}"), "write the result anew with `gripfast plan`"))?;
+        let gripper: Gripper = serde_json::from_value(set.gripper.clone()).map_err(|error| {
+            Error::input(
+                "gripper in the result file",
+                format!("cannot be read: {error}"),
+                "write the result anew with `gripfast plan`",
+            )
+        })?;
         let obstacles: Vec<Ready> = scene.obstacles.iter().map(ready).collect();
         let nearby = Nearby::new(|| {
             obstacles.iter().enumerate().flat_map(|(obstacle, ready)| {
                 let mesh = if let Ready::Mesh { tree, .. } = ready { Some(tree) } else { None };
-                mesh.into_iter().flat_map(MeshObstacle::triangles).map(move |(triangle, corners)| (obstacle as u32, triangle, corners))
+                mesh.into_iter()
+                    .flat_map(MeshObstacle::triangles)
+                    .map(move |(triangle, corners)| (obstacle as u32, triangle, corners))
             })
         });
-        let mut picker = Self { set, scene, gripper, obstacles, nearby, volumes: Vec::new(), volumes_of: Vec::with_capacity(set.grips.len()) };
+        let mut picker = Self {
+            set,
+            scene,
+            gripper,
+            obstacles,
+            nearby,
+            volumes: Vec::new(),
+            volumes_of: Vec::with_capacity(set.grips.len()),
+        };
         let mut known: HashMap<(u64, bool), std::result::Result<u32, f64>> = HashMap::new();
         for ranked in &set.grips {
-            let entry = known.entry((ranked.grip.width.to_bits(), ranked.grip.inside)).or_insert_with(|| {
-                let course = picker.course(&ranked.grip)?;
-                picker.volumes.push(Volumes::new(&picker.gripper, &course));
-                Ok(picker.volumes.len() as u32 - 1)
-            });
+            let entry = known
+                .entry((ranked.grip.width.to_bits(), ranked.grip.inside))
+                .or_insert_with(|| {
+                    let course = picker.course(&ranked.grip)?;
+                    picker.volumes.push(Volumes::new(&picker.gripper, &course));
+                    Ok(picker.volumes.len() as u32 - 1)
+                });
             picker.volumes_of.push(*entry);
         }
         Ok(picker)
@@ -119,7 +140,13 @@ impl<'a> Picker<'a> {
             // Depends on each grip's pose: tested apart.
             Retreat::Along(_) => DVec3::ZERO,
         };
-        Ok(Course { gap, opening: (self.opened(grip) - gap) / 2.0, approach: self.scene.approach, retreat, clearance: self.scene.clearance })
+        Ok(Course {
+            gap,
+            opening: (self.opened(grip) - gap) / 2.0,
+            approach: self.scene.approach,
+            retreat,
+            clearance: self.scene.clearance,
+        })
     }
 
     /// The first free grip with the part at `world_from_part`.
@@ -127,15 +154,19 @@ impl<'a> Picker<'a> {
     /// The answer, reasons included, is the same for any number of threads.
     pub fn pick(&self, world_from_part: &Frame) -> Pick {
         let mut pick = Pick::default();
-        // Small groups first: most often one of the first grips is free, and a group is tested whole.
+        // Small groups first: most often one of the first grips is free, and a group is tested
+        // whole.
         let mut size = PIECE;
         while pick.chosen.is_none() && pick.passed.len() < self.set.grips.len() {
             let start = pick.passed.len();
             let end = (start + size).min(self.set.grips.len());
             let piece = |first: usize| self.piece(first..(first + PIECE).min(end), world_from_part);
             // One piece is not worth waking the threads.
-            let pieces: Vec<(Vec<Reason>, bool)> =
-                if end - start <= PIECE { vec![piece(start)] } else { (start..end).into_par_iter().step_by(PIECE).map(piece).collect() };
+            let pieces: Vec<(Vec<Reason>, bool)> = if end - start <= PIECE {
+                vec![piece(start)]
+            } else {
+                (start..end).into_par_iter().step_by(PIECE).map(piece).collect()
+            };
             for (reasons, free) in pieces {
                 pick.passed.extend(reasons);
                 if free {
@@ -148,7 +179,8 @@ impl<'a> Picker<'a> {
         pick
     }
 
-    /// Why the grip of this index is not free with the part at `world_from_part`; `None` when it is, or when there is no such grip.
+    /// Why the grip of this index is not free with the part at `world_from_part`; `None` when it
+    /// is, or when there is no such grip.
     ///
     /// Of several collisions any may be named; [`Self::pick`] may name another one than this.
     pub fn check(&self, index: usize, world_from_part: &Frame) -> Option<Reason> {
@@ -199,16 +231,27 @@ impl<'a> Picker<'a> {
         let grip = &self.set.grips[index].grip;
         let course = self.course(grip).ok()?;
         let retreat = world_from_grip.rotation.transpose() * way;
-        let volumes = Volumes::new(&self.gripper, &Course { approach: 0.0, opening: 0.0, retreat, ..course });
-        self.collision(&volumes, &world_from_grip, room).map(|(obstacle, volume)| explain(obstacle, &volumes, volume))
+        let volumes =
+            Volumes::new(&self.gripper, &Course { approach: 0.0, opening: 0.0, retreat, ..course });
+        self.collision(&volumes, &world_from_grip, room)
+            .map(|(obstacle, volume)| explain(obstacle, &volumes, volume))
     }
 
     /// An obstacle and the first volume that meets it.
-    fn collision(&self, volumes: &Volumes, world_from_grip: &Frame, room: &mut Room) -> Option<(usize, usize)> {
+    fn collision(
+        &self,
+        volumes: &Volumes,
+        world_from_grip: &Frame,
+        room: &mut Room,
+    ) -> Option<(usize, usize)> {
         for (obstacle, ready) in self.obstacles.iter().enumerate() {
             let volume = match ready {
-                Ready::HalfSpace { normal, offset } => volumes.below(world_from_grip, *normal, *offset),
-                Ready::Box { world_from_box, half } => volumes.meets_box(world_from_grip, world_from_box, *half),
+                Ready::HalfSpace { normal, offset } => {
+                    volumes.below(world_from_grip, *normal, *offset)
+                }
+                Ready::Box { world_from_box, half } => {
+                    volumes.meets_box(world_from_grip, world_from_box, *half)
+                }
                 Ready::Mesh { .. } => None,
             };
             if let Some(volume) = volume {
@@ -220,7 +263,11 @@ impl<'a> Picker<'a> {
             _ => None,
         };
         // Most collisions are guessed; that there is none only the whole search says.
-        if let Some(found) = self.nearby.as_ref().and_then(|nearby| volumes.guess(nearby, triangle, world_from_grip, room)) {
+        if let Some(found) = self
+            .nearby
+            .as_ref()
+            .and_then(|nearby| volumes.guess(nearby, triangle, world_from_grip, room))
+        {
             return Some(found);
         }
         for (obstacle, ready) in self.obstacles.iter().enumerate() {
@@ -230,7 +277,9 @@ impl<'a> Picker<'a> {
             }
         }
         self.obstacles.iter().enumerate().find_map(|(obstacle, ready)| match ready {
-            Ready::Mesh { tree, closed: true } => tree.contains(volumes, world_from_grip).map(|volume| (obstacle, volume)),
+            Ready::Mesh { tree, closed: true } => {
+                tree.contains(volumes, world_from_grip).map(|volume| (obstacle, volume))
+            }
             _ => None,
         })
     }
@@ -238,11 +287,16 @@ impl<'a> Picker<'a> {
     /// A reason in words.
     pub fn describe(&self, reason: &Reason) -> String {
         match *reason {
-            Reason::Cone(angle) => format!("approach {:.1} deg off the cone's axis", angle.to_degrees()),
-            Reason::Reach(distance) => format!("out of reach: {:.1} mm from the base", distance * 1e3),
+            Reason::Cone(angle) => {
+                format!("approach {:.1} deg off the cone's axis", angle.to_degrees())
+            }
+            Reason::Reach(distance) => {
+                format!("out of reach: {:.1} mm from the base", distance * 1e3)
+            }
             Reason::Stroke(gap) => format!("outside the stroke: pads {:.2} mm apart", gap * 1e3),
             Reason::Collision { obstacle, phase, jaw, body } => {
-                let bodies = if jaw.is_empty() { &self.gripper.palm } else { &self.gripper.fingers };
+                let bodies =
+                    if jaw.is_empty() { &self.gripper.palm } else { &self.gripper.fingers };
                 let body = bodies.get(body).map_or("gripper", |body| body.name.as_str());
                 let jaw = if jaw.is_empty() { String::new() } else { format!(" of jaw {jaw}") };
                 let phase = match phase {
@@ -261,7 +315,9 @@ impl<'a> Picker<'a> {
             Reason::Cone(_) => "approach cone".into(),
             Reason::Reach(_) => "reach".into(),
             Reason::Stroke(_) => "stroke".into(),
-            Reason::Collision { obstacle, .. } => format!("collision with '{}'", self.scene.obstacles[obstacle].name),
+            Reason::Collision { obstacle, .. } => {
+                format!("collision with '{}'", self.scene.obstacles[obstacle].name)
+            }
         }
     }
 
@@ -271,7 +327,13 @@ impl<'a> Picker<'a> {
             Opening::Full => f64::INFINITY,
             Opening::Jaw(way) => way,
             // As the interference of the list was checked.
-            Opening::Planned => self.set.provenance.settings.get("opening_m").and_then(serde_json::Value::as_f64).unwrap_or(PLANNED_OPENING),
+            Opening::Planned => self
+                .set
+                .provenance
+                .settings
+                .get("opening_m")
+                .and_then(serde_json::Value::as_f64)
+                .unwrap_or(PLANNED_OPENING),
         };
         self.gripper.opened_gap(grip, opening)
     }
@@ -291,7 +353,10 @@ fn ready(obstacle: &Obstacle) -> Ready {
     let pose = obstacle.world_from_obstacle;
     match &obstacle.solid {
         Solid::Mesh { mesh, closed } => {
-            let placed = crate::part::Mesh { vertices: mesh.vertices.iter().map(|vertex| pose.point(*vertex)).collect(), triangles: mesh.triangles.clone() };
+            let placed = crate::part::Mesh {
+                vertices: mesh.vertices.iter().map(|vertex| pose.point(*vertex)).collect(),
+                triangles: mesh.triangles.clone(),
+            };
             Ready::Mesh { tree: MeshObstacle::new(&placed), closed: *closed }
         }
         Solid::Box { half } => Ready::Box { world_from_box: pose, half: *half },

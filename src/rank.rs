@@ -1,4 +1,5 @@
-//! The order of the grips: score, ties, flips, duplicates by symmetry, and a choice of grips that differ.
+//! The order of the grips: score, ties, flips, duplicates by symmetry, and a choice of grips that
+//! differ.
 
 use std::collections::BTreeMap;
 
@@ -7,12 +8,12 @@ use glam::DVec3;
 use crate::model::{Patch, Status};
 use crate::results::RankedGrip;
 
-/// Scores that differ by less than this share count as equal and are ordered by id: final answers agree to this across
-/// backends and refiners, and the order shall not depend on which of them ran.
+/// Scores that differ by less than this share count as equal and are ordered by id: final answers
+/// agree to this across backends and refiners, and the order shall not depend on which of them ran.
 pub const TIE: f64 = 1e-9;
 
-/// Two lengths [m] (or areas, by their square roots) count as equal for [`Options::merge_duplicates`]: part files have coordinates
-/// of single precision.
+/// Two lengths [m] (or areas, by their square roots) count as equal for
+/// [`Options::merge_duplicates`]: part files have coordinates of single precision.
 const SAME_LENGTH: f64 = 1e-7;
 /// Scores that such lengths can make differ by no more than this share.
 const SAME_SCORE: f64 = 1e-5;
@@ -49,32 +50,41 @@ pub struct Options {
     pub weights: Weights,
     /// Keeps grips that are another one with the jaws exchanged (`flip_of`).
     pub keep_flips: bool,
-    /// Keeps one of the grips that score the same with the same geometry in the grip frame, as those that a symmetry of the part
-    /// maps to each other do; [`RankedGrip::merged`] names the others.
+    /// Keeps one of the grips that score the same with the same geometry in the grip frame, as
+    /// those that a symmetry of the part maps to each other do; [`RankedGrip::merged`] names the
+    /// others.
     pub merge_duplicates: bool,
     /// Keeps this many.
     pub top: Option<usize>,
-    /// With `top`: keeps grips that differ in place, approach and face pair rather than the first ones.
+    /// With `top`: keeps grips that differ in place, approach and face pair rather than the first
+    /// ones.
     pub diverse: bool,
 }
 
 /// The ordered grips and what became of the others.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Ranking {
-    /// Best first. `rank` is the place among all grips that were ranked, so a choice by `top` and `diverse` has gaps.
+    /// Best first. `rank` is the place among all grips that were ranked, so a choice by `top` and
+    /// `diverse` has gaps.
     pub grips: Vec<RankedGrip>,
     /// Grips that were ranked, before `top`.
     pub ranked: u64,
-    /// Grips left out, by reason: the status (`twisted_out`, ...), `not_finite`, `flip`, `duplicate`.
+    /// Grips left out, by reason: the status (`twisted_out`, ...), `not_finite`, `flip`,
+    /// `duplicate`.
     pub rejections: BTreeMap<String, u64>,
 }
 
-/// Scores and orders `grips`; their `rank` and `score` are set here. `centre_of_mass` and `size` (the diagonal of the bounding
-/// box) are the part's [m], in the part frame.
+/// Scores and orders `grips`; their `rank` and `score` are set here. `centre_of_mass` and `size`
+/// (the diagonal of the bounding box) are the part's [m], in the part frame.
 ///
-/// The order is that of falling score; scores within [`TIE`] of each other follow the ids. It depends neither on the order in which
-/// the grips come nor on differences below [`TIE`].
-pub fn rank(grips: Vec<RankedGrip>, centre_of_mass: DVec3, size: f64, options: &Options) -> Ranking {
+/// The order is that of falling score; scores within [`TIE`] of each other follow the ids. It
+/// depends neither on the order in which the grips come nor on differences below [`TIE`].
+pub fn rank(
+    grips: Vec<RankedGrip>,
+    centre_of_mass: DVec3,
+    size: f64,
+    options: &Options,
+) -> Ranking {
     let mut ranking = Ranking::default();
     let mut reject = |reason: &str| *ranking.rejections.entry(reason.to_owned()).or_default() += 1;
     let mut kept: Vec<(f64, RankedGrip)> = Vec::with_capacity(grips.len());
@@ -87,7 +97,8 @@ pub fn rank(grips: Vec<RankedGrip>, centre_of_mass: DVec3, size: f64, options: &
             reject(&status_name(grip.worst.status));
             continue;
         }
-        let score = grip.worst.mu_s.map_or(f64::NAN, |mu_s| options.weights.score(mu_s, grip.alpha));
+        let score =
+            grip.worst.mu_s.map_or(f64::NAN, |mu_s| options.weights.score(mu_s, grip.alpha));
         if score.is_nan() {
             reject("not_finite");
             continue;
@@ -132,15 +143,16 @@ pub fn status_name(status: Status) -> String {
     }
 }
 
-/// Whether two scores count as equal, see [`TIE`]. Infinite ones, of grips that need no friction, tie with each other only.
+/// Whether two scores count as equal, see [`TIE`]. Infinite ones, of grips that need no friction,
+/// tie with each other only.
 pub(crate) fn ties(a: f64, b: f64) -> bool {
     a == b || ((a - b).is_finite() && (a - b).abs() <= TIE * a.abs().max(b.abs()))
 }
 
 /// Falling score, runs of scores that tie by id.
 ///
-/// A run ends at a gap between neighbours, not at a distance from its first member: two equal grips stay together whatever lies
-/// between them.
+/// A run ends at a gap between neighbours, not at a distance from its first member: two equal grips
+/// stay together whatever lies between them.
 fn order(grips: &mut [(f64, RankedGrip)]) {
     grips.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.grip.id.cmp(&b.1.grip.id)));
     for run in grips.chunk_by_mut(|a, b| ties(a.0, b.0)) {
@@ -148,11 +160,13 @@ fn order(grips: &mut [(f64, RankedGrip)]) {
     }
 }
 
-/// What a symmetry of the part, or exchanging the jaws, leaves of a grip: width (negative from inside), the centre of mass in the grip frame up to the
-/// signs of `x2` and `x3`, area and second moment of both contacts in either order.
+/// What a symmetry of the part, or exchanging the jaws, leaves of a grip: width (negative from
+/// inside), the centre of mass in the grip frame up to the signs of `x2` and `x3`, area and second
+/// moment of both contacts in either order.
 fn geometry(grip: &RankedGrip, centre_of_mass: DVec3) -> [f64; 8] {
     let centre = grip.grip.part_from_grip.point_inverse(centre_of_mass);
-    let [mut one, mut two] = [&grip.grip.contact.face_i, &grip.grip.contact.face_ii].map(size_and_spread);
+    let [mut one, mut two] =
+        [&grip.grip.contact.face_i, &grip.grip.contact.face_ii].map(size_and_spread);
     if (one[0], one[1]) < (two[0], two[1]) {
         std::mem::swap(&mut one, &mut two);
     }
@@ -167,7 +181,10 @@ fn size_and_spread(patch: &Patch) -> [f64; 2] {
         return [0.0; 2];
     }
     let polar = moments.second.x_axis.x + moments.second.y_axis.y;
-    [moments.area.sqrt(), (polar / moments.area + moments.centroid.length_squared()).max(0.0).sqrt()]
+    [
+        moments.area.sqrt(),
+        (polar / moments.area + moments.centroid.length_squared()).max(0.0).sqrt(),
+    ]
 }
 
 /// Keeps the first of each set of equal grips, from grips in order; each one kept names the others.
@@ -176,12 +193,15 @@ fn merge(grips: Vec<(f64, RankedGrip)>, centre_of_mass: DVec3) -> Vec<(f64, Rank
     let mut shapes: Vec<[f64; 8]> = Vec::with_capacity(grips.len());
     let mut near = 0; // the first kept grip whose score is not clearly larger
     for (score, mut grip) in grips {
-        let larger = |other: f64| other != score && (other.is_infinite() || other - score > SAME_SCORE * other.abs());
+        let larger = |other: f64| {
+            other != score && (other.is_infinite() || other - score > SAME_SCORE * other.abs())
+        };
         while near < kept.len() && larger(kept[near].0) {
             near += 1;
         }
         let shape = geometry(&grip, centre_of_mass);
-        let same = |other: &[f64; 8]| shape.iter().zip(other).all(|(a, b)| (a - b).abs() <= SAME_LENGTH);
+        let same =
+            |other: &[f64; 8]| shape.iter().zip(other).all(|(a, b)| (a - b).abs() <= SAME_LENGTH);
         if let Some(found) = shapes[near..].iter().position(same) {
             kept[near + found].1.merged.push(grip.grip.id);
         } else {
@@ -193,25 +213,34 @@ fn merge(grips: Vec<(f64, RankedGrip)>, centre_of_mass: DVec3) -> Vec<(f64, Rank
     kept
 }
 
-/// At most `top` of the ranked `grips` that differ in place, approach and face pair, best first. `size`: diagonal of the part's
-/// bounding box [m].
+/// At most `top` of the ranked `grips` that differ in place, approach and face pair, best first.
+/// `size`: diagonal of the part's bounding box [m].
 pub fn choose_diverse(grips: &[RankedGrip], top: usize, size: f64) -> Vec<&RankedGrip> {
-    grips.iter().zip(diverse(grips, top, size)).filter_map(|(grip, chosen)| chosen.then_some(grip)).collect()
+    grips
+        .iter()
+        .zip(diverse(grips, top, size))
+        .filter_map(|(grip, chosen)| chosen.then_some(grip))
+        .collect()
 }
 
-/// Marks `top` grips of an ordered list that differ: each lies at least a distance from every one chosen before it, and the distance
-/// is lowered step by step until enough are found.
+/// Marks `top` grips of an ordered list that differ: each lies at least a distance from every one
+/// chosen before it, and the distance is lowered step by step until enough are found.
 fn diverse(grips: &[RankedGrip], top: usize, size: f64) -> Vec<bool> {
     let mut chosen = vec![false; grips.len()];
     let mut list: Vec<usize> = Vec::new();
-    // 0.5: half the part's size, or a right angle of approach. Below 1 % grips are neighbours of a grid, and the rest is filled in order.
+    // 0.5: half the part's size, or a right angle of approach. Below 1 % grips are neighbours of a
+    // grid, and the rest is filled in order.
     let mut distance = 0.5;
     while list.len() < top.min(grips.len()) {
         for index in 0..grips.len() {
             if list.len() == top {
                 break;
             }
-            if !chosen[index] && list.iter().all(|other| difference(&grips[index], &grips[*other], size) >= distance) {
+            if !chosen[index]
+                && list
+                    .iter()
+                    .all(|other| difference(&grips[index], &grips[*other], size) >= distance)
+            {
                 chosen[index] = true;
                 list.push(index);
             }
@@ -221,12 +250,20 @@ fn diverse(grips: &[RankedGrip], top: usize, size: f64) -> Vec<bool> {
     chosen
 }
 
-/// How much two grips differ: place over the part's size, angle between the approaches over half a turn, and 0.2 for another face pair,
-/// as lengths of a right-angled triangle.
+/// How much two grips differ: place over the part's size, angle between the approaches over half a
+/// turn, and 0.2 for another face pair, as lengths of a right-angled triangle.
 fn difference(a: &RankedGrip, b: &RankedGrip, size: f64) -> f64 {
-    let place = if size > 0.0 { (a.grip.part_from_grip.origin - b.grip.part_from_grip.origin).length() / size } else { 0.0 };
-    let approach = a.grip.part_from_grip.rotation.x_axis.angle_between(b.grip.part_from_grip.rotation.x_axis) / std::f64::consts::PI;
-    let pair = |grip: &RankedGrip| (grip.grip.face_i.min(grip.grip.face_ii), grip.grip.face_i.max(grip.grip.face_ii));
+    let place = if size > 0.0 {
+        (a.grip.part_from_grip.origin - b.grip.part_from_grip.origin).length() / size
+    } else {
+        0.0
+    };
+    let approach =
+        a.grip.part_from_grip.rotation.x_axis.angle_between(b.grip.part_from_grip.rotation.x_axis)
+            / std::f64::consts::PI;
+    let pair = |grip: &RankedGrip| {
+        (grip.grip.face_i.min(grip.grip.face_ii), grip.grip.face_i.max(grip.grip.face_ii))
+    };
     let faces = if pair(a) == pair(b) { 0.0 } else { 0.2 };
     DVec3::new(place, approach, faces).length()
 }

@@ -1,6 +1,8 @@
-//! The result file: everything a run found, with its provenance. Native JSON; other formats are made from it.
+//! The result file: everything a run found, with its provenance. Native JSON; other formats are
+//! made from it.
 //!
-//! [`GripSet::read`], [`GripSet::write`] and [`GripSet::write_lines`] are its only doors. Numbers that are not finite are null.
+//! [`GripSet::read`], [`GripSet::write`] and [`GripSet::write_lines`] are its only doors. Numbers
+//! that are not finite are null.
 
 mod file;
 
@@ -111,7 +113,8 @@ pub struct Comparison {
     pub spearman: Option<f64>,
     /// Kendall's tau-b; `None` as above.
     pub kendall_tau_b: Option<f64>,
-    /// Grips that gain most places over the earlier order, most first; one for all that tie in both.
+    /// Grips that gain most places over the earlier order, most first; one for all that tie in
+    /// both.
     pub risen: Vec<u64>,
     /// Grips that lose most places, most first.
     pub fallen: Vec<u64>,
@@ -122,13 +125,15 @@ pub struct Comparison {
 pub struct EarlierScore {
     /// The earlier evaluation function, larger is better.
     pub evaluation: f64,
-    /// Place by it among the grips of the list, 1 is the best; grips that tie share the mean of their places.
+    /// Place by it among the grips of the list, 1 is the best; grips that tie share the mean of
+    /// their places.
     pub place: f64,
     /// Its friction coefficient under [`RankedGrip::worst`]'s load.
     pub mu_s: f64,
     /// Its slip centre, the centroid of the contact, in `(x1, x2)` [m].
     pub slip_centre: [f64; 2],
-    /// Distance of the slip centre from the centre of mass in the pad plane [m], the function's `D`.
+    /// Distance of the slip centre from the centre of mass in the pad plane [m], the function's
+    /// `D`.
     pub distance: f64,
 }
 
@@ -169,11 +174,13 @@ pub struct RankedGrip {
     pub safety: Option<f64>,
     /// Gripping force at which `mu_s` of the worst load equals the pad friction [N].
     pub force_needed: Option<f64>,
-    /// Ids of the grips left out because a symmetry of the part maps them to this one, where they were merged.
+    /// Ids of the grips left out because a symmetry of the part maps them to this one, where they
+    /// were merged.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub merged: Vec<u64>,
-    /// Largest multiple of the worst load, all of it, that the pad friction holds together with every smaller one; `None`
-    /// without a pad friction, or without a load. Another load may end at a smaller multiple: see [`crate::mechanics::inverse`].
+    /// Largest multiple of the worst load, all of it, that the pad friction holds together with
+    /// every smaller one; `None` without a pad friction, or without a load. Another load may end at
+    /// a smaller multiple: see [`crate::mechanics::inverse`].
     #[serde(default)]
     pub load_multiple: Option<f64>,
     /// By the earlier method, when asked for.
@@ -182,7 +189,8 @@ pub struct RankedGrip {
     /// Under an uncertain pose, when asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose_noise: Option<PoseNoise>,
-    /// `mu_s` of every load in the order of [`GripSet::loads`], when asked for; a load without limit state is null.
+    /// `mu_s` of every load in the order of [`GripSet::loads`], when asked for; a load without
+    /// limit state is null.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mu_by_load: Vec<Option<f64>>,
 }

@@ -1,4 +1,5 @@
-//! Values with units at the edge of the program: `80N`, `350g`, `2mm`, `15deg`. Inside everything is SI.
+//! Values with units at the edge of the program: `80N`, `350g`, `2mm`, `15deg`. Inside everything
+//! is SI.
 
 use crate::error::{Error, Result};
 
@@ -32,43 +33,100 @@ impl Quantity {
     /// Name and factor to SI of each accepted unit.
     pub fn units(self) -> &'static [(&'static str, f64)] {
         match self {
-            Self::Length => &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("in", 0.0254), ("ft", 0.3048)],
-            Self::Mass => &[("kg", 1.0), ("g", 1e-3), ("mg", 1e-6), ("t", 1e3), ("lb", 0.453_592_37), ("oz", 0.028_349_523_125)],
-            Self::Force => &[("N", 1.0), ("mN", 1e-3), ("kN", 1e3), ("lbf", 4.448_221_615_260_5), ("kgf", STANDARD_GRAVITY)],
-            Self::Moment => &[("Nm", 1.0), ("Nmm", 1e-3), ("mNm", 1e-3), ("lbfin", 0.112_984_829_027_616_7)],
+            Self::Length => &[
+                ("m", 1.0),
+                ("mm", 1e-3),
+                ("cm", 1e-2),
+                ("um", 1e-6),
+                ("in", 0.0254),
+                ("ft", 0.3048),
+            ],
+            Self::Mass => &[
+                ("kg", 1.0),
+                ("g", 1e-3),
+                ("mg", 1e-6),
+                ("t", 1e3),
+                ("lb", 0.453_592_37),
+                ("oz", 0.028_349_523_125),
+            ],
+            Self::Force => &[
+                ("N", 1.0),
+                ("mN", 1e-3),
+                ("kN", 1e3),
+                ("lbf", 4.448_221_615_260_5),
+                ("kgf", STANDARD_GRAVITY),
+            ],
+            Self::Moment => {
+                &[("Nm", 1.0), ("Nmm", 1e-3), ("mNm", 1e-3), ("lbfin", 0.112_984_829_027_616_7)]
+            }
             Self::Angle => &[("rad", 1.0), ("deg", std::f64::consts::PI / 180.0)],
-            Self::Acceleration => &[("m/s2", 1.0), ("m/s^2", 1.0), ("mm/s2", 1e-3), ("g", STANDARD_GRAVITY)],
+            Self::Acceleration => {
+                &[("m/s2", 1.0), ("m/s^2", 1.0), ("mm/s2", 1e-3), ("g", STANDARD_GRAVITY)]
+            }
             Self::Density => &[("kg/m3", 1.0), ("kg/m^3", 1.0), ("g/cm3", 1e3), ("g/cm^3", 1e3)],
-            Self::Pressure => &[("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("GPa", 1e9), ("bar", 1e5), ("psi", 6_894.757_293_168)],
+            Self::Pressure => &[
+                ("Pa", 1.0),
+                ("kPa", 1e3),
+                ("MPa", 1e6),
+                ("GPa", 1e9),
+                ("bar", 1e5),
+                ("psi", 6_894.757_293_168),
+            ],
             Self::Time => &[("s", 1.0), ("ms", 1e-3), ("min", 60.0), ("h", 3600.0)],
         }
     }
 
-    /// Parses `text` (number, then unit, spaces allowed between) to SI. `place` is the flag or field for the message.
+    /// Parses `text` (number, then unit, spaces allowed between) to SI. `place` is the flag or
+    /// field for the message.
     ///
     /// # Errors
-    /// When the number does not parse or is not finite, or the unit is missing or unknown; the message lists the units.
+    /// When the number does not parse or is not finite, or the unit is missing or unknown; the
+    /// message lists the units.
     pub fn parse(self, place: &str, text: &str) -> Result<f64> {
         let list = || self.units().iter().map(|unit| unit.0).collect::<Vec<_>>().join(", ");
         let text = text.trim();
-        // The longest prefix that is a number: units never look like digits, but `1e3g` must not stop at `1`.
-        let split = (1..=text.len()).rev().find(|&end| text.is_char_boundary(end) && text[..end].trim_end().parse::<f64>().is_ok());
+        // The longest prefix that is a number: units never look like digits, but `1e3g` must not
+        // stop at `1`.
+        let split = (1..=text.len()).rev().find(|&end| {
+            text.is_char_boundary(end) && text[..end].trim_end().parse::<f64>().is_ok()
+        });
         let Some(split) = split else {
-            return Err(Error::input(place, format!("'{text}' does not start with a number"), format!("write a number and a unit, one of: {}", list())));
+            return Err(Error::input(
+                place,
+                format!("'{text}' does not start with a number"),
+                format!("write a number and a unit, one of: {}", list()),
+            ));
         };
         let value: f64 = text[..split].trim_end().parse().unwrap_or(f64::NAN);
         let unit = text[split..].trim();
         if unit.is_empty() {
-            return Err(Error::input(place, format!("'{text}' has no unit"), format!("add one of: {}", list())));
+            return Err(Error::input(
+                place,
+                format!("'{text}' has no unit"),
+                format!("add one of: {}", list()),
+            ));
         }
-        let Some(factor) = self.units().iter().find(|known| known.0 == unit).map(|known| known.1) else {
-            return Err(Error::input(place, format!("'{text}': unknown unit '{unit}'"), format!("use one of: {}", list())));
+        let Some(factor) = self.units().iter().find(|known| known.0 == unit).map(|known| known.1)
+        else {
+            return Err(Error::input(
+                place,
+                format!("'{text}': unknown unit '{unit}'"),
+                format!("use one of: {}", list()),
+            ));
         };
         // 350 g is 350/1000 kg to the last digit, which 350 * 1e-3 is not.
         let inverse = (1.0 / factor).round();
-        let si = if factor < 1.0 && (inverse * factor - 1.0).abs() < 1e-15 { value / inverse } else { value * factor };
+        let si = if factor < 1.0 && (inverse * factor - 1.0).abs() < 1e-15 {
+            value / inverse
+        } else {
+            value * factor
+        };
         if !si.is_finite() {
-            return Err(Error::input(place, format!("'{text}' is not a finite value"), "give a finite number"));
+            return Err(Error::input(
+                place,
+                format!("'{text}' is not a finite value"),
+                "give a finite number",
+            ));
         }
         Ok(si)
     }
@@ -83,7 +141,9 @@ mod tests {
         assert_eq!(Quantity::Mass.parse("--mass", "350g").unwrap(), 0.35);
         assert_eq!(Quantity::Length.parse("x", "1e3 mm").unwrap(), 1.0);
         assert_eq!(Quantity::Acceleration.parse("x", "2g").unwrap(), 19.6133);
-        assert!((Quantity::Angle.parse("x", "180deg").unwrap() - std::f64::consts::PI).abs() < 1e-15);
+        assert!(
+            (Quantity::Angle.parse("x", "180deg").unwrap() - std::f64::consts::PI).abs() < 1e-15
+        );
     }
 
     #[test]

@@ -9,7 +9,11 @@ use serde_json::{Value, json};
 
 fn gripfast(arguments: &[&str]) -> Command {
     let mut command = Command::cargo_bin("gripfast").unwrap();
-    command.args(arguments).env_remove("GRIPFAST_ADAPTER").env_remove("WGPU_ADAPTER_NAME").current_dir(std::env::temp_dir());
+    command
+        .args(arguments)
+        .env_remove("GRIPFAST_ADAPTER")
+        .env_remove("WGPU_ADAPTER_NAME")
+        .current_dir(std::env::temp_dir());
     command
 }
 
@@ -38,7 +42,11 @@ fn score_gives_what_solve_gives() {
     let (scored, solved) = (lines(&scored), lines(&solved));
     assert_eq!(scored.len(), solved.len());
     for (a, b) in scored.iter().zip(&solved) {
-        assert_eq!((&a["id"], &a["status"], &a["load"]), (&b["id"], &b["status"], &json!(0)), "{a} {b}");
+        assert_eq!(
+            (&a["id"], &a["status"], &a["load"]),
+            (&b["id"], &b["status"], &json!(0)),
+            "{a} {b}"
+        );
         match (a["mu_s"].as_f64(), b["mu_s"].as_f64()) {
             (Some(x), Some(y)) => assert!((x - y).abs() <= 1e-12 * y.abs(), "{a} {b}"),
             (x, y) => assert_eq!(x, y),
@@ -51,12 +59,22 @@ fn json_lines_lists_and_own_loads_give_the_same_answers() {
     let (a, mut b) = (pair(0.0), pair(0.004));
     let json_lines = format!("{a}\n\n{b}\n");
     let (from_lines, summary) = run(&["score", "-", "--backend", "cpu"], &json_lines, 0);
-    assert!(summary.contains("backend cpu: asked for") && summary.contains("2 grips, 2 loads"), "{summary}");
-    assert_eq!(from_lines, run(&["score", "-", "--backend", "cpu"], &json!([a, b]).to_string(), 0).0);
-    assert_eq!(from_lines, run(&["score", "-", "--backend", "cpu"], &json!({ "cases": [a, b] }).to_string(), 0).0);
+    assert!(
+        summary.contains("backend cpu: asked for") && summary.contains("2 grips, 2 loads"),
+        "{summary}"
+    );
+    assert_eq!(
+        from_lines,
+        run(&["score", "-", "--backend", "cpu"], &json!([a, b]).to_string(), 0).0
+    );
+    assert_eq!(
+        from_lines,
+        run(&["score", "-", "--backend", "cpu"], &json!({ "cases": [a, b] }).to_string(), 0).0
+    );
     assert_eq!(from_lines, run(&["score", "-"], &json_lines, 0).0.as_str());
     b["loads"] = json!([{ "F": [1.0, 0.0, 0.0] }, { "F": [5.0, 0.0, 0.0], "M": [0.0, 0.0, 0.2] }]);
-    let own = lines(&run(&["score", "-", "--backend", "cpu", "--polish", "all"], &b.to_string(), 0).0);
+    let own =
+        lines(&run(&["score", "-", "--backend", "cpu", "--polish", "all"], &b.to_string(), 0).0);
     assert_eq!(own[0]["load"], 1);
     assert_eq!(own[0]["mu_s"], lines(&from_lines)[1]["mu_s"]);
     assert_eq!(own[0]["mu_by_load"].as_array().unwrap().len(), 2);
@@ -74,8 +92,25 @@ fn common_loads_replace_the_pairs_own() {
     assert!((0.0099..=0.01).contains(&mu), "{mu}");
     let folder = tempfile::tempdir().unwrap();
     let (loads, out) = (folder.path().join("loads.csv"), folder.path().join("out.jsonl"));
-    std::fs::write(&loads, "fx [N],fy [N],fz [N],mx [Nm],my [Nm],mz [Nm]\n5,0,0,0,0,0.2\n1,0,0,0,0,0\n").unwrap();
-    run(&["score", "-", "--backend", "cpu", "--loads", loads.to_str().unwrap(), "-o", out.to_str().unwrap()], &pairs, 0);
+    std::fs::write(
+        &loads,
+        "fx [N],fy [N],fz [N],mx [Nm],my [Nm],mz [Nm]\n5,0,0,0,0,0.2\n1,0,0,0,0,0\n",
+    )
+    .unwrap();
+    run(
+        &[
+            "score",
+            "-",
+            "--backend",
+            "cpu",
+            "--loads",
+            loads.to_str().unwrap(),
+            "-o",
+            out.to_str().unwrap(),
+        ],
+        &pairs,
+        0,
+    );
     let from_file = lines(&std::fs::read_to_string(&out).unwrap());
     assert_eq!((from_file.len(), &from_file[0]["load"]), (2, &json!(0)));
     let (refused, why) = run(&["score", "-", "--backend", "cpu", "--loads", "gravity"], &pairs, 2);
@@ -97,7 +132,8 @@ fn bad_input_is_named_and_leaves_no_file() {
         (json!({ "A_I": [], "A_II": [], "d": 1, "Fn": 1, "loads": 3 }).to_string(), "loads"),
         ("7".to_owned(), "neither"),
     ] {
-        let (_, why) = run(&["score", "-", "--backend", "cpu", "-o", out.to_str().unwrap()], &input, 2);
+        let (_, why) =
+            run(&["score", "-", "--backend", "cpu", "-o", out.to_str().unwrap()], &input, 2);
         assert!(why.contains(word), "{why}");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "{word}");
     }
@@ -105,7 +141,9 @@ fn bad_input_is_named_and_leaves_no_file() {
     assert!(why.contains("no_such_file.json"), "{why}");
     // Nothing held is exit code 1.
     let nothing = json!({ "A_I": [], "A_II": [], "d": 1, "Fn": 1, "F": [1, 0, 0], "M": [0, 0, 0] });
-    assert!(run(&["score", "-", "--backend", "cpu"], &nothing.to_string(), 1).0.contains("no_contact"));
+    assert!(
+        run(&["score", "-", "--backend", "cpu"], &nothing.to_string(), 1).0.contains("no_contact")
+    );
 }
 
 #[test]
@@ -122,7 +160,9 @@ fn a_missing_gpu_is_an_error_and_auto_says_why_not() {
     assert!(String::from_utf8(output.stderr).unwrap().contains("GPU") || output.stdout.is_empty());
     let output = with(&["score", "-"]).assert().code(0).get_output().clone();
     assert!(String::from_utf8(output.stderr).unwrap().contains("backend cpu: auto"));
-    for arguments in [["score", "-", "--adapter", "no such adapter"], ["score", "-", "--backend", "tpu"]] {
+    for arguments in
+        [["score", "-", "--adapter", "no such adapter"], ["score", "-", "--backend", "tpu"]]
+    {
         with(&arguments).assert().code(2);
     }
     with(&["score", "-", "--backend", "cpu", "--adapter", "0"]).assert().code(2);
@@ -134,10 +174,24 @@ fn devices_and_bench_write_json() {
     let devices: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(if devices.is_empty() { 1 } else { 0 }));
     for device in &devices {
-        assert!(device["name"].is_string() && device["max_binding"].as_u64().unwrap() > 0, "{device}");
+        assert!(
+            device["name"].is_string() && device["max_binding"].as_u64().unwrap() > 0,
+            "{device}"
+        );
         assert!(device["kind"] != "software" || device["counts_as_gpu"] == false, "{device}");
     }
-    let mut arguments = vec!["bench", "--json", "--seconds", "0.001", "--grips", "40", "--loads", "50", "--seeds", "21"];
+    let mut arguments = vec![
+        "bench",
+        "--json",
+        "--seconds",
+        "0.001",
+        "--grips",
+        "40",
+        "--loads",
+        "50",
+        "--seeds",
+        "21",
+    ];
     if devices.is_empty() {
         support::say("SKIPPED: no graphics adapter, bench runs on the processor alone");
     } else {
@@ -155,26 +209,61 @@ fn devices_and_bench_write_json() {
 fn polish_top_gives_the_same_best_grips() {
     let bracket = concat!(env!("CARGO_MANIFEST_DIR"), "/data/parts/l_bracket.stl");
     let plan = |more: &[&str]| {
-        let common =
-            ["plan", bracket, "--gripper", "robotiq-2f85", "--mass", "350g", "--backend", "cpu", "--loads", "ball:60", "--spacing", "4mm", "--json", "-q"];
+        let common = [
+            "plan",
+            bracket,
+            "--gripper",
+            "robotiq-2f85",
+            "--mass",
+            "350g",
+            "--backend",
+            "cpu",
+            "--loads",
+            "ball:60",
+            "--spacing",
+            "4mm",
+            "--json",
+            "-q",
+        ];
         let arguments: Vec<&str> = common.iter().chain(more).copied().collect();
         let set: Value = serde_json::from_str(&run(&arguments, "", 0).0).unwrap();
         set
     };
-    let numbers = |set: &Value| set["grips"].as_array().unwrap().iter().take(7).cloned().collect::<Vec<_>>();
+    let numbers =
+        |set: &Value| set["grips"].as_array().unwrap().iter().take(7).cloned().collect::<Vec<_>>();
     let whole = plan(&["--top", "7"]);
     let held = whole["grips"].as_array().unwrap().len() as u64;
     for threads in ["1", "3"] {
         let best = plan(&["--top", "7", "--polish", "top", "--threads", threads]);
         assert_eq!(numbers(&best), numbers(&whole));
         assert_eq!(best["grips"].as_array().unwrap().len(), 7);
-        let (solved, left) = (best["summary"]["ranked"].as_u64().unwrap(), best["summary"]["rejections"]["outranked"].as_u64().unwrap());
+        let (solved, left) = (
+            best["summary"]["ranked"].as_u64().unwrap(),
+            best["summary"]["rejections"]["outranked"].as_u64().unwrap(),
+        );
         assert!(solved + left == held && left > held / 2, "{solved} and {left} of {held}");
     }
     // Enough kept for a choice of grips that differ, and a word in the table.
-    let common = ["plan", bracket, "--gripper", "robotiq-2f85", "--mass", "350g", "--backend", "cpu", "--loads", "ball:60", "--spacing", "4mm", "-q"];
+    let common = [
+        "plan",
+        bracket,
+        "--gripper",
+        "robotiq-2f85",
+        "--mass",
+        "350g",
+        "--backend",
+        "cpu",
+        "--loads",
+        "ball:60",
+        "--spacing",
+        "4mm",
+        "-q",
+    ];
     let with = |more: &[&'static str]| [common.as_slice(), more].concat();
-    assert_eq!(run(&with(&["--diverse", "--polish", "top"]), "", 0).0, run(&with(&["--diverse"]), "", 0).0);
+    assert_eq!(
+        run(&with(&["--diverse", "--polish", "top"]), "", 0).0,
+        run(&with(&["--diverse"]), "", 0).0
+    );
     assert!(run(&with(&["--polish", "top"]), "", 0).0.contains("more were not solved"));
     assert!(run(&with(&["--polish", "top", "--k1=-1"]), "", 2).1.contains("--polish worst"));
 }

@@ -12,8 +12,18 @@ use gripfast::export::Format;
 use gripfast::results::GripSet;
 
 fn export(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let output = Command::cargo_bin("gripfast").unwrap().current_dir(folder).arg("export").args(arguments).output().unwrap();
-    (output.status.code().unwrap(), String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
+    let output = Command::cargo_bin("gripfast")
+        .unwrap()
+        .current_dir(folder)
+        .arg("export")
+        .args(arguments)
+        .output()
+        .unwrap();
+    (
+        output.status.code().unwrap(),
+        String::from_utf8(output.stdout).unwrap(),
+        String::from_utf8(output.stderr).unwrap(),
+    )
 }
 
 /// A folder with a result of four grips and the part it names.
@@ -21,8 +31,11 @@ fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     grips::grip_set(4).write(&folder.path().join("grips.json")).unwrap();
     let mut stl = "solid box\n".to_owned();
-    let corner = |index: usize| [[-30, 30][index & 1], [-20, 20][index >> 1 & 1], [-10, 10][index >> 2]];
-    for [a, b, c, d] in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
+    let corner =
+        |index: usize| [[-30, 30][index & 1], [-20, 20][index >> 1 & 1], [-10, 10][index >> 2]];
+    for [a, b, c, d] in
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    {
         for triangle in [[a, b, c], [a, c, d]] {
             stl += "facet normal 0 0 0\nouter loop\n";
             for index in triangle {
@@ -39,7 +52,10 @@ fn folder() -> tempfile::TempDir {
 #[test]
 fn the_ending_chooses_the_format() {
     let folder = folder();
-    let built = |format: &str| (format != "parquet" || cfg!(feature = "parquet")) && (format != "acronym" || cfg!(feature = "hdf5"));
+    let built = |format: &str| {
+        (format != "parquet" || cfg!(feature = "parquet"))
+            && (format != "acronym" || cfg!(feature = "hdf5"))
+    };
     for (_, name, endings) in Format::ALL {
         for ending in endings {
             let file = format!("out{ending}");
@@ -59,13 +75,35 @@ fn the_ending_chooses_the_format() {
 #[test]
 fn standard_output_and_a_choice_of_the_best() {
     let folder = folder();
-    let (code, stdout, _) = export(folder.path(), &["grips.json", "--format", "csv", "-o", "-", "--top", "2", "--convention", "graspgen"]);
+    let (code, stdout, _) = export(
+        folder.path(),
+        &["grips.json", "--format", "csv", "-o", "-", "--top", "2", "--convention", "graspgen"],
+    );
     assert_eq!(code, 0);
     assert_eq!(stdout.lines().count(), 3);
-    assert!(stdout.contains("\"z approach, x closing, origin midway between the pads\""), "{stdout}");
-    let (code, stdout, _) = export(folder.path(), &["grips.json", "--format", "moveit", "-o", "-", "--joint", "finger:-9.41:0.8", "--approach", "0.2m"]);
+    assert!(
+        stdout.contains("\"z approach, x closing, origin midway between the pads\""),
+        "{stdout}"
+    );
+    let (code, stdout, _) = export(
+        folder.path(),
+        &[
+            "grips.json",
+            "--format",
+            "moveit",
+            "-o",
+            "-",
+            "--joint",
+            "finger:-9.41:0.8",
+            "--approach",
+            "0.2m",
+        ],
+    );
     assert_eq!(code, 0);
-    assert!(stdout.contains("joint_names: [\"finger\"]") && stdout.contains("desired_distance: 0.2\n"), "{stdout}");
+    assert!(
+        stdout.contains("joint_names: [\"finger\"]") && stdout.contains("desired_distance: 0.2\n"),
+        "{stdout}"
+    );
 }
 
 #[test]
@@ -102,7 +140,8 @@ fn a_gripper_without_a_flange_is_told_so() {
     let mut set = grips::grip_set(1);
     set.gripper["grip_from_flange"] = serde_json::Value::Null;
     set.write(&folder.path().join("grips.json")).unwrap();
-    let (code, _, stderr) = export(folder.path(), &["grips.json", "-o", "out.csv", "--origin", "flange"]);
+    let (code, _, stderr) =
+        export(folder.path(), &["grips.json", "-o", "out.csv", "--origin", "flange"]);
     assert!(code == 2 && stderr.contains("no flange"), "{stderr}");
     set.gripper = serde_json::json!({"name": "other"});
     set.write(&folder.path().join("grips.json")).unwrap();

@@ -1,4 +1,5 @@
-//! The native result file: what is written is read back, and what is broken is refused with its place.
+//! The native result file: what is written is read back, and what is broken is refused with its
+//! place.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -32,7 +33,9 @@ fn json_and_json_lines_come_back_bit_for_bit() {
         serde_json::from_slice::<serde_json::Value>(&std::fs::read(&whole).unwrap()).unwrap();
         // Whatever layout another program gives it.
         let value = serde_json::to_value(&set).unwrap();
-        for text in [serde_json::to_string(&value).unwrap(), serde_json::to_string_pretty(&value).unwrap()] {
+        for text in
+            [serde_json::to_string(&value).unwrap(), serde_json::to_string_pretty(&value).unwrap()]
+        {
             assert_eq!(GripSet::parse("x", text.as_bytes()).unwrap(), set);
         }
     }
@@ -72,10 +75,15 @@ fn broken_files_are_refused_with_their_place() {
     assert!(refusal(b"[]").contains("grips.json"));
     assert!(refusal(b"{\"format\": \"other\"}").contains("other"));
     assert!(refusal(b"{}").contains("no format"));
-    assert!(refusal(text.replace("\"version\": 1", "\"version\": 2").as_bytes()).contains("newer gripfast"));
+    assert!(
+        refusal(text.replace("\"version\": 1", "\"version\": 2").as_bytes())
+            .contains("newer gripfast")
+    );
     assert!(refusal(text.replace("\"version\": 1", "\"version\": 0").as_bytes()).contains("older"));
     assert!(refusal(text.replace("\"alpha\"", "\"beta\"").as_bytes()).contains("alpha"));
-    assert!(refusal(text.replace("\"load\":0", "\"load\":7").as_bytes()).contains("load is number 7"));
+    assert!(
+        refusal(text.replace("\"load\":0", "\"load\":7").as_bytes()).contains("load is number 7")
+    );
     assert!(refusal(text.replace("\"width\":0.0", "\"width\":-0.0").as_bytes()).contains("width"));
     // Cut off anywhere: an error, never a panic, never half a result.
     for end in (1..good.len() - 3).step_by(97) {

@@ -10,14 +10,40 @@ use gripfast::report::figures::studies::{self, Trend};
 #[test]
 fn figure_5_shapes() {
     let rows = studies::figure_5().unwrap();
-    let ratio = |shape: &str, parameter: f64| rows.iter().find(|row| row.shape == shape && (row.parameter - parameter).abs() < 1e-9).unwrap().ratio;
-    for (hole, want) in [(0.2, 0.968), (0.3, 0.935), (0.4, 0.897), (0.5, 0.857), (0.6, 0.816), (0.75, 0.757), (0.9, 0.701)] {
-        assert!((ratio("hollow", hole) - want).abs() < 6e-4, "hole {hole}: {}", ratio("hollow", hole));
+    let ratio = |shape: &str, parameter: f64| {
+        rows.iter()
+            .find(|row| row.shape == shape && (row.parameter - parameter).abs() < 1e-9)
+            .unwrap()
+            .ratio
+    };
+    for (hole, want) in [
+        (0.2, 0.968),
+        (0.3, 0.935),
+        (0.4, 0.897),
+        (0.5, 0.857),
+        (0.6, 0.816),
+        (0.75, 0.757),
+        (0.9, 0.701),
+    ] {
+        assert!(
+            (ratio("hollow", hole) - want).abs() < 6e-4,
+            "hole {hole}: {}",
+            ratio("hollow", hole)
+        );
         // Exact: the mean radius of a hollow square is (1 - k^3)/(1 - k^2) times the square's.
         let exact = (1.0 - hole * hole) / (1.0 - hole * hole * hole);
         assert!((ratio("hollow", hole) / exact - 1.0).abs() < 1e-11);
     }
-    for (arm, want) in [(0.8, 1.029), (0.6, 1.102), (0.5, 1.153), (0.4, 1.214), (1.0 / 3.0, 1.260), (0.25, 1.322), (0.2, 1.362), (0.1, 1.447)] {
+    for (arm, want) in [
+        (0.8, 1.029),
+        (0.6, 1.102),
+        (0.5, 1.153),
+        (0.4, 1.214),
+        (1.0 / 3.0, 1.260),
+        (0.25, 1.322),
+        (0.2, 1.362),
+        (0.1, 1.447),
+    ] {
         assert!((ratio("cross", arm) - want).abs() < 6e-4, "arm {arm}: {}", ratio("cross", arm));
     }
     assert!((rows[0].mu_s - 0.261_371_039_717_985_4).abs() < 1e-12);
@@ -67,7 +93,10 @@ fn distance_between_the_faces() {
         }
     }
     let count = |trend: Trend| sweeps.iter().filter(|sweep| sweep.trend == trend).count();
-    assert_eq!([Trend::Constant, Trend::Up, Trend::Down, Trend::Mixed].map(count), [39, 25, 12, 32]);
+    assert_eq!(
+        [Trend::Constant, Trend::Up, Trend::Down, Trend::Mixed].map(count),
+        [39, 25, 12, 32]
+    );
 }
 
 #[test]
@@ -81,17 +110,25 @@ fn contact_falls_with_the_moment() {
             if sweep.shape == "square" && sweep.direction == 0.0 {
                 let want = f64::min(1.0, 1.5 * (1.0 - share));
                 assert!((left - want).abs() < 1e-9, "{share}: {left}");
-                assert!(!(0.4..=0.8).contains(&share) || (5..=9).contains(&rounds), "{share}: {rounds}");
+                assert!(
+                    !(0.4..=0.8).contains(&share) || (5..=9).contains(&rounds),
+                    "{share}: {rounds}"
+                );
             }
         }
     }
 }
 
 fn figures(folder: &Path) -> std::process::Output {
-    Command::new(env!("CARGO_BIN_EXE_gripfast")).args(["figures", "-o"]).arg(folder).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_gripfast"))
+        .args(["figures", "-o"])
+        .arg(folder)
+        .output()
+        .unwrap()
 }
 
-/// Every table in `docs/figures` is what the program writes today (to 1e-6, for other machines' last digits).
+/// Every table in `docs/figures` is what the program writes today (to 1e-6, for other machines'
+/// last digits).
 #[test]
 fn the_figures_in_the_documentation_are_current() {
     let folder = tempfile::tempdir().unwrap();
@@ -100,10 +137,17 @@ fn the_figures_in_the_documentation_are_current() {
     assert!(String::from_utf8_lossy(&output.stdout).contains("figure6.csv"));
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/figures");
     for name in ["separation", "figure4", "figure5", "figure6", "distance"] {
-        let read = |folder: &Path, suffix: &str| std::fs::read_to_string(folder.join(name).with_extension(suffix)).unwrap();
+        let read = |folder: &Path, suffix: &str| {
+            std::fs::read_to_string(folder.join(name).with_extension(suffix)).unwrap()
+        };
         for folder in [folder.path(), &docs] {
             let drawing = read(folder, "svg");
-            assert!(drawing.starts_with("<svg") && drawing.trim_end().ends_with("</svg>") && !drawing.contains("NaN"), "{name}");
+            assert!(
+                drawing.starts_with("<svg")
+                    && drawing.trim_end().ends_with("</svg>")
+                    && !drawing.contains("NaN"),
+                "{name}"
+            );
         }
         let (new, old) = (read(folder.path(), "csv"), read(&docs, "csv"));
         assert_eq!(new.lines().count(), old.lines().count(), "{name}");

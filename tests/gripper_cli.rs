@@ -14,7 +14,15 @@ fn gripfast(args: &[&str]) -> (i32, String, String) {
 fn list_names_every_shipped_gripper() {
     let (code, out, _) = gripfast(&["gripper", "list"]);
     assert_eq!(code, 0);
-    for name in ["robotiq-2f85", "robotiq-2f140", "robotiq-hande", "franka-hand", "onrobot-rg2", "wsg50-110", "generic"] {
+    for name in [
+        "robotiq-2f85",
+        "robotiq-2f140",
+        "robotiq-hande",
+        "franka-hand",
+        "onrobot-rg2",
+        "wsg50-110",
+        "generic",
+    ] {
         assert!(out.contains(name), "{name}: {out}");
     }
 }
@@ -23,11 +31,16 @@ fn list_names_every_shipped_gripper() {
 fn check_prints_sources_and_draws() {
     let folder = tempfile::tempdir().unwrap();
     let svg = folder.path().join("out.svg");
-    let (code, out, _) = gripfast(&["gripper", "check", "Robotiq 2F-85", "--svg", svg.to_str().unwrap()]);
+    let (code, out, _) =
+        gripfast(&["gripper", "check", "Robotiq 2F-85", "--svg", svg.to_str().unwrap()]);
     assert_eq!(code, 0);
     assert!(out.contains("UNVERIFIED") && out.contains("0 .. 85 mm"), "{out}");
     let drawing = std::fs::read_to_string(&svg).unwrap();
-    assert!(drawing.starts_with("<svg") && drawing.trim_end().ends_with("</svg>") && drawing.contains("stroke 85"));
+    assert!(
+        drawing.starts_with("<svg")
+            && drawing.trim_end().ends_with("</svg>")
+            && drawing.contains("stroke 85")
+    );
     assert!(!drawing.contains("NaN") && !drawing.contains("inf"));
 }
 
@@ -52,11 +65,19 @@ fn bad_files_are_refused_with_place_and_remedy() {
         ("force = [\"10N\", \"150N\"]", "", "missing field"),
         ("force = [\"10N\", \"150N\"]", "force = [\"nanN\", \"1N\"]", "not a finite value"),
         ("rectangle = [\"20mm\", \"20mm\"]", "rectangle = [\"20mm\", \"0mm\"]", "no area"),
-        ("rectangle = [\"20mm\", \"20mm\"]", "polygon = [[\"0mm\",\"0mm\"],[\"1mm\",\"1mm\"],[\"1mm\",\"0mm\"],[\"0mm\",\"1mm\"]]", "not a convex"),
+        (
+            "rectangle = [\"20mm\", \"20mm\"]",
+            "polygon = [[\"0mm\",\"0mm\"],[\"1mm\",\"1mm\"],[\"1mm\",\"0mm\"],[\"0mm\",\"1mm\"]]",
+            "not a convex",
+        ),
         ("friction = 0.5", "friction = -1", "between 0 and 10"),
         ("friction = 0.5", "friction = nan", "between 0 and 10"),
         ("thickness = \"2mm\"", "thickness = \"-2mm\"", "above zero"),
-        ("box = [\"24mm\", \"22mm\", \"10mm\"]", "box = [\"24mm\", \"22mm\", \"-10mm\"]", "no volume"),
+        (
+            "box = [\"24mm\", \"22mm\", \"10mm\"]",
+            "box = [\"24mm\", \"22mm\", \"-10mm\"]",
+            "no volume",
+        ),
         ("box = [\"24mm\", \"22mm\", \"10mm\"]", "", "exactly one of"),
         (
             "box = [\"24mm\", \"22mm\", \"10mm\"]",
@@ -66,7 +87,11 @@ fn bad_files_are_refused_with_place_and_remedy() {
         ("name = \"finger\" ", "name = \"fingertip\" ", "used twice"),
         ("\"palm.housing\" = ", "\"palm.house\" = ", "names no dimension"),
         ("[source]\nstroke", "[source\nstroke", ""),
-        ("origin = [\"-132mm\", \"0mm\", \"0mm\"]", "origin = [\"-132mm\", \"0mm\", \"0mm\"]\nz = [0.0, 0.0, 0.0]", "parallel or zero"),
+        (
+            "origin = [\"-132mm\", \"0mm\", \"0mm\"]",
+            "origin = [\"-132mm\", \"0mm\", \"0mm\"]\nz = [0.0, 0.0, 0.0]",
+            "parallel or zero",
+        ),
     ];
     let folder = tempfile::tempdir().unwrap();
     for (index, (from, to, expected)) in cases.iter().enumerate() {
@@ -75,12 +100,20 @@ fn bad_files_are_refused_with_place_and_remedy() {
         std::fs::write(&path, good.replacen(from, to, 1)).unwrap();
         let (code, _, error) = gripfast(&["gripper", "check", path.to_str().unwrap()]);
         assert_eq!(code, 2, "{to}: {error}");
-        assert!(error.contains(expected) && error.contains("bad") && error.contains("remedy"), "{to}: {error}");
+        assert!(
+            error.contains(expected) && error.contains("bad") && error.contains("remedy"),
+            "{to}: {error}"
+        );
     }
     std::fs::write(folder.path().join("binary.toml"), [0xff, 0xfe, 0x00]).unwrap();
-    assert_eq!(gripfast(&["gripper", "check", folder.path().join("binary.toml").to_str().unwrap()]).0, 2);
+    assert_eq!(
+        gripfast(&["gripper", "check", folder.path().join("binary.toml").to_str().unwrap()]).0,
+        2
+    );
     assert_eq!(gripfast(&["gripper", "check", "/no/such.toml"]).0, 2);
-    assert!(gripfast(&["gripper", "check", "frankahands"]).2.contains("did you mean 'franka-hand'"));
+    assert!(
+        gripfast(&["gripper", "check", "frankahands"]).2.contains("did you mean 'franka-hand'")
+    );
 }
 
 #[test]
@@ -105,8 +138,15 @@ fn shapes_other_than_boxes_are_read_and_drawn() {
     "#;
     let gripper = gripfast::gripper::parse(text, "t").unwrap();
     let [min, max] = gripper.fingers[0].bounds();
-    assert!((min - glam::DVec3::new(-0.024, -0.004, 0.0)).length() < 1e-12 && (max.x - 0.006).abs() < 1e-12);
+    assert!(
+        (min - glam::DVec3::new(-0.024, -0.004, 0.0)).length() < 1e-12
+            && (max.x - 0.006).abs() < 1e-12
+    );
     let drawing = gripfast::gripper::drawing::svg(&gripper);
     assert!(drawing.contains("round &amp; slanted") && !drawing.contains("NaN"));
-    assert!(gripfast::gripper::check(&gripper).iter().any(|warning| warning.contains("friction is not stated")));
+    assert!(
+        gripfast::gripper::check(&gripper)
+            .iter()
+            .any(|warning| warning.contains("friction is not stated"))
+    );
 }

@@ -1,4 +1,5 @@
-//! Load lists and trajectories from files: exact values, agreement of the forms a motion can be given in, refusals with file and line.
+//! Load lists and trajectories from files: exact values, agreement of the forms a motion can be
+//! given in, refusals with file and line.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -14,7 +15,12 @@ use gripfast::results::LoadCase;
 const G: f64 = 9.80665;
 
 fn mass() -> MassProperties {
-    MassProperties { volume: 1e-4, mass: 2.0, centre_of_mass: DVec3::new(0.01, -0.02, 0.03), inertia: DMat3::from_diagonal(DVec3::new(1e-3, 2e-3, 4e-3)) }
+    MassProperties {
+        volume: 1e-4,
+        mass: 2.0,
+        centre_of_mass: DVec3::new(0.01, -0.02, 0.03),
+        inertia: DMat3::from_diagonal(DVec3::new(1e-3, 2e-3, 4e-3)),
+    }
 }
 
 struct File {
@@ -51,7 +57,10 @@ fn a_csv_list_with_units_points_and_frames() {
     let file = file("loads.csv", text.as_bytes());
     let mut set = set(&file);
     // World: the part turned by 90 degrees about x, so world -z is part -y; and moved.
-    set.world_from_part = Frame { rotation: DMat3::from_rotation_x(std::f64::consts::FRAC_PI_2), origin: DVec3::new(1.0, 2.0, 3.0) };
+    set.world_from_part = Frame {
+        rotation: DMat3::from_rotation_x(std::f64::consts::FRAC_PI_2),
+        origin: DVec3::new(1.0, 2.0, 3.0),
+    };
     let found = set.cases(&mass()).unwrap();
     assert_eq!(found[0].name, "push");
     close(found[0].wrench.force, DVec3::new(10.0, 0.0, 0.0), 1e-15);
@@ -59,31 +68,43 @@ fn a_csv_list_with_units_points_and_frames() {
     close(found[0].wrench.moment, DVec3::new(1.0, 1.0, 0.0), 1e-15);
     close(found[1].wrench.force, DVec3::new(0.0, -4.0, 0.0), 1e-15);
     let point_in_part = set.world_from_part.point_inverse(DVec3::ZERO);
-    close(found[1].wrench.moment, (point_in_part - mass().centre_of_mass).cross(DVec3::new(0.0, -4.0, 0.0)), 1e-14);
+    close(
+        found[1].wrench.moment,
+        (point_in_part - mass().centre_of_mass).cross(DVec3::new(0.0, -4.0, 0.0)),
+        1e-14,
+    );
 }
 
 #[test]
 fn a_bare_header_is_si_about_the_centre_of_mass() {
     let found = csv("fx,fy,fz,mx,my,mz\n1,2,3,4,5,6\n");
-    assert_eq!((found[0].wrench.force, found[0].wrench.moment), (DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 6.0)));
+    assert_eq!(
+        (found[0].wrench.force, found[0].wrench.moment),
+        (DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 6.0))
+    );
     assert_eq!(found[0].name, "loads.csv row 1");
     assert_eq!(csv("\u{feff}mx,my,mz\r\n4,5,6\r\n")[0].wrench.force, DVec3::ZERO);
 }
 
 #[test]
 fn a_json_list() {
-    let text =
-        r#"{"units": {"force": "kN", "length": "mm"}, "loads": [{"name": "a", "force": [0.001, 0, 0], "point": [10, -20, 1030]}, {"moment": [0, 0, 2]}]}"#;
+    let text = r#"{"units": {"force": "kN", "length": "mm"}, "loads": [{"name": "a", "force": [0.001, 0, 0], "point": [10, -20, 1030]}, {"moment": [0, 0, 2]}]}"#;
     let found = set(&file("loads.json", text.as_bytes())).cases(&mass()).unwrap();
     close(found[0].wrench.force, DVec3::X, 1e-15);
     close(found[0].wrench.moment, DVec3::Y, 1e-14);
-    assert_eq!((found[1].name.as_str(), found[1].wrench.moment), ("load 2", DVec3::new(0.0, 0.0, 2.0)));
+    assert_eq!(
+        (found[1].name.as_str(), found[1].wrench.moment),
+        ("load 2", DVec3::new(0.0, 0.0, 2.0))
+    );
 }
 
 #[test]
 fn sources_join_in_order() {
     let file = file("loads.csv", b"fx,fy,fz\n1,2,3\n");
-    let found = LoadSet::parse("--loads", &format!("gravity:-z,{},ball:20", file.path.display())).unwrap().cases(&mass()).unwrap();
+    let found = LoadSet::parse("--loads", &format!("gravity:-z,{},ball:20", file.path.display()))
+        .unwrap()
+        .cases(&mass())
+        .unwrap();
     assert_eq!(found.len(), 22);
     assert_eq!(found[1].wrench.force, DVec3::new(1.0, 2.0, 3.0));
 }
@@ -149,7 +170,10 @@ fn a_part_at_rest_weighs_and_one_in_free_fall_does_not() {
 
 #[test]
 fn a_spin_about_a_fixed_axis_throws_the_centre_of_mass_outwards() {
-    let file = file("loads.csv", b"t[ms],wx[rpm],wy[rpm],wz[rpm],frame\n0,0,0,60,part\n100,0,0,60,part\n200,0,0,60,part\n");
+    let file = file(
+        "loads.csv",
+        b"t[ms],wx[rpm],wy[rpm],wz[rpm],frame\n0,0,0,60,part\n100,0,0,60,part\n200,0,0,60,part\n",
+    );
     let mut set = set(&file);
     set.world_gravity = DVec3::ZERO;
     for case in set.cases(&mass()).unwrap() {
@@ -164,7 +188,11 @@ struct Motion;
 
 impl Motion {
     fn angles(t: f64) -> ([f64; 2], [f64; 2], [f64; 2]) {
-        ([1.5 * (2.0 * t).sin(), 1.1 * (3.0 * t).cos()], [3.0 * (2.0 * t).cos(), -3.3 * (3.0 * t).sin()], [-6.0 * (2.0 * t).sin(), -9.9 * (3.0 * t).cos()])
+        (
+            [1.5 * (2.0 * t).sin(), 1.1 * (3.0 * t).cos()],
+            [3.0 * (2.0 * t).cos(), -3.3 * (3.0 * t).sin()],
+            [-6.0 * (2.0 * t).sin(), -9.9 * (3.0 * t).cos()],
+        )
     }
 
     fn rotation(t: f64) -> DQuat {
@@ -201,10 +229,15 @@ impl Motion {
         let part = mass();
         let h = 1e-4;
         let com = |t: f64| Self::position(t) + Self::rotation(t) * part.centre_of_mass;
-        let spin = |t: f64| Self::rotation(t) * (part.inertia * (Self::rotation(t).conjugate() * Self::omega(t)));
+        let spin = |t: f64| {
+            Self::rotation(t) * (part.inertia * (Self::rotation(t).conjugate() * Self::omega(t)))
+        };
         let acceleration = (com(t + h) - com(t) * 2.0 + com(t - h)) / (h * h);
         let back = Self::rotation(t).conjugate();
-        (back * ((DVec3::NEG_Z * G - acceleration) * part.mass), back * (-(spin(t + h) - spin(t - h)) / (2.0 * h)))
+        (
+            back * ((DVec3::NEG_Z * G - acceleration) * part.mass),
+            back * (-(spin(t + h) - spin(t - h)) / (2.0 * h)),
+        )
     }
 
     fn table(columns: &str, frame: &str, rows: usize) -> String {
@@ -223,7 +256,8 @@ impl Motion {
         for row in 0..rows {
             let t = row as f64 / rows as f64;
             write!(text, "{t}").unwrap();
-            let turn = if frame == "part" { Self::rotation(t).conjugate() } else { DQuat::IDENTITY };
+            let turn =
+                if frame == "part" { Self::rotation(t).conjugate() } else { DQuat::IDENTITY };
             for column in columns.chars() {
                 let vector = match column {
                     'x' => Self::position(t),
@@ -248,16 +282,27 @@ impl Motion {
 #[test]
 fn every_form_of_one_motion_gives_the_same_wrenches() {
     let rows = 400;
-    // Forces reach 40 N, moments 0.1 N m (weighted here by 50 /m). Differentiated columns carry the error of fourth-order
-    // differences (third at the ends), orientations carried on by the angular velocity that of second order.
-    for (columns, tolerance) in [("qawl", 1e-5), ("qvw", 1e-4), ("xq", 1e-3), ("awl", 1e-3), ("vw", 1e-3), ("xw", 1e-3), ("qv", 1e-3)] {
+    // Forces reach 40 N, moments 0.1 N m (weighted here by 50 /m). Differentiated columns carry the
+    // error of fourth-order differences (third at the ends), orientations carried on by the angular
+    // velocity that of second order.
+    for (columns, tolerance) in [
+        ("qawl", 1e-5),
+        ("qvw", 1e-4),
+        ("xq", 1e-3),
+        ("awl", 1e-3),
+        ("vw", 1e-3),
+        ("xw", 1e-3),
+        ("qv", 1e-3),
+    ] {
         for frame in ["world", "part"] {
             let file = file("loads.csv", Motion::table(columns, frame, rows).as_bytes());
             let mut set = set(&file);
             set.world_from_part.rotation = DMat3::from_quat(Motion::rotation(0.0));
             for (row, case) in set.cases(&mass()).unwrap().iter().enumerate() {
                 let (force, moment) = Motion::wrench(row as f64 / rows as f64);
-                let error = (case.wrench.force - force).length().max((case.wrench.moment - moment).length() * 50.0);
+                let error = (case.wrench.force - force)
+                    .length()
+                    .max((case.wrench.moment - moment).length() * 50.0);
                 assert!(error < tolerance, "{columns} {frame} row {row}: {error}");
             }
         }
@@ -266,7 +311,8 @@ fn every_form_of_one_motion_gives_the_same_wrenches() {
 
 #[test]
 fn a_body_tumbling_freely_needs_no_moment() {
-    // Euler's equations for torque-free motion, integrated by small steps; the wrench's moment must vanish.
+    // Euler's equations for torque-free motion, integrated by small steps; the wrench's moment must
+    // vanish.
     let inertia = DVec3::new(1e-3, 2e-3, 4e-3);
     let rate = |w: DVec3| -(w.cross(inertia * w)) / inertia;
     let mut w = DVec3::new(3.0, 5.0, 1.0);
@@ -288,7 +334,9 @@ fn a_body_tumbling_freely_needs_no_moment() {
 #[test]
 fn uneven_sampling_and_few_rows_keep_polynomials_exact() {
     // Position t^2 has the acceleration 2 from three rows on, whatever their spacing.
-    for times in [&[0.0, 0.1, 0.5][..], &[0.0, 0.1, 0.5, 0.55], &[0.0, 0.1, 0.5, 0.55, 2.0, 2.1, 7.0]] {
+    for times in
+        [&[0.0, 0.1, 0.5][..], &[0.0, 0.1, 0.5, 0.55], &[0.0, 0.1, 0.5, 0.55, 2.0, 2.1, 7.0]]
+    {
         let mut text = "t,x,y,z\n".to_owned();
         for t in times {
             writeln!(text, "{t},{},0,0", t * t).unwrap();

@@ -1,4 +1,5 @@
-//! Values known exactly: discs by elliptic integrals, bars, figure 6, shapes under a pure moment, nearly pure translation.
+//! Values known exactly: discs by elliptic integrals, bars, figure 6, shapes under a pure moment,
+//! nearly pure translation.
 
 #![allow(clippy::unwrap_used, reason = "a test ends at the first surprise")]
 
@@ -14,14 +15,17 @@ fn polygon(n: usize, radius: f64) -> Vec<DVec2> {
 }
 
 fn rectangle(a: f64, b: f64) -> Vec<DVec2> {
-    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| DVec2::new(x * a / 2.0, y * b / 2.0)).to_vec()
+    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+        .map(|(x, y)| DVec2::new(x * a / 2.0, y * b / 2.0))
+        .to_vec()
 }
 
 fn patch(outer: Vec<DVec2>, holes: Vec<Vec<DVec2>>) -> Patch {
     vec![Polygon { outer, holes }]
 }
 
-/// The limit of values at `n, 2n, 4n, ..` corners, whose errors are even powers of `1/n` (Richardson).
+/// The limit of values at `n, 2n, 4n, ..` corners, whose errors are even powers of `1/n`
+/// (Richardson).
 fn round(first: usize, value: impl Fn(usize) -> f64) -> f64 {
     let mut row: Vec<f64> = (0..5).map(|i| value(first << i)).collect();
     let mut power = 4.0;
@@ -45,7 +49,8 @@ fn elliptic(m: f64) -> (f64, f64) {
     (k, k * (1.0 - sum))
 }
 
-/// `int |v|` and the force over a disc of radius 1 that turns at unit rate about a point `k` from its middle, `0 < k < 1`.
+/// `int |v|` and the force over a disc of radius 1 that turns at unit rate about a point `k` from
+/// its middle, `0 < k < 1`.
 fn disc(k: f64) -> (f64, f64) {
     let (big_k, e) = elliptic(k * k);
     let d = 4.0 / 9.0 * ((7.0 + k * k) * e - 4.0 * (1.0 - k * k) * big_k);
@@ -55,7 +60,8 @@ fn disc(k: f64) -> (f64, f64) {
 
 /// `int |v|` and the force over a regular polygon.
 fn polygonal_disc(n: usize, k: f64) -> (f64, f64) {
-    let g = friction(&Loops::new(&patch(polygon(n, 1.0), vec![])), [0.0, -k, 1.0], [1.0, 0.0, 0.0]).g[0];
+    let g = friction(&Loops::new(&patch(polygon(n, 1.0), vec![])), [0.0, -k, 1.0], [1.0, 0.0, 0.0])
+        .g[0];
     (g[2] - k * g[1], -g[1])
 }
 
@@ -63,8 +69,12 @@ fn polygonal_disc(n: usize, k: f64) -> (f64, f64) {
 fn discs_by_elliptic_integrals() {
     for k in [0.1, 0.3, 0.6, 0.653001789205597639, 0.9] {
         let (d, f) = disc(k);
-        let (got_d, got_f) = (round(128, |n| polygonal_disc(n, k).0), round(128, |n| polygonal_disc(n, k).1));
-        assert!((got_d / d - 1.0).abs() < 1e-12 && (got_f / f - 1.0).abs() < 1e-12, "{k}: {got_d} {d}, {got_f} {f}");
+        let (got_d, got_f) =
+            (round(128, |n| polygonal_disc(n, k).0), round(128, |n| polygonal_disc(n, k).1));
+        assert!(
+            (got_d / d - 1.0).abs() < 1e-12 && (got_f / f - 1.0).abs() < 1e-12,
+            "{k}: {got_d} {d}, {got_f} {f}"
+        );
     }
     // On the rim: the formulas' limits, and the closed forms with the slip centre on a vertex.
     let (d, f) = (32.0 / 9.0, 8.0 / 3.0);
@@ -119,7 +129,8 @@ fn mean_radii_of_round_and_thin_shapes() {
     }
     for (a, b) in [(1.0, 1.0), (1.0f64, 3.0f64), (0.2, 7.0), (1e-3, 1.0)] {
         let q = a.hypot(b);
-        let want = q / 6.0 + a * a / (12.0 * b) * (b / a).asinh() + b * b / (12.0 * a) * (a / b).asinh();
+        let want =
+            q / 6.0 + a * a / (12.0 * b) * (b / a).asinh() + b * b / (12.0 * a) * (a / b).asinh();
         let got = mean_radius(&patch(rectangle(a, b), vec![]));
         assert!((got / want - 1.0).abs() < 1e-12, "{a} {b}: {got} {want}");
     }
@@ -138,24 +149,56 @@ fn solved(patch: &Patch, distance: f64, force: [f64; 3], moment: [f64; 3]) -> Sc
 fn shapes_under_a_pure_moment() {
     let cross = |arm: f64| {
         let (a, b) = (arm / 2.0, 0.5);
-        [(a, -b), (a, -a), (b, -a), (b, a), (a, a), (a, b), (-a, b), (-a, a), (-b, a), (-b, -a), (-a, -a), (-a, -b)].map(|(x, y)| DVec2::new(x, y)).to_vec()
+        [
+            (a, -b),
+            (a, -a),
+            (b, -a),
+            (b, a),
+            (a, a),
+            (a, b),
+            (-a, b),
+            (-a, a),
+            (-b, a),
+            (-b, -a),
+            (-a, -a),
+            (-a, -b),
+        ]
+        .map(|(x, y)| DVec2::new(x, y))
+        .to_vec()
     };
     for (name, shape, radius) in [
         ("square", patch(rectangle(1.0, 1.0), vec![]), 0.382597858232106346),
         ("1 x 4", patch(rectangle(1.0, 4.0), vec![]), 1.06077939773390097),
         ("1 x 100", patch(rectangle(1.0, 100.0), vec![]), 25.0051097151664562),
         ("triangle", patch(polygon(3, 1.0), vec![]), 0.460057666050157725),
-        ("hollow by 1/4", patch(rectangle(1.0, 1.0), vec![rectangle(0.25, 0.25)]), 0.401727751143711663),
-        ("hollow by 1/2", patch(rectangle(1.0, 1.0), vec![rectangle(0.5, 0.5)]), 0.446364167937457403),
-        ("hollow by 4/5", patch(rectangle(1.0, 1.0), vec![rectangle(0.8, 0.8)]), 0.518632652270188602),
+        (
+            "hollow by 1/4",
+            patch(rectangle(1.0, 1.0), vec![rectangle(0.25, 0.25)]),
+            0.401727751143711663,
+        ),
+        (
+            "hollow by 1/2",
+            patch(rectangle(1.0, 1.0), vec![rectangle(0.5, 0.5)]),
+            0.446364167937457403,
+        ),
+        (
+            "hollow by 4/5",
+            patch(rectangle(1.0, 1.0), vec![rectangle(0.8, 0.8)]),
+            0.518632652270188602,
+        ),
         ("cross 1/3", patch(cross(1.0 / 3.0), vec![]), 0.303751992525063141),
         ("cross 1/2", patch(cross(0.5), vec![]), 0.331722634340615518),
     ] {
         // Neither the distance nor F3 nor a tilting moment that leaves the contact whole matters.
         for (distance, f3, m1) in [(0.0, 0.0, 0.0), (0.5, 0.3, 0.02), (-0.5, -0.3, 0.01)] {
             let score = solved(&shape, distance, [0.0, 0.0, f3], [m1, 0.0, -0.1]);
-            assert!((score.mu_s.unwrap() * 2.0 * radius / 0.1 - 1.0).abs() < 1e-10, "{name}: {score:?}");
-            let Some(Slip::Rotation { c, sense: -1 }) = score.slip else { panic!("{name}: {score:?}") };
+            assert!(
+                (score.mu_s.unwrap() * 2.0 * radius / 0.1 - 1.0).abs() < 1e-10,
+                "{name}: {score:?}"
+            );
+            let Some(Slip::Rotation { c, sense: -1 }) = score.slip else {
+                panic!("{name}: {score:?}")
+            };
             assert!(c[0].hypot(c[1]) < 1e-9, "{name}: {c:?}");
         }
     }
@@ -163,7 +206,8 @@ fn shapes_under_a_pure_moment() {
 
 #[test]
 fn a_bar_pushed_square_on_at_its_end() {
-    // mu N = F/(sqrt 2 - 1), slip centre (sqrt 2 - 1)/2 lengths beyond the middle, for a bar without width.
+    // mu N = F/(sqrt 2 - 1), slip centre (sqrt 2 - 1)/2 lengths beyond the middle, for a bar
+    // without width.
     let root = 2f64.sqrt() - 1.0;
     let score = solved(&patch(rectangle(1.0, 1e-6), vec![]), 0.0, [0.0, 0.2, 0.0], [0.0, 0.0, 0.1]);
     assert!((score.mu_s.unwrap() * 2.0 * root / 0.2 - 1.0).abs() < 1e-10, "{score:?}");
@@ -198,7 +242,11 @@ fn a_force_just_beside_the_middle_nearly_slides() {
     let square = patch(rectangle(1.0, 1.0), vec![]);
     for eps in [1e-2, 1e-3, 1e-4] {
         let score = solved(&square, 0.3, [0.0, 0.3, 0.0], [0.0, 0.0, 0.3 * eps]);
-        assert!((score.mu_s.unwrap() * 2.0 / 0.3 - 1.0 - 6.0 * eps * eps).abs() < 200.0 * eps.powi(4) + 1e-14, "{eps}: {score:?}");
+        assert!(
+            (score.mu_s.unwrap() * 2.0 / 0.3 - 1.0 - 6.0 * eps * eps).abs()
+                < 200.0 * eps.powi(4) + 1e-14,
+            "{eps}: {score:?}"
+        );
         let Some(Slip::Rotation { c, .. }) = score.slip else { panic!("{score:?}") };
         assert!((-c[0] * eps * 12.0 - 1.0).abs() < 100.0 * eps * eps + 1e-9, "{eps}: {c:?}");
     }

@@ -1,4 +1,5 @@
-//! What must not change the answer, or change it in a known way: units, axes, origin, the names of the faces.
+//! What must not change the answer, or change it in a known way: units, axes, origin, the names of
+//! the faces.
 
 #![allow(clippy::unwrap_used, reason = "a test ends at the first surprise")]
 
@@ -21,7 +22,10 @@ fn answer(case: &Case) -> Score {
 
 /// A star-shaped polygon about a point, with any corners between convex and deeply notched.
 fn patch(radii: &[f64], turn: f64, centre: DVec2) -> Patch {
-    let corner = |(i, r): (usize, &f64)| centre + *r * DVec2::from_angle(turn + std::f64::consts::TAU * i as f64 / radii.len() as f64);
+    let corner = |(i, r): (usize, &f64)| {
+        centre
+            + *r * DVec2::from_angle(turn + std::f64::consts::TAU * i as f64 / radii.len() as f64)
+    };
     vec![Polygon { outer: radii.iter().enumerate().map(corner).collect(), holes: Vec::new() }]
 }
 
@@ -29,16 +33,37 @@ fn cases() -> impl Strategy<Value = Case> {
     let radii = || proptest::collection::vec(0.4..1.2f64, 3..9);
     let small = || -0.25..0.25f64;
     let wrench = [small(), small(), small(), small(), small(), small()];
-    (radii(), radii(), 0.0..6.0f64, small(), small(), -0.8..1.2f64, wrench).prop_map(|(one, two, turn, x, y, distance, w)| Case {
-        contact: Contact { face_i: patch(&one, turn, DVec2::ZERO), face_ii: patch(&two, -turn, DVec2::new(x, y)) },
-        distance,
-        force: 1.0,
-        wrench: Wrench { force: DVec3::new(w[0], w[1], w[2]), moment: DVec3::new(w[3], w[4], w[5]) },
-    })
+    (radii(), radii(), 0.0..6.0f64, small(), small(), -0.8..1.2f64, wrench).prop_map(
+        |(one, two, turn, x, y, distance, w)| Case {
+            contact: Contact {
+                face_i: patch(&one, turn, DVec2::ZERO),
+                face_ii: patch(&two, -turn, DVec2::new(x, y)),
+            },
+            distance,
+            force: 1.0,
+            wrench: Wrench {
+                force: DVec3::new(w[0], w[1], w[2]),
+                moment: DVec3::new(w[3], w[4], w[5]),
+            },
+        },
+    )
 }
 
-fn mapped(case: &Case, point: impl Fn(DVec2) -> DVec2, vector: impl Fn(DVec3) -> DVec3, pseudo: impl Fn(DVec3) -> DVec3) -> Case {
-    let map = |patch: &Patch| patch.iter().map(|polygon| Polygon { outer: polygon.outer.iter().map(|&x| point(x)).collect(), holes: Vec::new() }).collect();
+fn mapped(
+    case: &Case,
+    point: impl Fn(DVec2) -> DVec2,
+    vector: impl Fn(DVec3) -> DVec3,
+    pseudo: impl Fn(DVec3) -> DVec3,
+) -> Case {
+    let map = |patch: &Patch| {
+        patch
+            .iter()
+            .map(|polygon| Polygon {
+                outer: polygon.outer.iter().map(|&x| point(x)).collect(),
+                holes: Vec::new(),
+            })
+            .collect()
+    };
     Case {
         contact: Contact { face_i: map(&case.contact.face_i), face_ii: map(&case.contact.face_ii) },
         wrench: Wrench { force: vector(case.wrench.force), moment: pseudo(case.wrench.moment) },
@@ -46,7 +71,8 @@ fn mapped(case: &Case, point: impl Fn(DVec2) -> DVec2, vector: impl Fn(DVec3) ->
     }
 }
 
-/// Both answers are the same kind, and `mu_s` agrees; only clear answers are compared beyond their status.
+/// Both answers are the same kind, and `mu_s` agrees; only clear answers are compared beyond their
+/// status.
 fn agree(a: &Score, b: &Score) -> Result<(), TestCaseError> {
     prop_assert_eq!(a.status, b.status);
     if let (Status::Ok, Some(x), Some(y)) = (a.status, a.mu_s, b.mu_s) {
@@ -93,7 +119,8 @@ proptest! {
 
     #[test]
     fn from_inside_with_the_in_plane_load_reversed(case in cases()) {
-        // Friction reverses with the load, and so does its lever with `d`: the pressure knows no difference.
+        // Friction reverses with the load, and so does its lever with `d`: the pressure knows no
+        // difference.
         let mut inside = case.clone();
         inside.distance = -case.distance;
         inside.wrench.force = case.wrench.force * DVec3::new(-1.0, -1.0, 1.0);

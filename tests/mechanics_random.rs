@@ -1,5 +1,6 @@
-//! Random contact pairs, loads, distances and units: every answer is put into the seven equations anew, and every
-//! refusal and every claim to be the only limit state is looked over by a scan that shares no code with the solver.
+//! Random contact pairs, loads, distances and units: every answer is put into the seven equations
+//! anew, and every refusal and every claim to be the only limit state is looked over by a scan that
+//! shares no code with the solver.
 
 #![allow(clippy::unwrap_used, reason = "a test ends at the first surprise")]
 
@@ -57,13 +58,19 @@ fn judge(number: u64, scans: Scans) -> Tally {
     let unit = case(number);
     let (length, force) = Case::units(number);
     let posed = unit.scaled(length, force);
-    let score = solve(&posed.contact, posed.distance, posed.force, &posed.wrench, &Options::default()).unwrap();
+    let score =
+        solve(&posed.contact, posed.distance, posed.force, &posed.wrench, &Options::default())
+            .unwrap();
     tally.evaluations = u64::from(score.evaluations);
     tally.count(format!("status {:?}", score.status));
-    let mut wrong = |what: String| tally.wrong.push(format!("case {number}: {what}\n    {score:?}\n    {}", unit.json()));
+    let mut wrong = |what: String| {
+        tally.wrong.push(format!("case {number}: {what}\n    {score:?}\n    {}", unit.json()))
+    };
     let f3 = posed.wrench.force.z.abs();
     // Exactly at the limit rounding decides.
-    if (f3 / (2.0 * posed.force) - 1.0).abs() > 1e-14 && (score.status == Status::NoNormalForce) != (f3 > 2.0 * posed.force) {
+    if (f3 / (2.0 * posed.force) - 1.0).abs() > 1e-14
+        && (score.status == Status::NoNormalForce) != (f3 > 2.0 * posed.force)
+    {
         wrong(format!("|F3| = {f3}, 2 Fn = {}", 2.0 * posed.force));
     }
     let mut strength = None;
@@ -75,11 +82,16 @@ fn judge(number: u64, scans: Scans) -> Tally {
             if !score.status.holds() {
                 wrong("has numbers but no usable status".into());
             }
-            #[allow(clippy::neg_cmp_op_on_partial_ord, reason = "a residual that is no number is wrong")]
+            #[allow(
+                clippy::neg_cmp_op_on_partial_ord,
+                reason = "a residual that is no number is wrong"
+            )]
             if !(check.residual <= 1e-10 + check.rounding) {
                 wrong(format!("equations {check:?}"));
             }
-            let lost = check.rounding.max(1e-12) / score.contact_area_i.min(score.contact_area_ii).max(1e-300) * (length * length);
+            let lost = check.rounding.max(1e-12)
+                / score.contact_area_i.min(score.contact_area_ii).max(1e-300)
+                * (length * length);
             let areas = [score.contact_area_i, score.contact_area_ii];
             if !(0..2).all(|k| (areas[k] / check.areas[k] - 1.0).abs() <= 1e-7 + lost) {
                 wrong(format!("areas {areas:?} are {:?}", check.areas));
@@ -96,7 +108,10 @@ fn judge(number: u64, scans: Scans) -> Tally {
             }
         }
         // Not solved and saying so: counted, and few.
-        None if matches!(score.status, Status::TwistedOut | Status::NoNormalForce | Status::NotConverged) => {}
+        None if matches!(
+            score.status,
+            Status::TwistedOut | Status::NoNormalForce | Status::NotConverged
+        ) => {}
         None => wrong("has no numbers".into()),
     }
     let strong = strength.is_some_and(|strength| strength > STRONG);
@@ -118,20 +133,33 @@ fn judge(number: u64, scans: Scans) -> Tally {
 }
 
 /// The scan's verdict on a refusal or on the claim to be the only limit state.
-fn look(number: u64, problem: &Problem, score: &gripfast::model::Score, unit: &Case, strength: Option<f64>, scans: Scans, tally: &mut Tally) {
+fn look(
+    number: u64,
+    problem: &Problem,
+    score: &gripfast::model::Score,
+    unit: &Case,
+    strength: Option<f64>,
+    scans: Scans,
+    tally: &mut Tally,
+) {
     let scan = problem.scan(scans.rays, scans.rings);
     let kind = match (score.status, strength) {
         (Status::TwistedOut, _) => "refusals".to_owned(),
         (Status::Ambiguous, _) => "ambiguous answers".to_owned(),
         (_, Some(strength)) => format!(
             "single answers at coupling {}",
-            [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 100.0].iter().find(|bound| strength < **bound).map_or("more".into(), |b| format!("< {b}"))
+            [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 100.0]
+                .iter()
+                .find(|bound| strength < **bound)
+                .map_or("more".into(), |b| format!("< {b}"))
         ),
         _ => "answers without coupling".to_owned(),
     };
     tally.count(format!("scanned {kind}"));
     let mus: Vec<f64> = scan.zeros.iter().map(|zero| zero.mu).collect();
-    let known = score.mu_s.map(|mu| scan.zeros.iter().filter(|zero| (zero.mu / mu - 1.0).abs() < 1e-5).count());
+    let known = score
+        .mu_s
+        .map(|mu| scan.zeros.iter().filter(|zero| (zero.mu / mu - 1.0).abs() < 1e-5).count());
     let others = mus.len() - known.unwrap_or(0).min(mus.len());
     let mut wrong = |name: &str, what: String| {
         tally.wrong.push(format!(
@@ -144,8 +172,13 @@ fn look(number: u64, problem: &Problem, score: &gripfast::model::Score, unit: &C
         *tally.counts.entry(format!("WRONG {name}")).or_default() += 1;
     };
     match score.status {
-        Status::TwistedOut if !mus.is_empty() => wrong("refused, but a limit state exists", String::new()),
-        Status::Ok if others > 0 => wrong("called the only limit state, but another exists", format!("coupling {strength:?}")),
+        Status::TwistedOut if !mus.is_empty() => {
+            wrong("refused, but a limit state exists", String::new())
+        }
+        Status::Ok if others > 0 => wrong(
+            "called the only limit state, but another exists",
+            format!("coupling {strength:?}"),
+        ),
         _ => {}
     }
     if score.mu_s.is_some()
@@ -167,8 +200,14 @@ fn look(number: u64, problem: &Problem, score: &gripfast::model::Score, unit: &C
 }
 
 fn run(first: u64, count: u64, scans: Scans) -> Tally {
-    let tally = (first..first + count).into_par_iter().map(|number| judge(number, scans)).reduce(Tally::default, Tally::add);
-    support::say(&format!("{count} random cases from number {first}, {:.1} evaluations each:", tally.evaluations as f64 / count as f64));
+    let tally = (first..first + count)
+        .into_par_iter()
+        .map(|number| judge(number, scans))
+        .reduce(Tally::default, Tally::add);
+    support::say(&format!(
+        "{count} random cases from number {first}, {:.1} evaluations each:",
+        tally.evaluations as f64 / count as f64
+    ));
     for (name, count) in &tally.counts {
         support::say(&format!("  {count:8} {name}"));
     }
@@ -177,12 +216,27 @@ fn run(first: u64, count: u64, scans: Scans) -> Tally {
 
 #[test]
 fn ten_thousand_random_cases() {
-    let tally = run(0, 10_000, Scans { refused: 0.08, ambiguous: 0.3, strong: 0.03, weak: 0.005, rays: 32, rings: 16 });
-    assert!(tally.wrong.is_empty(), "{} disagreements:\n{}", tally.wrong.len(), tally.wrong.join("\n"));
+    let tally = run(
+        0,
+        10_000,
+        Scans { refused: 0.08, ambiguous: 0.3, strong: 0.03, weak: 0.005, rays: 32, rings: 16 },
+    );
+    assert!(
+        tally.wrong.is_empty(),
+        "{} disagreements:\n{}",
+        tally.wrong.len(),
+        tally.wrong.join("\n")
+    );
     let share = |name: &str| tally.counts.get(name).copied().unwrap_or(0);
     assert!(share("status NotConverged") <= 10, "{:?}", tally.counts);
     // Every kind of answer was there, and looked at.
-    for name in ["status TwistedOut", "status Ambiguous", "status NoNormalForce", "scanned refusals", "strongly coupled answers"] {
+    for name in [
+        "status TwistedOut",
+        "status Ambiguous",
+        "status NoNormalForce",
+        "scanned refusals",
+        "strongly coupled answers",
+    ] {
         assert!(share(name) >= 10, "{name}: {:?}", tally.counts);
     }
 }
@@ -190,7 +244,9 @@ fn ten_thousand_random_cases() {
 #[test]
 #[ignore = "a quarter of an hour on one core: a million cases by hand, GRIPFAST_CASES=1000000 cargo test --release --test mechanics_random -- --ignored"]
 fn many_random_cases() {
-    let number = |name: &str, default: u64| std::env::var(name).map_or(default, |text| text.parse().unwrap());
+    let number = |name: &str, default: u64| {
+        std::env::var(name).map_or(default, |text| text.parse().unwrap())
+    };
     let (first, count) = (number("GRIPFAST_FIRST", 0), number("GRIPFAST_CASES", 100_000));
     let thousandths = |name: &str, default: u64| number(name, default) as f64 / 1000.0;
     let scans = Scans {
@@ -202,5 +258,10 @@ fn many_random_cases() {
         rings: number("GRIPFAST_RINGS", 24) as usize,
     };
     let tally = run(first, count, scans);
-    assert!(tally.wrong.is_empty(), "{} disagreements:\n{}", tally.wrong.len(), tally.wrong.join("\n"));
+    assert!(
+        tally.wrong.is_empty(),
+        "{} disagreements:\n{}",
+        tally.wrong.len(),
+        tally.wrong.join("\n")
+    );
 }

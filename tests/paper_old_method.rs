@@ -15,7 +15,9 @@ fn friction_by_the_earlier_method_on_the_reference_cases() {
     let mut compared = 0;
     for case in file["cases"].as_array().unwrap() {
         let Some(want) = case["expected"]["mu_old_centroid"].as_f64() else { continue };
-        let contact: Contact = serde_json::from_value(serde_json::json!({"A_I": case["A_I"], "A_II": case["A_II"]})).unwrap();
+        let contact: Contact =
+            serde_json::from_value(serde_json::json!({"A_I": case["A_I"], "A_II": case["A_II"]}))
+                .unwrap();
         let vector = |name: &str| serde_json::from_value(case[name].clone()).unwrap();
         let load = Wrench { force: vector("F"), moment: vector("M") };
         let got = centroid(&contact).unwrap().mu_s(case["Fn"].as_f64().unwrap(), &load);

@@ -34,7 +34,10 @@ fn looking(part: &Part, eye: DVec3) -> Vec<u32> {
 fn a_box_shows_one_face_in_each_view() {
     let part = shipped("shaft_key.stl");
     let views = numbers(&drawing::svg(&part));
-    assert_eq!(views, [looking(&part, DVec3::NEG_Y), looking(&part, DVec3::X), looking(&part, DVec3::Z)]);
+    assert_eq!(
+        views,
+        [looking(&part, DVec3::NEG_Y), looking(&part, DVec3::X), looking(&part, DVec3::Z)]
+    );
     assert!(views.iter().all(|view| view.len() == 1));
 }
 
@@ -42,7 +45,8 @@ fn a_box_shows_one_face_in_each_view() {
 fn pocket_floors_are_numbered_and_hidden_faces_are_not() {
     let part = shipped("pocket_plate.stl");
     let views = numbers(&drawing::svg(&part));
-    // The top and both pocket floors from above; the pockets' walls are hidden from the side, where only the outer side shows.
+    // The top and both pocket floors from above; the pockets' walls are hidden from the side, where
+    // only the outer side shows.
     assert_eq!(views[2], looking(&part, DVec3::Z));
     assert_eq!(views[2].len(), 3);
     assert_eq!((views[0].len(), views[1].len()), (1, 1));
@@ -53,9 +57,21 @@ fn pocket_floors_are_numbered_and_hidden_faces_are_not() {
 fn the_command_writes_it() {
     let scratch = tempfile::tempdir().unwrap();
     let part = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/parts/spur_gear.stl");
-    let run = |more: &[&str]| assert_cmd::Command::new(env!("CARGO_BIN_EXE_gripfast")).current_dir(scratch.path()).arg("part").arg(&part).args(more).assert();
+    let run = |more: &[&str]| {
+        assert_cmd::Command::new(env!("CARGO_BIN_EXE_gripfast"))
+            .current_dir(scratch.path())
+            .arg("part")
+            .arg(&part)
+            .args(more)
+            .assert()
+    };
     run(&["--plot", "gear.svg"]).success();
     let svg = std::fs::read_to_string(scratch.path().join("gear.svg")).unwrap();
-    assert!(svg.starts_with("<svg ") && svg.trim_end().ends_with("</svg>") && svg.contains("spur_gear") && svg.contains("class=\"curved\""));
+    assert!(
+        svg.starts_with("<svg ")
+            && svg.trim_end().ends_with("</svg>")
+            && svg.contains("spur_gear")
+            && svg.contains("class=\"curved\"")
+    );
     run(&["--plot", "no/such/folder/gear.svg"]).code(2);
 }

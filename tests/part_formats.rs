@@ -1,4 +1,5 @@
-//! The same solid in every format that is read, with the unit and the transforms that the format carries.
+//! The same solid in every format that is read, with the unit and the transforms that the format
+//! carries.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -9,7 +10,8 @@ use glam::DVec3;
 use gripfast::part::{Part, ReadOptions, Unit};
 
 /// An L-shaped bar, 30 x 20 x 10: its ends are concave hexagons.
-const OUTLINE: [(f64, f64); 6] = [(0.0, 0.0), (30.0, 0.0), (30.0, 5.0), (5.0, 5.0), (5.0, 20.0), (0.0, 20.0)];
+const OUTLINE: [(f64, f64); 6] =
+    [(0.0, 0.0), (30.0, 0.0), (30.0, 5.0), (5.0, 5.0), (5.0, 20.0), (0.0, 20.0)];
 
 fn vertices() -> Vec<[f64; 3]> {
     [0.0, 10.0].iter().flat_map(|&z| OUTLINE.map(|(x, y)| [x, y, z])).collect()
@@ -24,8 +26,14 @@ fn polygons() -> Vec<Vec<usize>> {
 /// The solid in triangles.
 fn triangles() -> Vec<[usize; 3]> {
     let ends = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
-    let mut triangles: Vec<[usize; 3]> = ends.iter().map(|&[a, b, c]| [c, b, a]).chain(ends.iter().map(|t| t.map(|k| k + 6))).collect();
-    triangles.extend((0..6).flat_map(|k| [[k, (k + 1) % 6, (k + 1) % 6 + 6], [k, (k + 1) % 6 + 6, k + 6]]));
+    let mut triangles: Vec<[usize; 3]> = ends
+        .iter()
+        .map(|&[a, b, c]| [c, b, a])
+        .chain(ends.iter().map(|t| t.map(|k| k + 6)))
+        .collect();
+    triangles.extend(
+        (0..6).flat_map(|k| [[k, (k + 1) % 6, (k + 1) % 6 + 6], [k, (k + 1) % 6 + 6, k + 6]]),
+    );
     triangles
 }
 
@@ -38,7 +46,12 @@ fn check(part: &Part, unit: Unit, bodies: usize) {
     let lines = part.health.lines();
     assert!(part.health.watertight, "{}: {lines:?}", part.name);
     assert_eq!(part.unit_m, scale, "{}", part.name);
-    assert_eq!((part.health.shells, part.faces.len()), (bodies, 8 * bodies), "{}: {lines:?}", part.name);
+    assert_eq!(
+        (part.health.shells, part.faces.len()),
+        (bodies, 8 * bodies),
+        "{}: {lines:?}",
+        part.name
+    );
     let volume = part.mass_properties(1.0).volume / scale.powi(3);
     assert!((volume - 2250.0 * bodies as f64).abs() < 1e-3, "{}: {volume}", part.name);
     let area: f64 = part.faces.iter().map(|face| face.area).sum::<f64>() / scale.powi(2);
@@ -52,13 +65,22 @@ impl Scratch {
     fn read(&self, name: &str, bytes: &[u8], unit: Option<Unit>) -> Part {
         let path = self.0.path().join(name);
         std::fs::write(&path, bytes).unwrap();
-        let part = Part::read(&path, &ReadOptions { unit }).unwrap_or_else(|error| panic!("{error}"));
+        let part =
+            Part::read(&path, &ReadOptions { unit }).unwrap_or_else(|error| panic!("{error}"));
         let zipped = self.0.path().join(format!("{name}.gz"));
-        let mut encoder = flate2::write::GzEncoder::new(std::fs::File::create(&zipped).unwrap(), flate2::Compression::fast());
+        let mut encoder = flate2::write::GzEncoder::new(
+            std::fs::File::create(&zipped).unwrap(),
+            flate2::Compression::fast(),
+        );
         encoder.write_all(bytes).unwrap();
         encoder.finish().unwrap();
-        let unzipped = Part::read(&zipped, &ReadOptions { unit }).unwrap_or_else(|error| panic!("{error}"));
-        assert_eq!((&unzipped.mesh, &unzipped.faces, &unzipped.name), (&part.mesh, &part.faces, &part.name), "{name}");
+        let unzipped =
+            Part::read(&zipped, &ReadOptions { unit }).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(
+            (&unzipped.mesh, &unzipped.faces, &unzipped.name),
+            (&part.mesh, &part.faces, &part.name),
+            "{name}"
+        );
         assert_eq!(part.name, name.split('.').next().unwrap());
         part
     }
@@ -68,17 +90,36 @@ impl Scratch {
 fn obj_with_polygons_negative_indices_and_materials() {
     let scratch = Scratch(tempfile::tempdir().unwrap());
     let lines: Vec<String> = vertices().iter().map(|v| format!("v {}\n", join(v))).collect();
-    let faces: String = polygons().iter().map(|p| format!("f {}\n", join(p.iter().map(|k| format!("{}//1", k + 1))))).collect();
-    let text = format!("# a comment\nmtllib missing.mtl\no bar\n{}vn 0 0 1\nusemtl steel\ns off\n{faces}", lines.concat());
+    let faces: String = polygons()
+        .iter()
+        .map(|p| format!("f {}\n", join(p.iter().map(|k| format!("{}//1", k + 1)))))
+        .collect();
+    let text = format!(
+        "# a comment\nmtllib missing.mtl\no bar\n{}vn 0 0 1\nusemtl steel\ns off\n{faces}",
+        lines.concat()
+    );
     check(&scratch.read("bar.obj", text.as_bytes(), None), Unit::Millimetre, 1);
-    let faces: String = triangles().iter().map(|t| format!("f {}\n", join(t.map(|k| k as i64 - 12)))).collect();
-    check(&scratch.read("negative.obj", format!("{}{faces}", lines.concat()).replace('\n', "\r\n").as_bytes(), Some(Unit::Inch)), Unit::Inch, 1);
+    let faces: String =
+        triangles().iter().map(|t| format!("f {}\n", join(t.map(|k| k as i64 - 12)))).collect();
+    check(
+        &scratch.read(
+            "negative.obj",
+            format!("{}{faces}", lines.concat()).replace('\n', "\r\n").as_bytes(),
+            Some(Unit::Inch),
+        ),
+        Unit::Inch,
+        1,
+    );
 }
 
 #[test]
 fn ply_in_three_encodings_with_further_elements() {
     let scratch = Scratch(tempfile::tempdir().unwrap());
-    for (encoding, list) in [("ascii", "vertex_index"), ("binary_little_endian", "vertex_indices"), ("binary_big_endian", "vertex_index")] {
+    for (encoding, list) in [
+        ("ascii", "vertex_index"),
+        ("binary_little_endian", "vertex_indices"),
+        ("binary_big_endian", "vertex_index"),
+    ] {
         let mut bytes = format!(
             "ply\nformat {encoding} 1.0\ncomment made by hand\nelement vertex 12\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\n\
              element camera 1\nproperty float fov\nelement face 8\nproperty list uchar uint {list}\nend_header\n"
@@ -89,7 +130,9 @@ fn ply_in_three_encodings_with_further_elements() {
             if encoding == "ascii" {
                 bytes.extend(format!("{} 255\n", join(v)).bytes());
             } else {
-                bytes.extend(v.iter().flat_map(|x| if little { x.to_le_bytes() } else { x.to_be_bytes() }));
+                bytes.extend(
+                    v.iter().flat_map(|x| if little { x.to_le_bytes() } else { x.to_be_bytes() }),
+                );
                 bytes.push(255);
             }
         }
@@ -103,7 +146,9 @@ fn ply_in_three_encodings_with_further_elements() {
                 bytes.extend(format!("{} {}\n", p.len(), join(&p)).bytes());
             } else {
                 bytes.push(p.len() as u8);
-                bytes.extend(p.iter().flat_map(|&k| if little { (k as u32).to_le_bytes() } else { (k as u32).to_be_bytes() }));
+                bytes.extend(p.iter().flat_map(|&k| {
+                    if little { (k as u32).to_le_bytes() } else { (k as u32).to_be_bytes() }
+                }));
             }
         }
         check(&scratch.read("bar.ply", &bytes, Some(Unit::Centimetre)), Unit::Centimetre, 1);
@@ -113,10 +158,22 @@ fn ply_in_three_encodings_with_further_elements() {
 #[test]
 fn off_with_comments_colours_and_counts_on_one_line() {
     let scratch = Scratch(tempfile::tempdir().unwrap());
-    let body: String = vertices().iter().map(|v| format!("{} 10 20 30 255 # grey\n", join(v))).collect::<String>()
-        + &polygons().iter().map(|p| format!("{} {} 0.5 0.5 0.5\n\n", p.len(), join(p))).collect::<String>();
-    check(&scratch.read("bar.off", format!("COFF\n# counts follow\n12 8 0\n{body}").as_bytes(), None), Unit::Millimetre, 1);
-    check(&scratch.read("bar.off", format!("OFF 12 8 0\n{body}").as_bytes(), None), Unit::Millimetre, 1);
+    let body: String =
+        vertices().iter().map(|v| format!("{} 10 20 30 255 # grey\n", join(v))).collect::<String>()
+            + &polygons()
+                .iter()
+                .map(|p| format!("{} {} 0.5 0.5 0.5\n\n", p.len(), join(p)))
+                .collect::<String>();
+    check(
+        &scratch.read("bar.off", format!("COFF\n# counts follow\n12 8 0\n{body}").as_bytes(), None),
+        Unit::Millimetre,
+        1,
+    );
+    check(
+        &scratch.read("bar.off", format!("OFF 12 8 0\n{body}").as_bytes(), None),
+        Unit::Millimetre,
+        1,
+    );
     for (text, says) in [
         ("OFF\n3 1 0\n0 0 0\n1 0 0\n", "line 4"),
         ("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n", "face 1"),
@@ -135,7 +192,8 @@ fn off_with_comments_colours_and_counts_on_one_line() {
 
 /// A glTF document of the solid, with `uri` as its buffer, and the buffer.
 fn gltf(uri: Option<&str>) -> (String, Vec<u8>) {
-    let mut buffer: Vec<u8> = vertices().iter().flatten().flat_map(|&x| (x as f32 * 1e-3).to_le_bytes()).collect();
+    let mut buffer: Vec<u8> =
+        vertices().iter().flatten().flat_map(|&x| (x as f32 * 1e-3).to_le_bytes()).collect();
     buffer.extend(triangles().iter().flatten().flat_map(|&k| (k as u16).to_le_bytes()));
     let mut header = serde_json::json!({ "byteLength": buffer.len() });
     if let Some(uri) = uri {
@@ -182,11 +240,18 @@ fn gltf_with_transforms_in_metres() {
     let scratch = Scratch(tempfile::tempdir().unwrap());
     let (json, buffer) = gltf(None);
     let part = scratch.read("bar.glb", &glb(&json, &buffer), None);
-    assert_eq!((part.unit_m, part.health.shells, part.faces.len(), part.health.watertight), (1.0, 2, 16, true));
+    assert_eq!(
+        (part.unit_m, part.health.shells, part.faces.len(), part.health.watertight),
+        (1.0, 2, 16, true)
+    );
     assert!((part.mass_properties(1.0).volume - 2.0 * 2250e-9).abs() < 1e-12);
     // One bar is turned about z and moved to x = 1 m, the other one mirrored.
     let (low, high) = part.mesh.bounding_box();
-    assert!(low.distance(DVec3::new(-0.03, 0.0, 0.0)) < 1e-7 && high.distance(DVec3::new(1.0, 0.03, 0.01)) < 1e-7, "{low} {high}");
+    assert!(
+        low.distance(DVec3::new(-0.03, 0.0, 0.0)) < 1e-7
+            && high.distance(DVec3::new(1.0, 0.03, 0.01)) < 1e-7,
+        "{low} {high}"
+    );
     let (json, buffer) = gltf(Some("bar.bin"));
     std::fs::write(scratch.0.path().join("bar.bin"), &buffer).unwrap();
     assert_eq!(scratch.read("bar.gltf", json.as_bytes(), None).faces, part.faces);
@@ -201,10 +266,19 @@ fn gltf_with_transforms_in_metres() {
     let (json, buffer) = gltf(None);
     assert!(refused(glb(&json, &buffer[..100])).contains("bytes of"));
     assert!(refused(glb(&json, &buffer)[..200].to_vec()).contains("not a readable glTF"));
-    assert!(refused(glb(&json.replace("\"count\":60", "\"count\":66"), &buffer)).contains("beyond its data"));
-    assert!(refused(glb(&json.replace("\"count\":60", "\"count\":18446744073709551615"), &buffer)).contains("beyond its data"));
+    assert!(
+        refused(glb(&json.replace("\"count\":60", "\"count\":66"), &buffer))
+            .contains("beyond its data")
+    );
+    assert!(
+        refused(glb(&json.replace("\"count\":60", "\"count\":18446744073709551615"), &buffer))
+            .contains("beyond its data")
+    );
     assert!(refused(glb(&json.replace("5126", "5123"), &buffer)).contains("32-bit floats"));
-    assert!(refused(glb(&json.replace("\"children\":[1]", "\"children\":[0]"), &buffer)).contains("nested without end"));
+    assert!(
+        refused(glb(&json.replace("\"children\":[1]", "\"children\":[0]"), &buffer))
+            .contains("nested without end")
+    );
     let mut far = buffer.clone();
     far[144..146].copy_from_slice(&[255, 255]);
     assert!(refused(glb(&json, &far)).contains("vertex 65535"));
@@ -233,14 +307,20 @@ fn three_mf_with_components_transforms_and_unit() {
     let mut package = package.build().unwrap();
     // A second item: turned by 90 degrees about z, moved along x.
     let mut item = package.root.build.item[0].clone();
-    item.transform = Some(threemf2::model::domain::transform::Transform([0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 100.0, 0.0, 0.0]));
+    item.transform = Some(threemf2::model::domain::transform::Transform([
+        0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 100.0, 0.0, 0.0,
+    ]));
     package.root.build.item.push(item);
     let mut bytes = Vec::new();
     package.write(std::io::Cursor::new(&mut bytes)).unwrap();
     let part = scratch.read("bar.3mf", &bytes, None);
     check(&part, Unit::Inch, 2);
     let (low, high) = part.mesh.bounding_box();
-    assert!(low.distance(DVec3::ZERO) < 1e-9 && high.distance(DVec3::new(100.0, 30.0, 10.0) * 0.0254) < 1e-9, "{low} {high}");
+    assert!(
+        low.distance(DVec3::ZERO) < 1e-9
+            && high.distance(DVec3::new(100.0, 30.0, 10.0) * 0.0254) < 1e-9,
+        "{low} {high}"
+    );
     check(&scratch.read("bar.3mf", &bytes, Some(Unit::Millimetre)), Unit::Millimetre, 2);
     let path = scratch.0.path().join("bad.3mf");
     for bytes in [&bytes[..bytes.len() / 2], b"PK\x03\x04 and nothing else", b"no zip"] {

@@ -53,7 +53,11 @@ fn folder(scene: &str) -> tempfile::TempDir {
     let down = DMat3::from_cols(DVec3::NEG_Z, DVec3::X, DVec3::NEG_Y);
     let mut set = GripSet { grips: Vec::new(), ..grips::grip_set(0) };
     for id in 0..30 {
-        let mut grip = grips::grip(id, Frame { rotation: down, origin: DVec3::new(0.0, 0.01 * id as f64, 0.0) }, 0.1 + 0.01 * id as f64);
+        let mut grip = grips::grip(
+            id,
+            Frame { rotation: down, origin: DVec3::new(0.0, 0.01 * id as f64, 0.0) },
+            0.1 + 0.01 * id as f64,
+        );
         grip.grip.width = 0.02;
         grip.rank = id + 1;
         set.grips.push(grip);
@@ -65,9 +69,18 @@ fn folder(scene: &str) -> tempfile::TempDir {
 }
 
 fn pick(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let output =
-        Command::cargo_bin("gripfast").unwrap().current_dir(folder).args(["pick", "grips.json", "--scene", "scene.toml"]).args(arguments).output().unwrap();
-    (output.status.code().unwrap(), String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
+    let output = Command::cargo_bin("gripfast")
+        .unwrap()
+        .current_dir(folder)
+        .args(["pick", "grips.json", "--scene", "scene.toml"])
+        .args(arguments)
+        .output()
+        .unwrap();
+    (
+        output.status.code().unwrap(),
+        String::from_utf8(output.stdout).unwrap(),
+        String::from_utf8(output.stderr).unwrap(),
+    )
 }
 
 #[test]
@@ -79,9 +92,14 @@ fn every_field_of_a_scene_is_read() {
     assert_eq!(scene.retreat, Retreat::Along(DVec3::new(0.0, 0.0, 0.05)));
     assert_eq!(scene.cone, Some((DVec3::NEG_Z, std::f64::consts::FRAC_PI_4)));
     assert_eq!(scene.reach, Some(Reach { base: DVec3::X, least: 0.1, most: 0.85 }));
-    assert_eq!(scene.obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect::<Vec<_>>(), ["table", "obstacle 2", "post"]);
+    assert_eq!(
+        scene.obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect::<Vec<_>>(),
+        ["table", "obstacle 2", "post"]
+    );
     assert_eq!(scene.obstacles[0].world_from_obstacle.rotation.z_axis, DVec3::Z);
-    assert!(matches!(&scene.obstacles[1].solid, Solid::Mesh { mesh, closed: true } if mesh.bounding_box().1 == DVec3::splat(0.01)));
+    assert!(
+        matches!(&scene.obstacles[1].solid, Solid::Mesh { mesh, closed: true } if mesh.bounding_box().1 == DVec3::splat(0.01))
+    );
     assert_eq!(scene.obstacles[2].solid, Solid::Box { half: DVec3::new(0.02, 0.01, 0.3) });
     assert_eq!(Scene::parse("x", "", Path::new("")).unwrap(), Scene::default());
 }
@@ -119,11 +137,13 @@ fn a_scene_that_is_wrong_names_its_place() {
 
 #[test]
 fn the_first_free_grip_is_printed_with_the_reasons_before_it() {
-    // A box over the first 20 grips' places: grip k stands at y = k cm, its palm reaches 60 mm to either side.
+    // A box over the first 20 grips' places: grip k stands at y = k cm, its palm reaches 60 mm to
+    // either side.
     let folder = folder(
         "[part]\nposition = [\"0.5m\", \"0m\", \"0m\"]\n[[obstacle]]\nname = \"shelf\"\nbox = [\"300mm\", \"100mm\", \"20mm\"]\nposition = [\"500mm\", \"0mm\", \"50mm\"]\n",
     );
-    let (code, stdout, stderr) = pick(folder.path(), &["--json", "--origin", "flange", "--convention", "graspgen"]);
+    let (code, stdout, stderr) =
+        pick(folder.path(), &["--json", "--origin", "flange", "--convention", "graspgen"]);
     assert_eq!(code, 0, "{stderr}");
     let found: serde_json::Value = serde_json::from_str(&stdout).unwrap();
     // The palm's edge touches the shelf's at y = 50 mm for the grip at 110 mm.
@@ -132,8 +152,16 @@ fn the_first_free_grip_is_printed_with_the_reasons_before_it() {
     assert_eq!(found["passed"].as_array().unwrap().len() as u64, first);
     assert_eq!(found["counts"]["collision with 'shelf'"], first);
     assert!(found["passed"][0]["reason"].as_str().unwrap().contains("meets 'shelf' in the grip"));
-    let position: Vec<f64> = found["chosen"]["world_from_tool"]["position"].as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect();
-    assert!((DVec3::from_slice(&position) - DVec3::new(0.5, 0.01 * first as f64, 0.1)).length() < 1e-12, "{position:?}");
+    let position: Vec<f64> = found["chosen"]["world_from_tool"]["position"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|value| value.as_f64().unwrap())
+        .collect();
+    assert!(
+        (DVec3::from_slice(&position) - DVec3::new(0.5, 0.01 * first as f64, 0.1)).length() < 1e-12,
+        "{position:?}"
+    );
     assert_eq!(found["chosen"]["approach_direction"], serde_json::json!([0.0, 0.0, -1.0]));
     assert_eq!(found["chosen"]["tool_frame"], "z approach, x closing, origin at the flange");
     assert!((found["chosen"]["opened_m"].as_f64().unwrap() - 0.03).abs() < 1e-12);
@@ -153,8 +181,14 @@ fn no_free_grip_is_exit_code_one() {
     let folder = folder("[gripper]\ncone = { axis = [1, 0, 0], angle = \"10deg\" }\n");
     let (code, stdout, _) = pick(folder.path(), &[]);
     assert_eq!(code, 1);
-    assert!(stdout.contains("no grip of 30 is free") && stdout.contains("approach 90.0 deg off the cone's axis"), "{stdout}");
+    assert!(
+        stdout.contains("no grip of 30 is free")
+            && stdout.contains("approach 90.0 deg off the cone's axis"),
+        "{stdout}"
+    );
     let (code, stdout, _) = pick(folder.path(), &["--json"]);
     let found: serde_json::Value = serde_json::from_str(&stdout).unwrap();
-    assert!(code == 1 && found["chosen"].is_null() && found["passed"].as_array().unwrap().len() == 30);
+    assert!(
+        code == 1 && found["chosen"].is_null() && found["passed"].as_array().unwrap().len() == 30
+    );
 }

@@ -20,10 +20,26 @@ use gripfast::propose::{Displacement, ProposeOptions, Proposer};
 use gripfast::rank::Weights;
 use gripfast::results::{GripSet, LoadCase, RankedGrip};
 
-const BRACKET: [&str; 10] = ["plan", "data/parts/l_bracket.stl", "--gripper", "robotiq-2f85", "--mass", "350g", "--backend", "cpu", "--angle-step", "90deg"];
+const BRACKET: [&str; 10] = [
+    "plan",
+    "data/parts/l_bracket.stl",
+    "--gripper",
+    "robotiq-2f85",
+    "--mass",
+    "350g",
+    "--backend",
+    "cpu",
+    "--angle-step",
+    "90deg",
+];
 
 fn gripfast(arguments: &[&str]) -> Output {
-    Command::cargo_bin("gripfast").unwrap().current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments).output().unwrap()
+    Command::cargo_bin("gripfast")
+        .unwrap()
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(arguments)
+        .output()
+        .unwrap()
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -34,7 +50,9 @@ fn text(bytes: &[u8]) -> String {
 fn bracket(more: &[&str]) -> (GripSet, String) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("grips.json");
-    let output = gripfast(&[&BRACKET[..], &["--spacing", "8mm", "-o", file.to_str().unwrap()], more].concat());
+    let output = gripfast(
+        &[&BRACKET[..], &["--spacing", "8mm", "-o", file.to_str().unwrap()], more].concat(),
+    );
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "the result and nothing else");
     (GripSet::read(&file).unwrap(), text(&output.stdout))
@@ -52,22 +70,39 @@ fn the_load_multiple_is_where_the_pads_friction_or_the_contact_ends() {
         assert!((multiple * needed / 20.0 - 1.0).abs() < 1e-12);
         let pads = Pads::new(&ranked.grip.contact).unwrap();
         let by = |search: Search, factor: f64| {
-            let wrench = Wrench { force: ranked.worst.wrench.force * factor, moment: ranked.worst.wrench.moment * factor };
-            solve_pads(&pads, ranked.grip.width, 20.0, &wrench, &Options { search, ..Options::default() })
+            let wrench = Wrench {
+                force: ranked.worst.wrench.force * factor,
+                moment: ranked.worst.wrench.moment * factor,
+            };
+            solve_pads(
+                &pads,
+                ranked.grip.width,
+                20.0,
+                &wrench,
+                &Options { search, ..Options::default() },
+            )
         };
         let at = |factor: f64| by(Search::WhereNeeded, factor);
         let held = |score: Score| score.status.holds() && score.mu_s.unwrap() <= friction;
         let slips = at(multiple * (1.0 + 1e-7)).mu_s.is_some_and(|mu| mu > friction);
         // Where the contact twists out first, the branch from d = 0 is followed to 1e-4 of its end.
         let (sharp, beyond) = (1e-7, if slips { 1e-7 } else { 1.01e-4 });
-        assert!(held(at(multiple * (1.0 - sharp))) && !held(by(Search::Off, multiple * (1.0 + beyond))), "{}: {multiple}", ranked.grip.id);
+        assert!(
+            held(at(multiple * (1.0 - sharp))) && !held(by(Search::Off, multiple * (1.0 + beyond))),
+            "{}: {multiple}",
+            ranked.grip.id
+        );
         if slips {
             slipping += 1
         } else {
             twisted += 1
         }
-        // The safety is the friction's share alone: equal where mu_s grows with the load up to there.
-        if at(multiple * (1.0 - sharp)).contact_area_i == patch_area(&ranked.grip.contact.face_i) && slips && ranked.contact_share == 1.0 {
+        // The safety is the friction's share alone: equal where mu_s grows with the load up to
+        // there.
+        if at(multiple * (1.0 - sharp)).contact_area_i == patch_area(&ranked.grip.contact.face_i)
+            && slips
+            && ranked.contact_share == 1.0
+        {
             assert!((multiple / ranked.safety.unwrap() - 1.0).abs() < 1e-6, "{}", ranked.grip.id);
         }
     }
@@ -95,25 +130,47 @@ fn compare_puts_the_earlier_method_beside_every_grip() {
     }
     // Pearson's correlation of the places, those by score counted out as well.
     let by_score = |a: &RankedGrip| {
-        let near = |b: &&RankedGrip| (a.score.unwrap() - b.score.unwrap()).abs() <= 1e-9 * a.score.unwrap();
+        let near = |b: &&RankedGrip| {
+            (a.score.unwrap() - b.score.unwrap()).abs() <= 1e-9 * a.score.unwrap()
+        };
         let better = set.grips.iter().filter(|b| b.score > a.score && !near(b)).count() as f64;
         better + (set.grips.iter().filter(near).count() as f64 + 1.0) / 2.0
     };
-    let pairs: Vec<(f64, f64)> = set.grips.iter().map(|a| (by_score(a), earlier(a).place)).collect();
+    let pairs: Vec<(f64, f64)> =
+        set.grips.iter().map(|a| (by_score(a), earlier(a).place)).collect();
     let mean = (set.grips.len() as f64 + 1.0) / 2.0;
-    let sum = |f: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|&(x, y)| f(x - mean, y - mean)).sum::<f64>();
+    let sum = |f: &dyn Fn(f64, f64) -> f64| {
+        pairs.iter().map(|&(x, y)| f(x - mean, y - mean)).sum::<f64>()
+    };
     let expected = sum(&|x, y| x * y) / (sum(&|x, _| x * x) * sum(&|_, y| y * y)).sqrt();
-    assert!((comparison.spearman.unwrap() - expected).abs() < 1e-12, "{:?} {expected}", comparison.spearman);
+    assert!(
+        (comparison.spearman.unwrap() - expected).abs() < 1e-12,
+        "{:?} {expected}",
+        comparison.spearman
+    );
     assert!(comparison.kendall_tau_b.is_some_and(|tau| tau.abs() < 1.0 && tau * expected > 0.0));
-    let gain = |id: u64| set.grips.iter().zip(&pairs).find(|(ranked, _)| ranked.grip.id == id).map(|(_, (now, before))| before - now).unwrap();
+    let gain = |id: u64| {
+        set.grips
+            .iter()
+            .zip(&pairs)
+            .find(|(ranked, _)| ranked.grip.id == id)
+            .map(|(_, (now, before))| before - now)
+            .unwrap()
+    };
     let most = pairs.iter().map(|(now, before)| before - now).fold(0.0, f64::max);
     assert_eq!(gain(comparison.risen[0]), most);
     assert!(comparison.fallen.iter().all(|&id| gain(id) < 0.0));
-    for needle in ["Spearman", "Kendall tau-b", "ranked higher than by the earlier method", "earlier mu_s"] {
+    for needle in
+        ["Spearman", "Kendall tau-b", "ranked higher than by the earlier method", "earlier mu_s"]
+    {
         assert!(out.contains(needle), "{needle}: {out}");
     }
     let (plain, out) = bracket(&[]);
-    assert!(plain.summary.comparison.is_none() && plain.grips.iter().all(|ranked| ranked.earlier.is_none()) && !out.contains("arlier"));
+    assert!(
+        plain.summary.comparison.is_none()
+            && plain.grips.iter().all(|ranked| ranked.earlier.is_none())
+            && !out.contains("arlier")
+    );
 }
 
 #[test]
@@ -123,25 +180,47 @@ fn pose_noise_is_told_for_the_printed_grips_and_does_not_depend_on_threads() {
     let (two, _) = bracket(&[&noise[..], &["--threads", "2"]].concat());
     assert_eq!(one.grips, two.grips);
     assert!(out.contains("noise 95 %") && out.contains("20 poses off by up to 1 mm"), "{out}");
-    assert!(one.grips[..4].iter().all(|ranked| ranked.pose_noise.is_some_and(|noise| noise.samples == 20)));
+    assert!(
+        one.grips[..4]
+            .iter()
+            .all(|ranked| ranked.pose_noise.is_some_and(|noise| noise.samples == 20))
+    );
     assert!(one.grips[4..].iter().all(|ranked| ranked.pose_noise.is_none()));
     let (diverse, _) = bracket(&[&noise[..], &["--diverse"]].concat());
-    let with: Vec<u64> = diverse.grips.iter().filter(|ranked| ranked.pose_noise.is_some()).map(|ranked| ranked.rank).collect();
+    let with: Vec<u64> = diverse
+        .grips
+        .iter()
+        .filter(|ranked| ranked.pose_noise.is_some())
+        .map(|ranked| ranked.rank)
+        .collect();
     assert!(with.len() == 4 && with[3] > 4, "{with:?}");
     // Without noise every pose is the pose.
     let (still, _) = bracket(&["--pose-noise", "0mm,0deg", "--noise-samples", "3", "--top", "4"]);
     for ranked in &still.grips[..4] {
         let noise = ranked.pose_noise.unwrap();
         let mu = ranked.worst.mu_s.unwrap();
-        assert!(noise.lost == 0 && (noise.mu_s_worst.unwrap() / mu - 1.0).abs() < 1e-9 && noise.mu_s_95 == noise.mu_s_worst, "{noise:?} {mu}");
+        assert!(
+            noise.lost == 0
+                && (noise.mu_s_worst.unwrap() / mu - 1.0).abs() < 1e-9
+                && noise.mu_s_95 == noise.mu_s_worst,
+            "{noise:?} {mu}"
+        );
     }
 }
 
 /// A box of this size [m] with a corner at the origin, as STL.
 fn write_box(file: &Path, size: DVec3) {
-    let corner = |index: usize| DVec3::new(f64::from(u8::from(index & 1 > 0)), f64::from(u8::from(index & 2 > 0)), f64::from(u8::from(index & 4 > 0))) * size;
+    let corner = |index: usize| {
+        DVec3::new(
+            f64::from(u8::from(index & 1 > 0)),
+            f64::from(u8::from(index & 2 > 0)),
+            f64::from(u8::from(index & 4 > 0)),
+        ) * size
+    };
     let mut stl = "solid box\n".to_owned();
-    for [a, b, c, d] in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
+    for [a, b, c, d] in
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    {
         for triangle in [[a, b, c], [a, c, d]] {
             stl += "facet normal 0 0 0\nouter loop\n";
             for point in triangle.map(corner) {
@@ -177,9 +256,20 @@ fn clipped(mut ring: Ring, window: &[DVec2]) -> Ring {
 fn box_and_grips(folder: &Path, gripper: &Gripper) -> (Part, ProposeOptions, Vec<Grip>) {
     let file = folder.join("box.stl");
     write_box(&file, DVec3::new(80.0, 60.0, 20.0));
-    let part = Part::read(&file, &ReadOptions { unit: Some(Unit::ALL.into_iter().find(|unit| unit.metres() == 1e-3).unwrap()) }).unwrap();
-    let options = ProposeOptions { angle_step: 0.5, spacing: Some(0.004), ..ProposeOptions::default() };
-    let grips: Vec<Grip> = Proposer::new(&part, gripper, &options).unwrap().flat_map(|chunk| chunk.grips).filter(|grip| grip.width < 0.021).collect();
+    let part = Part::read(
+        &file,
+        &ReadOptions {
+            unit: Some(Unit::ALL.into_iter().find(|unit| unit.metres() == 1e-3).unwrap()),
+        },
+    )
+    .unwrap();
+    let options =
+        ProposeOptions { angle_step: 0.5, spacing: Some(0.004), ..ProposeOptions::default() };
+    let grips: Vec<Grip> = Proposer::new(&part, gripper, &options)
+        .unwrap()
+        .flat_map(|chunk| chunk.grips)
+        .filter(|grip| grip.width < 0.021)
+        .collect();
     assert!(grips.len() > 50, "{}", grips.len());
     (part, options, grips)
 }
@@ -207,16 +297,36 @@ fn displaced_grips_agree_with_pads_clipped_by_hand() {
     }
 
     // At an edge: each displaced contact, its load and its mu_s by hand.
-    let part_of_pad = |grip: &&Grip| patch_area(&grip.contact.face_i) < 0.8 * pad_area && grip.part_from_grip.rotation.x_axis.x.abs() > 0.1;
+    let part_of_pad = |grip: &&Grip| {
+        patch_area(&grip.contact.face_i) < 0.8 * pad_area
+            && grip.part_from_grip.rotation.x_axis.x.abs() > 0.1
+    };
     let edge: Vec<&Grip> = grips.iter().filter(part_of_pad).step_by(9).take(4).collect();
     assert_eq!(edge.len(), 4);
     let mass = part.mass_properties(2700.0);
-    let loads: Vec<LoadCase> = [DVec3::new(0.0, 0.0, -1.0), DVec3::new(1.0, -3.0, 0.5), DVec3::new(-2.0, 0.0, 1.0)]
-        .map(|force| LoadCase { name: "by hand".into(), wrench: Wrench { force, moment: DVec3::new(0.01, 0.0, -0.02) } })
-        .to_vec();
-    let settings = Settings { force: 40.0, weights: Weights::default(), delta: 0.0, mu_c: 0.0, pad_friction: None, score: ScoreOptions::default() };
+    let loads: Vec<LoadCase> =
+        [DVec3::new(0.0, 0.0, -1.0), DVec3::new(1.0, -3.0, 0.5), DVec3::new(-2.0, 0.0, 1.0)]
+            .map(|force| LoadCase {
+                name: "by hand".into(),
+                wrench: Wrench { force, moment: DVec3::new(0.01, 0.0, -0.02) },
+            })
+            .to_vec();
+    let settings = Settings {
+        force: 40.0,
+        weights: Weights::default(),
+        delta: 0.0,
+        mu_c: 0.0,
+        pad_friction: None,
+        score: ScoreOptions::default(),
+    };
     let seeds = SeedSet::with_at_least(81).unwrap();
-    let assessor = Assessor { loads: &loads, mass, settings: &settings, backend: &Backend::Cpu, seeds: &seeds };
+    let assessor = Assessor {
+        loads: &loads,
+        mass,
+        settings: &settings,
+        backend: &Backend::Cpu,
+        seeds: &seeds,
+    };
     let mut ranked = assessor.assess(edge.iter().map(|&grip| grip.clone()).collect()).unwrap();
     noise.assess(&proposer, &assessor, &mut ranked.iter_mut().collect::<Vec<_>>()).unwrap();
     let mut lost_in_all = 0;
@@ -224,19 +334,38 @@ fn displaced_grips_agree_with_pads_clipped_by_hand() {
         let mut values = Vec::new();
         for (by, displaced) in by.iter().zip(proposer.displaced(grip, &by).unwrap()) {
             let pose = by_hand(grip, by);
-            let face: Ring = [(0.0, 0.0), (0.08, 0.0), (0.08, 0.06), (0.0, 0.06)].map(|(x, y)| pose.inverse_point(DVec3::new(x, y, pose.origin.z))).to_vec();
-            let sense = face[0].perp_dot(face[1]) + face[1].perp_dot(face[2]) + face[2].perp_dot(face[3]) + face[3].perp_dot(face[0]);
+            let face: Ring = [(0.0, 0.0), (0.08, 0.0), (0.08, 0.06), (0.0, 0.06)]
+                .map(|(x, y)| pose.inverse_point(DVec3::new(x, y, pose.origin.z)))
+                .to_vec();
+            let sense = face[0].perp_dot(face[1])
+                + face[1].perp_dot(face[2])
+                + face[2].perp_dot(face[3])
+                + face[3].perp_dot(face[0]);
             let face: Ring = if sense < 0.0 { face.into_iter().rev().collect() } else { face };
-            let patch = vec![Polygon { outer: clipped(gripper.pad.clone(), &face), holes: Vec::new() }];
+            let patch =
+                vec![Polygon { outer: clipped(gripper.pad.clone(), &face), holes: Vec::new() }];
             let area = patch_area(&displaced.contact.face_i);
-            assert!((area - patch_area(&patch)).abs() < 1e-8 * pad_area, "{area} {}", patch_area(&patch));
+            assert!(
+                (area - patch_area(&patch)).abs() < 1e-8 * pad_area,
+                "{area} {}",
+                patch_area(&patch)
+            );
             let contact = Contact { face_i: patch.clone(), face_ii: patch };
             let mu = |load: &LoadCase| {
                 let arm = mass.centre_of_mass - pose.origin;
                 let force = load.wrench.force;
                 let moment = load.wrench.moment + arm.cross(force);
-                let into = |v: DVec3| DVec3::new(v.dot(pose.axes[0]), v.dot(pose.axes[1]), v.dot(pose.axes[2]));
-                let score = mechanics::solve(&contact, 0.02, 40.0, &Wrench { force: into(force), moment: into(moment) }, &Options::default()).unwrap();
+                let into = |v: DVec3| {
+                    DVec3::new(v.dot(pose.axes[0]), v.dot(pose.axes[1]), v.dot(pose.axes[2]))
+                };
+                let score = mechanics::solve(
+                    &contact,
+                    0.02,
+                    40.0,
+                    &Wrench { force: into(force), moment: into(moment) },
+                    &Options::default(),
+                )
+                .unwrap();
                 score.mu_s.filter(|_| score.status.holds()).unwrap_or(f64::INFINITY)
             };
             values.push(loads.iter().map(mu).fold(0.0, f64::max));
@@ -278,24 +407,55 @@ impl Pose {
 fn by_hand(grip: &Grip, by: &Displacement) -> Pose {
     let [x1, x2, x3] = [0, 1, 2].map(|axis| grip.part_from_grip.rotation.col(axis));
     let (sin, cos) = by.turn.sin_cos();
-    Pose { axes: [cos * x1 + sin * x2, cos * x2 - sin * x1, x3], origin: grip.part_from_grip.origin + by.shift.x * x1 + by.shift.y * x2 }
+    Pose {
+        axes: [cos * x1 + sin * x2, cos * x2 - sin * x1, x3],
+        origin: grip.part_from_grip.origin + by.shift.x * x1 + by.shift.y * x2,
+    }
 }
 
 #[test]
 fn the_ending_of_the_result_chooses_its_format() {
     let folder = tempfile::tempdir().unwrap();
-    let base = [&BRACKET[..], &["--spacing", "15mm", "-q", "--top", "3", "--compare", "--pose-noise", "1mm,1deg", "--noise-samples", "5"]].concat();
-    let built = |format: Format| (format != Format::Parquet || cfg!(feature = "parquet")) && (format != Format::Acronym || cfg!(feature = "hdf5"));
+    let base = [
+        &BRACKET[..],
+        &[
+            "--spacing",
+            "15mm",
+            "-q",
+            "--top",
+            "3",
+            "--compare",
+            "--pose-noise",
+            "1mm,1deg",
+            "--noise-samples",
+            "5",
+        ],
+    ]
+    .concat();
+    let built = |format: Format| {
+        (format != Format::Parquet || cfg!(feature = "parquet"))
+            && (format != Format::Acronym || cfg!(feature = "hdf5"))
+    };
     for (format, _, endings) in Format::ALL {
         let file = folder.path().join(format!("grips{}", endings[0]));
         let output = gripfast(&[&base[..], &["-o", file.to_str().unwrap()]].concat());
         let err = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(if built(format) { 0 } else { 2 }), "{format:?}: {err}");
+        assert_eq!(
+            output.status.code(),
+            Some(if built(format) { 0 } else { 2 }),
+            "{format:?}: {err}"
+        );
         assert_eq!(file.exists(), built(format), "{format:?}");
     }
     let csv = std::fs::read_to_string(folder.path().join("grips.csv")).unwrap();
     let (head, first) = (csv.lines().next().unwrap(), csv.lines().nth(1).unwrap());
-    for column in ["load_multiple", "noise_mu_s_95", "noise_lost_share", "earlier_evaluation", "earlier_place"] {
+    for column in [
+        "load_multiple",
+        "noise_mu_s_95",
+        "noise_lost_share",
+        "earlier_evaluation",
+        "earlier_place",
+    ] {
         assert!(head.split(',').any(|name| name == column), "{column}: {head}");
     }
     assert!(!first.ends_with(','), "{first}");
@@ -303,7 +463,10 @@ fn the_ending_of_the_result_chooses_its_format() {
     assert!(lines.summary.comparison.is_some() && lines.grips[0].pose_noise.is_some());
     // A name without an ending is native JSON.
     let bare = folder.path().join("grips");
-    assert_eq!(gripfast(&[&base[..], &["-o", bare.to_str().unwrap()]].concat()).status.code(), Some(0));
+    assert_eq!(
+        gripfast(&[&base[..], &["-o", bare.to_str().unwrap()]].concat()).status.code(),
+        Some(0)
+    );
     assert_eq!(GripSet::read(&bare).unwrap().grips, lines.grips);
 }
 

@@ -34,7 +34,13 @@ const PLAN: [&str; 19] = [
 
 fn command(file: &Path, more: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_gripfast"));
-    command.current_dir(env!("CARGO_MANIFEST_DIR")).args(PLAN).arg("-o").arg(file).args(more).stdin(Stdio::null());
+    command
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(PLAN)
+        .arg("-o")
+        .arg(file)
+        .args(more)
+        .stdin(Stdio::null());
     command
 }
 
@@ -52,7 +58,11 @@ fn partial(file: &Path) -> PathBuf {
 
 /// A run that has written its first state.
 fn started(file: &Path) -> Child {
-    let child = command(file, &["--checkpoint", "0s", "-q"]).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let child = command(file, &["--checkpoint", "0s", "-q"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
     let since = Instant::now();
     while !partial(file).exists() {
         assert!(since.elapsed() < Duration::from_secs(60), "no state was written");
@@ -68,7 +78,10 @@ fn answer(file: &Path) -> String {
 }
 
 fn candidates_before(stderr: &str) -> u64 {
-    let line = stderr.lines().find(|line| line.starts_with("going on from")).unwrap_or_else(|| panic!("{stderr}"));
+    let line = stderr
+        .lines()
+        .find(|line| line.starts_with("going on from"))
+        .unwrap_or_else(|| panic!("{stderr}"));
     line.split(": ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap()
 }
 
@@ -96,11 +109,17 @@ fn a_killed_run_goes_on_to_the_same_bytes() {
         let output = run(&file, &[&["--resume"], more].concat());
         let err = text(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{more:?}: {err}");
-        assert!(err.contains("grips.json.partial") && names.iter().all(|name| err.contains(name)), "{more:?}: {err}");
+        assert!(
+            err.contains("grips.json.partial") && names.iter().all(|name| err.contains(name)),
+            "{more:?}: {err}"
+        );
     }
 
     // Killed again, further on; with another number of threads it ends as if nothing had been.
-    let mut child = command(&file, &["--resume", "--checkpoint", "0s", "-q"]).stdout(Stdio::null()).spawn().unwrap();
+    let mut child = command(&file, &["--resume", "--checkpoint", "0s", "-q"])
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
     std::thread::sleep(Duration::from_millis(300));
     child.kill().unwrap();
     child.wait().unwrap();
@@ -109,11 +128,17 @@ fn a_killed_run_goes_on_to_the_same_bytes() {
     assert_eq!(output.status.code(), Some(0), "{err}");
     let set = GripSet::read(&file).unwrap();
     let before = candidates_before(&err);
-    assert!(before > 0 && before < set.summary.candidates, "{before} of {}", set.summary.candidates);
+    assert!(
+        before > 0 && before < set.summary.candidates,
+        "{before} of {}",
+        set.summary.candidates
+    );
     assert_eq!(answer(&file), answer(&whole));
     assert!(!partial(&file).exists());
     // A kill in the middle of writing a state may leave the temporary file, and nothing else.
-    let names = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let names = std::fs::read_dir(folder.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap());
     assert_eq!(names.filter(|name| !name.starts_with(".gripfast-")).count(), 2);
 }
 
@@ -122,7 +147,9 @@ fn an_interrupted_run_ranks_what_it_has_and_goes_on_later() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("grips.json");
     let child = started(&file);
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert!(
+        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success()
+    );
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let some = GripSet::read(&file).unwrap();
@@ -134,7 +161,10 @@ fn an_interrupted_run_ranks_what_it_has_and_goes_on_later() {
     assert_eq!(candidates_before(&err), some.summary.candidates);
     let all = GripSet::read(&file).unwrap();
     assert_eq!(all.provenance.settings["complete"], true);
-    assert!(all.summary.candidates > some.summary.candidates && all.summary.ranked >= some.summary.ranked);
+    assert!(
+        all.summary.candidates > some.summary.candidates
+            && all.summary.ranked >= some.summary.ranked
+    );
     assert!(!partial(&file).exists());
 }
 
@@ -143,18 +173,37 @@ fn what_is_no_state_is_refused_and_none_is_no_fault() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("grips.json");
     let quick = ["--spacing", "10mm", "--angle-step", "90deg", "--resume"];
-    for bad in ["", "{", "{\"format\":\"gripfast-unfinished\",\"version\":9}", "{\"format\":\"gripfast-unfinished\",\"version\":1}", "solid box"] {
+    for bad in [
+        "",
+        "{",
+        "{\"format\":\"gripfast-unfinished\",\"version\":9}",
+        "{\"format\":\"gripfast-unfinished\",\"version\":1}",
+        "solid box",
+    ] {
         std::fs::write(partial(&file), bad).unwrap();
         let output = run(&file, &quick);
         let err = text(&output.stderr);
-        assert!(output.status.code() == Some(2) && err.contains("grips.json.partial") && err.contains("without --resume"), "{bad}: {err}");
+        assert!(
+            output.status.code() == Some(2)
+                && err.contains("grips.json.partial")
+                && err.contains("without --resume"),
+            "{bad}: {err}"
+        );
     }
     std::fs::remove_file(partial(&file)).unwrap();
     let output = run(&file, &quick);
-    assert!(output.status.code() == Some(0) && text(&output.stderr).contains("nothing to go on from"), "{}", text(&output.stderr));
+    assert!(
+        output.status.code() == Some(0) && text(&output.stderr).contains("nothing to go on from"),
+        "{}",
+        text(&output.stderr)
+    );
     // Left from another run and not asked for: said, then overwritten or removed.
     std::fs::write(partial(&file), "{").unwrap();
     let output = run(&file, &quick[..4]);
-    assert!(output.status.code() == Some(0) && text(&output.stderr).contains("will be overwritten"), "{}", text(&output.stderr));
+    assert!(
+        output.status.code() == Some(0) && text(&output.stderr).contains("will be overwritten"),
+        "{}",
+        text(&output.stderr)
+    );
     assert!(!partial(&file).exists());
 }

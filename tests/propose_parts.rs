@@ -1,4 +1,5 @@
-//! Proposals on the reference parts, which lie beside the checkout; without them these tests say SKIPPED.
+//! Proposals on the reference parts, which lie beside the checkout; without them these tests say
+//! SKIPPED.
 
 #![allow(clippy::unwrap_used, reason = "tests fail by panicking")]
 
@@ -31,13 +32,16 @@ fn propose(part: &Part, gripper: &Gripper, options: &ProposeOptions) -> (Vec<Gri
     (grips, proposer.tally().clone())
 }
 
-/// Winding number of the surface about a point: 1 in the material, 0 outside (Van Oosterom and Strackee 1983).
+/// Winding number of the surface about a point: 1 in the material, 0 outside (Van Oosterom and
+/// Strackee 1983).
 fn winding(part: &Part, point: DVec3) -> f64 {
     let angle: f64 = (0..part.mesh.triangles.len() as u32)
         .map(|index| {
             let [a, b, c] = part.mesh.corners(index).map(|corner| corner - point);
             let (la, lb, lc) = (a.length(), b.length(), c.length());
-            2.0 * a.dot(b.cross(c)).atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
+            2.0 * a
+                .dot(b.cross(c))
+                .atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
         })
         .sum();
     angle / (4.0 * std::f64::consts::PI)
@@ -71,19 +75,31 @@ fn assert_sound(part: &Part, gripper: &Gripper, grip: &Grip) {
     let z = grip.part_from_grip.rotation.z_axis;
     assert!(face_i.normal.dot(z) > 0.99999 && face_ii.normal.dot(z) < -0.99999);
     assert!((grip.part_from_grip.rotation.determinant() - 1.0).abs() < 1e-12);
-    let height = |face: &gripfast::part::PlanarFace| (face.offset - face.normal.dot(grip.part_from_grip.origin)).abs();
-    assert!((height(face_i) - grip.width / 2.0).abs() < 1e-6 && (height(face_ii) - grip.width / 2.0).abs() < 1e-6);
+    let height = |face: &gripfast::part::PlanarFace| {
+        (face.offset - face.normal.dot(grip.part_from_grip.origin)).abs()
+    };
+    assert!(
+        (height(face_i) - grip.width / 2.0).abs() < 1e-6
+            && (height(face_ii) - grip.width / 2.0).abs() < 1e-6
+    );
     let pad = Bounds2::of(&gripper.pad);
     for (patch, sign) in [(&grip.contact.face_i, 1.0), (&grip.contact.face_ii, -1.0)] {
         let area = patch_area(patch);
-        assert!(area > 0.019 * ring_area(&gripper.pad) && area < ring_area(&gripper.pad) * (1.0 + 1e-9));
+        assert!(
+            area > 0.019 * ring_area(&gripper.pad) && area < ring_area(&gripper.pad) * (1.0 + 1e-9)
+        );
         for polygon in patch {
-            assert!(ring_area(&polygon.outer) > 0.0 && polygon.holes.iter().all(|hole| ring_area(hole) < 0.0));
+            assert!(
+                ring_area(&polygon.outer) > 0.0
+                    && polygon.holes.iter().all(|hole| ring_area(hole) < 0.0)
+            );
         }
         for index in 0..16 {
             let share = DVec2::new(f64::from(index % 4) + 0.53, f64::from(index / 4) + 0.47) / 4.0;
             let point = pad.min + pad.size() * share;
-            let at = |height: f64| grip.part_from_grip.point(point.extend(sign * (grip.width / 2.0 + height)));
+            let at = |height: f64| {
+                grip.part_from_grip.point(point.extend(sign * (grip.width / 2.0 + height)))
+            };
             let touched = patch.iter().any(|polygon| contains(polygon, point));
             if touched {
                 assert!(winding(part, at(-2e-6)) > 0.5, "no material under the pad");
@@ -91,8 +107,11 @@ fn assert_sound(part: &Part, gripper: &Gripper, grip: &Grip) {
             assert!(winding(part, at(2e-5)) < 0.5, "the pad is in the material");
         }
     }
-    let triangles: Vec<[DVec3; 3]> =
-        (0..part.mesh.triangles.len() as u32).map(|index| part.mesh.corners(index).map(|corner| grip.part_from_grip.point_inverse(corner))).collect();
+    let triangles: Vec<[DVec3; 3]> = (0..part.mesh.triangles.len() as u32)
+        .map(|index| {
+            part.mesh.corners(index).map(|corner| grip.part_from_grip.point_inverse(corner))
+        })
+        .collect();
     let mut bodies = gripper.finger(true, grip.width);
     bodies.extend(gripper.finger(false, grip.width));
     bodies.extend(gripper.palm.iter().cloned());
@@ -100,7 +119,11 @@ fn assert_sound(part: &Part, gripper: &Gripper, grip: &Grip) {
         assert!(matches!(body.shape, Shape::Box { .. }));
         let [low, high] = body.bounds();
         let margin = DVec3::splat(2e-5);
-        assert!(!triangles.iter().any(|triangle| clip_leaves(low + margin, high - margin, *triangle)), "{} in the part", body.name);
+        assert!(
+            !triangles.iter().any(|triangle| clip_leaves(low + margin, high - margin, *triangle)),
+            "{} in the part",
+            body.name
+        );
     }
 }
 
@@ -130,9 +153,11 @@ fn grips_on_real_parts_look_right() {
     }
 }
 
-/// Splits every triangle in four at its edges' middles, rounded to 32-bit millimetres as a file would.
+/// Splits every triangle in four at its edges' middles, rounded to 32-bit millimetres as a file
+/// would.
 fn refined(part: &Part, times: u32) -> Part {
-    let mut triangles: Vec<[DVec3; 3]> = (0..part.mesh.triangles.len() as u32).map(|index| part.mesh.corners(index)).collect();
+    let mut triangles: Vec<[DVec3; 3]> =
+        (0..part.mesh.triangles.len() as u32).map(|index| part.mesh.corners(index)).collect();
     let round = |point: DVec3| (point * 1e3).as_vec3().as_dvec3() * 1e-3;
     for _ in 0..times {
         triangles = triangles
@@ -144,7 +169,9 @@ fn refined(part: &Part, times: u32) -> Part {
             .collect();
     }
     let vertices: Vec<DVec3> = triangles.iter().flatten().copied().collect();
-    let indices: Vec<[u32; 3]> = (0..triangles.len() as u32).map(|index| [3 * index, 3 * index + 1, 3 * index + 2]).collect();
+    let indices: Vec<[u32; 3]> = (0..triangles.len() as u32)
+        .map(|index| [3 * index, 3 * index + 1, 3 * index + 2])
+        .collect();
     Part::from_triangles("refined", &vertices, &indices).unwrap()
 }
 
@@ -160,20 +187,42 @@ fn scores(part: &Part, gripper: &Gripper, grips: Vec<Grip>) -> Vec<RankedGrip> {
         pad_friction: gripper.pad_friction,
         score: ScoreOptions::default(),
     };
-    Assessor { loads: &loads, mass, settings: &settings, backend: &Backend::Cpu, seeds: &SeedSet::default() }.assess(grips).unwrap()
+    Assessor {
+        loads: &loads,
+        mass,
+        settings: &settings,
+        backend: &Backend::Cpu,
+        seeds: &SeedSet::default(),
+    }
+    .assess(grips)
+    .unwrap()
 }
 
 /// The same candidates and grips, positions to 1 um, scores to 1e-6.
 fn assert_same_grips(coarse: &Part, fine: &Part) {
     let gripper = gripper::find("generic").unwrap();
-    let ((a, tally_a), (b, tally_b)) = (propose(coarse, &gripper, &ProposeOptions::default()), propose(fine, &gripper, &ProposeOptions::default()));
+    let ((a, tally_a), (b, tally_b)) = (
+        propose(coarse, &gripper, &ProposeOptions::default()),
+        propose(fine, &gripper, &ProposeOptions::default()),
+    );
     assert_eq!(tally_a, tally_b);
     assert_eq!(a.len(), b.len());
     for (a, b) in a.iter().zip(&b) {
         assert_eq!((a.id, a.face_i, a.face_ii), (b.id, b.face_i, b.face_ii));
-        assert!((a.part_from_grip.origin - b.part_from_grip.origin).length() < 1e-6 && (a.width - b.width).abs() < 1e-6);
-        assert!((a.part_from_grip.rotation - b.part_from_grip.rotation).to_cols_array().iter().all(|x| x.abs() < 1e-5));
-        assert!((patch_area(&a.contact.face_i) - patch_area(&b.contact.face_i)).abs() < 1e-5 * patch_area(&a.contact.face_i));
+        assert!(
+            (a.part_from_grip.origin - b.part_from_grip.origin).length() < 1e-6
+                && (a.width - b.width).abs() < 1e-6
+        );
+        assert!(
+            (a.part_from_grip.rotation - b.part_from_grip.rotation)
+                .to_cols_array()
+                .iter()
+                .all(|x| x.abs() < 1e-5)
+        );
+        assert!(
+            (patch_area(&a.contact.face_i) - patch_area(&b.contact.face_i)).abs()
+                < 1e-5 * patch_area(&a.contact.face_i)
+        );
     }
     let every = |grips: Vec<Grip>| -> Vec<Grip> { grips.into_iter().step_by(17).collect() };
     let (a, b) = (scores(coarse, &gripper, every(a)), scores(fine, &gripper, every(b)));
@@ -184,8 +233,15 @@ fn assert_same_grips(coarse: &Part, fine: &Part) {
         assert!(near(a.alpha, b.alpha) && near(a.twist_margin, b.twist_margin), "{a:?}\n{b:?}");
         if let (Some(mu), Some(other)) = (a.worst.mu_s, b.worst.mu_s) {
             held += 1;
-            assert!(near(mu, other), "grip {}: mu_s {mu} on the coarse mesh, {other} on the fine one", a.grip.id);
-            assert!(near(Weights::default().score(mu, a.alpha), Weights::default().score(other, b.alpha)));
+            assert!(
+                near(mu, other),
+                "grip {}: mu_s {mu} on the coarse mesh, {other} on the fine one",
+                a.grip.id
+            );
+            assert!(near(
+                Weights::default().score(mu, a.alpha),
+                Weights::default().score(other, b.alpha)
+            ));
         }
     }
     assert!(a.len() > 500 && held > a.len() / 2, "{held} of {}", a.len());

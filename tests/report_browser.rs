@@ -1,7 +1,8 @@
 //! The page in a real browser: see `viewer/test/browser.mjs` for what is checked.
 //!
-//! Needs node, Chromium and the packages of `viewer/` (`npm ci` there); says SKIPPED without them, or fails when the
-//! environment variable `GRIPFAST_BROWSER` is `require`. `GRIPFAST_SCREENSHOTS` names a folder for pictures.
+//! Needs node, Chromium and the packages of `viewer/` (`npm ci` there); says SKIPPED without them,
+//! or fails when the environment variable `GRIPFAST_BROWSER` is `require`. `GRIPFAST_SCREENSHOTS`
+//! names a folder for pictures.
 
 mod report_support;
 
@@ -34,7 +35,8 @@ fn the_page_works_in_a_browser() {
     let folder = tempfile::tempdir().unwrap();
     let part = part(&data("parts/l_bracket.stl"));
     let mut set = plan(&part, "robotiq-2f85", "ball:60:5N", 0.35, (3, 6), 200);
-    let (small_page, large_page) = (folder.path().join("small.html"), folder.path().join("large.html"));
+    let (small_page, large_page) =
+        (folder.path().join("small.html"), folder.path().join("large.html"));
     let fine = refined(&part.mesh, 6);
     let mut many = large(&set, 10_000);
     many.part.triangles = fine.triangles.len();
@@ -42,9 +44,14 @@ fn the_page_works_in_a_browser() {
     set.part.file = "</script><img src=x onerror=alert(1)>.stl".into();
     report::write(&set, Some(&part.mesh), &small_page).unwrap();
     let mut command = Command::new("node");
-    command.arg(viewer.join("test/browser.mjs")).args([&small_page, &large_page]).args(std::env::var_os("GRIPFAST_SCREENSHOTS"));
+    command
+        .arg(viewer.join("test/browser.mjs"))
+        .args([&small_page, &large_page])
+        .args(std::env::var_os("GRIPFAST_SCREENSHOTS"));
     let output = command.env("CHROMIUM", browser).output().unwrap();
-    let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    let text = [output.stdout, output.stderr]
+        .map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
+        .concat();
     println!("{text}");
     assert!(output.status.success(), "{text}");
 }

@@ -6,7 +6,8 @@ use crate::error::{Error, Result};
 /// What `--backend` asks for.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Choice {
-    /// A GPU where there is one, else the processor. A GPU lost on the way is replaced by the processor.
+    /// A GPU where there is one, else the processor. A GPU lost on the way is replaced by the
+    /// processor.
     #[default]
     Auto,
     /// The processor.
@@ -23,7 +24,11 @@ impl std::str::FromStr for Choice {
             "auto" => Ok(Self::Auto),
             "cpu" => Ok(Self::Cpu),
             "gpu" => Ok(Self::Gpu),
-            _ => Err(Error::input("--backend", format!("`{text}` is not a backend"), "use auto, cpu or gpu")),
+            _ => Err(Error::input(
+                "--backend",
+                format!("`{text}` is not a backend"),
+                "use auto, cpu or gpu",
+            )),
         }
     }
 }
@@ -37,15 +42,18 @@ pub struct Selection {
     pub reason: String,
 }
 
-/// Opens what was asked for. `adapter` names the GPU (index or part of its name); without it the environment variable
-/// `GRIPFAST_ADAPTER` does.
+/// Opens what was asked for. `adapter` names the GPU (index or part of its name); without it the
+/// environment variable `GRIPFAST_ADAPTER` does.
 ///
 /// # Errors
-/// [`Error::Backend`] when `gpu` was asked for and there is none, or a named adapter does not exist or does not work
-/// (whatever the choice: a name is never silently ignored); [`Error::Input`] for an adapter named with `cpu`.
+/// [`Error::Backend`] when `gpu` was asked for and there is none, or a named adapter does not exist
+/// or does not work (whatever the choice: a name is never silently ignored); [`Error::Input`] for
+/// an adapter named with `cpu`.
 pub fn select(choice: Choice, adapter: Option<&str>) -> Result<Selection> {
     match choice {
-        Choice::Cpu if adapter.is_some() => Err(Error::input("--adapter", "is given with --backend cpu", "leave out one of them")),
+        Choice::Cpu if adapter.is_some() => {
+            Err(Error::input("--adapter", "is given with --backend cpu", "leave out one of them"))
+        }
         Choice::Cpu => Ok(Selection { backend: Backend::Cpu, reason: "cpu: asked for".to_owned() }),
         Choice::Auto | Choice::Gpu => open(choice, adapter),
     }
@@ -55,12 +63,18 @@ pub fn select(choice: Choice, adapter: Option<&str>) -> Result<Selection> {
 fn open(choice: Choice, adapter: Option<&str>) -> Result<Selection> {
     match super::Gpu::open(adapter, choice == Choice::Gpu) {
         Ok(gpu) => {
-            let software = if gpu.is_software() { " (software: right answers, no speed)" } else { "" };
+            let software =
+                if gpu.is_software() { " (software: right answers, no speed)" } else { "" };
             let named = adapter.is_some() || named_in_environment();
             let why = if choice == Choice::Gpu || named { "asked for" } else { "auto, found" };
-            Ok(Selection { reason: format!("gpu: {why} {}{software}", gpu.name()), backend: Backend::Gpu(Box::new(gpu)) })
+            Ok(Selection {
+                reason: format!("gpu: {why} {}{software}", gpu.name()),
+                backend: Backend::Gpu(Box::new(gpu)),
+            })
         }
-        Err(Error::Backend(why)) if choice == Choice::Auto && adapter.is_none() && !named_in_environment() => {
+        Err(Error::Backend(why))
+            if choice == Choice::Auto && adapter.is_none() && !named_in_environment() =>
+        {
             Ok(Selection { backend: Backend::Cpu, reason: format!("cpu: auto, {why}") })
         }
         Err(error) => Err(error),
@@ -75,7 +89,10 @@ fn named_in_environment() -> bool {
 #[cfg(not(feature = "gpu"))]
 fn open(choice: Choice, adapter: Option<&str>) -> Result<Selection> {
     if choice == Choice::Auto && adapter.is_none() {
-        return Ok(Selection { backend: Backend::Cpu, reason: "cpu: auto, this build has no GPU support".to_owned() });
+        return Ok(Selection {
+            backend: Backend::Cpu,
+            reason: "cpu: auto, this build has no GPU support".to_owned(),
+        });
     }
     Err(Error::Backend("this build has no GPU support (cargo feature `gpu`)".to_owned()))
 }

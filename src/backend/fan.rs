@@ -1,15 +1,18 @@
-//! Gradient basis of one contact at one twist, in f32: the twin of `shaders/fan.wgsl`, same functions in the same order.
+//! Gradient basis of one contact at one twist, in f32: the twin of `shaders/fan.wgsl`, same
+//! functions in the same order.
 //!
-//! For each weight `1, x1, x2` the integrals over a face of `weight * v(x)/|v(x)|` and of its moment about the origin,
-//! where `v(x) = (u1 - omega x2, u2 + omega x1)`. Pressure times these is the gradient of the dissipation; pressure
-//! times these times the twist is the dissipation itself (it is homogeneous of degree one).
+//! For each weight `1, x1, x2` the integrals over a face of `weight * v(x)/|v(x)|` and of its
+//! moment about the origin, where `v(x) = (u1 - omega x2, u2 + omega x1)`. Pressure times these is
+//! the gradient of the dissipation; pressure times these times the twist is the dissipation itself
+//! (it is homogeneous of degree one).
 
 use super::layout::{EdgeRecord, GAUSS, NEAR_LIMIT, ON_LINE, SERIES_LIMIT};
 
 /// Integrals of weights `1, x1, x2` by components `g1, g2, torque`.
 pub(crate) type Basis = [f32; 9];
 
-/// `asinh(s2/|h|) - asinh(s1/|h|)` of an edge at distance `h` from the apex, from `s1` to `s2` along it.
+/// `asinh(s2/|h|) - asinh(s1/|h|)` of an edge at distance `h` from the apex, from `s1` to `s2`
+/// along it.
 pub(crate) fn edge_log(h: f32, l: f32, s1: f32, s2: f32, r1: f32, r2: f32) -> f32 {
     if s1 < 0.0 && s2 > 0.0 {
         return (((s2 + r2) / h) * ((r1 - s1) / h)).ln();
@@ -19,7 +22,10 @@ pub(crate) fn edge_log(h: f32, l: f32, s1: f32, s2: f32, r1: f32, r2: f32) -> f3
         return if s1 >= 0.0 { ((s2 + r2) / (s1 + r1)).ln() } else { ((r1 - s1) / (r2 - s2)).ln() };
     }
     let q = z * z;
-    2.0 * z * (1.0 + q * (1.0 / 3.0 + q * (1.0 / 5.0 + q * (1.0 / 7.0 + q * (1.0 / 9.0 + q * (1.0 / 11.0))))))
+    2.0 * z
+        * (1.0
+            + q * (1.0 / 3.0
+                + q * (1.0 / 5.0 + q * (1.0 / 7.0 + q * (1.0 / 9.0 + q * (1.0 / 11.0))))))
 }
 
 /// Fan integrals about the apex `c`: `int e` (2), `int r`, `int y e` (11, 12, 22), `int y r` (2).
@@ -76,17 +82,24 @@ pub(crate) fn basis_near(edges: &[EdgeRecord], v: [f32; 3]) -> Basis {
     ]
 }
 
-/// The basis from Gauss points on the triangles (origin, A, B), the integrand in twist form: regular for translations.
-/// Takes the components of `LANES` twists and gives the nine numbers of each, side by side.
+/// The basis from Gauss points on the triangles (origin, A, B), the integrand in twist form:
+/// regular for translations. Takes the components of `LANES` twists and gives the nine numbers of
+/// each, side by side.
 #[inline(always)]
-pub(crate) fn basis_far<const LANES: usize>(edges: &[EdgeRecord], v: &[[f32; LANES]; 3]) -> [[f32; LANES]; 9] {
+pub(crate) fn basis_far<const LANES: usize>(
+    edges: &[EdgeRecord],
+    v: &[[f32; LANES]; 3],
+) -> [[f32; LANES]; 9] {
     let mut total = [[0.0_f32; LANES]; 9];
     for edge in edges {
         // One sum per edge: with all edges in one, rounding grows with the number of points.
         let mut sum = [[0.0_f32; LANES]; 9];
         let twice_area = edge[0] * edge[3] - edge[1] * edge[2];
         for across in GAUSS {
-            let (px, py) = (edge[0] + across[0] * (edge[2] - edge[0]), edge[1] + across[0] * (edge[3] - edge[1]));
+            let (px, py) = (
+                edge[0] + across[0] * (edge[2] - edge[0]),
+                edge[1] + across[0] * (edge[3] - edge[1]),
+            );
             for along in GAUSS {
                 let (x1, x2) = (along[0] * px, along[0] * py);
                 let area = twice_area * across[1] * along[1] * along[0];
@@ -157,8 +170,18 @@ mod tests {
             ("square", square.clone(), vec![]),
             ("bar", ring(&[(-5.0, -0.5), (5.0, -0.5), (5.0, 0.5), (-5.0, 0.5)]), vec![]),
             ("hollow", square, vec![ring(&[(-0.8, -0.8), (-0.8, 0.8), (0.8, 0.8), (0.8, -0.8)])]),
-            ("L", ring(&[(0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)]), vec![]),
-            ("disc", (0..96).map(|i| DVec2::from_angle(f64::from(i) * std::f64::consts::TAU / 96.0)).collect(), vec![]),
+            (
+                "L",
+                ring(&[(0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)]),
+                vec![],
+            ),
+            (
+                "disc",
+                (0..96)
+                    .map(|i| DVec2::from_angle(f64::from(i) * std::f64::consts::TAU / 96.0))
+                    .collect(),
+                vec![],
+            ),
         ];
         outlines
             .into_iter()
@@ -167,8 +190,15 @@ mod tests {
                 let contact = Contact { face_i: patch.clone(), face_ii: patch.clone() };
                 let prepared = Prepared::new(&contact, name).unwrap().unwrap();
                 assert_eq!(prepared.header.faces, 1, "{name}");
-                let exact = Loops::mapped(&patch, |point| (point - prepared.origin) / prepared.unit);
-                Face { name, radius: prepared.header.radius, area: f64::from(prepared.header.area_i), edges: prepared.edges, exact }
+                let exact =
+                    Loops::mapped(&patch, |point| (point - prepared.origin) / prepared.unit);
+                Face {
+                    name,
+                    radius: prepared.header.radius,
+                    area: f64::from(prepared.header.area_i),
+                    edges: prepared.edges,
+                    exact,
+                }
             })
             .collect()
     }
@@ -177,18 +207,33 @@ mod tests {
     fn errors(face: &Face, found: &Basis, v: [f32; 3]) -> [f64; 3] {
         let v = v.map(f64::from);
         let exact = friction(&face.exact, v, [1.0, 0.0, 0.0]).g.concat();
-        let difference: Vec<f64> = found.iter().zip(&exact).map(|(a, b)| f64::from(*a) - b).collect();
-        let largest = |part: &[f64]| part.iter().fold(0.0, |most: f64, x| most.max(x.abs())) / face.area;
+        let difference: Vec<f64> =
+            found.iter().zip(&exact).map(|(a, b)| f64::from(*a) - b).collect();
+        let largest =
+            |part: &[f64]| part.iter().fold(0.0, |most: f64, x| most.max(x.abs())) / face.area;
         let along = |g: &[f64]| g[0] * v[0] + g[1] * v[1] + g[2] * v[2];
-        [along(&difference).abs() / along(&exact), largest(&difference[..3]), largest(&difference[3..])]
+        [
+            along(&difference).abs() / along(&exact),
+            largest(&difference[..3]),
+            largest(&difference[3..]),
+        ]
     }
 
-    fn worst(face: &Face, form: impl Fn([f32; 3]) -> Basis, twists: impl Iterator<Item = [f32; 3]>) -> [f64; 3] {
-        twists.map(|v| errors(face, &form(v), v)).fold([0.0; 3], |most, e| [0, 1, 2].map(|i| most[i].max(e[i])))
+    fn worst(
+        face: &Face,
+        form: impl Fn([f32; 3]) -> Basis,
+        twists: impl Iterator<Item = [f32; 3]>,
+    ) -> [f64; 3] {
+        twists
+            .map(|v| errors(face, &form(v), v))
+            .fold([0.0; 3], |most, e| [0, 1, 2].map(|i| most[i].max(e[i])))
     }
 
     fn assert_small(name: &str, errors: [f64; 3]) {
-        println!("{name}: dissipation {:.1e}, weight 1 {:.1e}, weights x {:.1e}", errors[0], errors[1], errors[2]);
+        println!(
+            "{name}: dissipation {:.1e}, weight 1 {:.1e}, weights x {:.1e}",
+            errors[0], errors[1], errors[2]
+        );
         assert!(errors[0] < 2e-6 && errors[1] < 4e-6 && errors[2] < 1.2e-5, "{name}: {errors:?}");
     }
 
@@ -208,7 +253,15 @@ mod tests {
     #[test]
     fn slip_centres_on_vertices_edges_and_their_lines() {
         for face in faces() {
-            let offsets = [(0.0, 0.0), (0.5, 0.0), (0.25, 1e-6), (0.7, -1e-3), (1.0, 1e-7), (1.3, 0.0), (-0.2, 1e-5)];
+            let offsets = [
+                (0.0, 0.0),
+                (0.5, 0.0),
+                (0.25, 1e-6),
+                (0.7, -1e-3),
+                (1.0, 1e-7),
+                (1.3, 0.0),
+                (-0.2, 1e-5),
+            ];
             let twists = face.edges.iter().flat_map(|edge| {
                 let (a, b) = (glam::Vec2::new(edge[0], edge[1]), glam::Vec2::new(edge[2], edge[3]));
                 offsets.map(|(along, off)| about(a + along * (b - a) + off * (b - a).perp()))
@@ -217,15 +270,23 @@ mod tests {
         }
     }
 
-    /// Prints the error of both forms by the slip centre's distance in circumradii: where [`NEAR_LIMIT`] comes from.
+    /// Prints the error of both forms by the slip centre's distance in circumradii: where
+    /// [`NEAR_LIMIT`] comes from.
     #[test]
     fn near_and_far_forms_meet_where_both_are_good() {
         for face in faces() {
             for kappa in [0.5, 1.0, 1.25, 1.5, 1.75, 2.0, 3.0, 10.0] {
-                let twists = || (0..200).map(|i| about(glam::Vec2::from_angle(i as f32 * 0.7) * kappa * face.radius));
+                let twists = || {
+                    (0..200).map(|i| {
+                        about(glam::Vec2::from_angle(i as f32 * 0.7) * kappa * face.radius)
+                    })
+                };
                 let near = worst(&face, |v| basis_near(&face.edges, v), twists());
                 let far = worst(&face, |v| far(&face.edges, v), twists());
-                println!("{:8} {kappa:5}: near {:.1e} {:.1e} {:.1e}  far {:.1e} {:.1e} {:.1e}", face.name, near[0], near[1], near[2], far[0], far[1], far[2]);
+                println!(
+                    "{:8} {kappa:5}: near {:.1e} {:.1e} {:.1e}  far {:.1e} {:.1e} {:.1e}",
+                    face.name, near[0], near[1], near[2], far[0], far[1], far[2]
+                );
                 if kappa == NEAR_LIMIT {
                     assert_small(face.name, near);
                     assert_small(face.name, far);

@@ -1,14 +1,16 @@
-//! The seed stage on processor or GPU: for every load the best slip twist of a fixed set, with bounds on `mu_s`.
+//! The seed stage on processor or GPU: for every load the best slip twist of a fixed set, with
+//! bounds on `mu_s`.
 //!
-//! The gradient of the dissipation at a twist depends on the contact polygons alone, linearly in the pressure. It is
-//! computed once per distinct contact and twist (nine numbers per face); what is left per load is a small
-//! product and a maximum. The supports of the triangles round the best twist give an upper bound: `w` is a combination
-//! of three gradients, and the sum of its coefficients' magnitudes bounds `mu_s`, because `D` is a norm.
+//! The gradient of the dissipation at a twist depends on the contact polygons alone, linearly in
+//! the pressure. It is computed once per distinct contact and twist (nine numbers per face); what
+//! is left per load is a small product and a maximum. The supports of the triangles round the best
+//! twist give an upper bound: `w` is a combination of three gradients, and the sum of its
+//! coefficients' magnitudes bounds `mu_s`, because `D` is a norm.
 //!
-//! Where the bounds hold: congruent faces in full contact, whose summed pressure is constant, so that neither
-//! `M1, M2, F3` nor the distance of the faces matters; and different faces in full contact whose friction coupling is
-//! weak, the bounds being widened by all that it can do. Elsewhere the seeds come from the pressure without friction
-//! coupling, and there are no bounds.
+//! Where the bounds hold: congruent faces in full contact, whose summed pressure is constant, so
+//! that neither `M1, M2, F3` nor the distance of the faces matters; and different faces in full
+//! contact whose friction coupling is weak, the bounds being widened by all that it can do.
+//! Elsewhere the seeds come from the pressure without friction coupling, and there are no bounds.
 
 mod choice;
 mod cpu;
@@ -41,16 +43,18 @@ use crate::model::{Contact, Wrench};
 use layout::SeedRecord;
 use prepare::{Chunk, Prepared, not_searched};
 
-/// Relative widening of both bounds: ten times the largest error of the 32-bit kernels seen in tests (processor and
-/// software Vulkan; Vulkan allows a logarithm 5e-7 off).
+/// Relative widening of both bounds: ten times the largest error of the 32-bit kernels seen in
+/// tests (processor and software Vulkan; Vulkan allows a logarithm 5e-7 off).
 pub const F32_TOLERANCE: f64 = 2e-5;
 
 /// One grip: its contact and the loads on it.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem<'a> {
-    /// Contact areas in the grip frame. Problems that share the `Arc` share the work that depends on it alone.
+    /// Contact areas in the grip frame. Problems that share the `Arc` share the work that depends
+    /// on it alone.
     pub contact: &'a Arc<Contact>,
-    /// Height of face I over face II [m], the `d` of the mechanics: negative for grips from inside ([`crate::model::Grip::distance`]).
+    /// Height of face I over face II [m], the `d` of the mechanics: negative for grips from inside
+    /// ([`crate::model::Grip::distance`]).
     pub distance: f64,
     /// Gripping force [N].
     pub force: f64,
@@ -68,9 +72,11 @@ pub struct Batch<'a> {
 /// What kind of seed a load got.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum SeedStatus {
-    /// Congruent faces in full contact: a twist and bounds on `mu_s`, which depends on the in-plane load alone.
+    /// Congruent faces in full contact: a twist and bounds on `mu_s`, which depends on the in-plane
+    /// load alone.
     Bounded,
-    /// Different faces in full contact: a twist, and bounds on `mu_s` that allow for all that the friction coupling can do.
+    /// Different faces in full contact: a twist, and bounds on `mu_s` that allow for all that the
+    /// friction coupling can do.
     Coupled,
     /// A twist; no bounds.
     Unbounded,
@@ -87,15 +93,15 @@ pub enum SeedStatus {
 pub struct Seed {
     /// What kind of seed this is.
     pub status: SeedStatus,
-    /// Twist `(u1, u2, omega)` of the body about the grip origin, in the sense that the load drives: [m/s, m/s, rad/s]
-    /// up to a positive factor. Zero where nothing was searched.
+    /// Twist `(u1, u2, omega)` of the body about the grip origin, in the sense that the load
+    /// drives: [m/s, m/s, rad/s] up to a positive factor. Zero where nothing was searched.
     pub twist: [f64; 3],
     /// `mu_s` is at least this (0 without bounds).
     pub lower: f64,
     /// `mu_s` is at most this (infinite without bounds).
     pub upper: f64,
-    /// `mu_s` is about this: the best twist's value for the pressure without friction coupling, shortened to full
-    /// contact. Not a bound; zero where nothing was searched.
+    /// `mu_s` is about this: the best twist's value for the pressure without friction coupling,
+    /// shortened to full contact. Not a bound; zero where nothing was searched.
     pub estimate: f64,
 }
 
@@ -119,8 +125,8 @@ pub(crate) struct Limits {
 }
 
 impl Limits {
-    /// On the processor a chunk is one task: small enough for the second-level cache, large enough that computing a
-    /// contact's basis anew for each is lost in it.
+    /// On the processor a chunk is one task: small enough for the second-level cache, large enough
+    /// that computing a contact's basis anew for each is lost in it.
     const CPU: Self = Self { loads: 1 << 13, contacts: 64, edges: 1 << 14, basis: 1 << 18 };
 }
 
@@ -146,12 +152,12 @@ impl Backend {
         }
     }
 
-    /// Seeds of all loads of all problems, in order. Equal input gives equal output on one backend, whatever the number
-    /// of threads, and however the batch is cut or permuted.
+    /// Seeds of all loads of all problems, in order. Equal input gives equal output on one backend,
+    /// whatever the number of threads, and however the batch is cut or permuted.
     ///
     /// # Errors
-    /// [`Error::Input`] for numbers that are not finite or a gripping force that is not positive; [`Error::Backend`]
-    /// when the GPU fails.
+    /// [`Error::Input`] for numbers that are not finite or a gripping force that is not positive;
+    /// [`Error::Backend`] when the GPU fails.
     pub fn seed(&self, batch: &Batch<'_>, seeds: &SeedSet) -> Result<Vec<Seed>> {
         let job = Job::new(batch, seeds)?;
         let mut answers = vec![not_searched(SeedStatus::NoContact); job.loads];
@@ -207,13 +213,18 @@ impl<'a> Job<'a> {
         }
         let prepared = problems
             .par_iter()
-            .map(|users| Prepared::new(batch.problems[users[0]].contact, &format!("contact of grip {}", users[0])))
+            .map(|users| {
+                Prepared::new(
+                    batch.problems[users[0]].contact,
+                    &format!("contact of grip {}", users[0]),
+                )
+            })
             .collect::<Result<_>>()?;
         Ok(Self { batch, seeds, loads, prepared, problems })
     }
 
-    /// Cuts the job into chunks within `limits`, each with its places among the `answers`. A contact with many loads is
-    /// cut too.
+    /// Cuts the job into chunks within `limits`, each with its places among the `answers`. A
+    /// contact with many loads is cut too.
     fn plans<'b>(&self, limits: Limits, mut answers: &'b mut [Seed]) -> Vec<Plan<'b>> {
         let mut places: Vec<&'b mut [Seed]> = Vec::with_capacity(self.batch.problems.len());
         for problem in &self.batch.problems {
@@ -225,8 +236,13 @@ impl<'a> Job<'a> {
         let (mut loads, mut edges, mut basis) = (0, 0, 0);
         for (contact, users) in self.problems.iter().enumerate() {
             let Some(prepared) = &self.prepared[contact] else { continue };
-            let (own_edges, own_basis) = (prepared.edges.len(), prepare::basis_length(&prepared.header, self.seeds.len()));
-            if !plan.is_empty() && (plan.len() + 1 > limits.contacts || edges + own_edges > limits.edges || basis + own_basis > limits.basis) {
+            let (own_edges, own_basis) =
+                (prepared.edges.len(), prepare::basis_length(&prepared.header, self.seeds.len()));
+            if !plan.is_empty()
+                && (plan.len() + 1 > limits.contacts
+                    || edges + own_edges > limits.edges
+                    || basis + own_basis > limits.basis)
+            {
                 plans.push(std::mem::take(&mut plan));
                 (loads, edges, basis) = (0, 0, 0);
             }
@@ -262,7 +278,10 @@ impl<'a> Job<'a> {
 
     /// The records of a plan; answers of loads that need no search are written at once.
     fn build(&self, plan: &mut Plan<'_>) -> Chunk {
-        let mut pieces: Vec<(usize, &mut Piece<'_>)> = plan.iter_mut().flat_map(|(contact, pieces)| pieces.iter_mut().map(|piece| (*contact, piece))).collect();
+        let mut pieces: Vec<(usize, &mut Piece<'_>)> = plan
+            .iter_mut()
+            .flat_map(|(contact, pieces)| pieces.iter_mut().map(|piece| (*contact, piece)))
+            .collect();
         let records: Vec<Vec<layout::LoadRecord>> = pieces
             .par_iter_mut()
             .with_min_len(16)
@@ -271,7 +290,9 @@ impl<'a> Job<'a> {
                 let problem = &self.batch.problems[piece.problem];
                 let mut records = Vec::with_capacity(piece.answers.len());
                 piece.scales = Vec::with_capacity(piece.answers.len());
-                for (wrench, answer) in problem.wrenches[piece.first..].iter().zip(piece.answers.iter_mut()) {
+                for (wrench, answer) in
+                    problem.wrenches[piece.first..].iter().zip(piece.answers.iter_mut())
+                {
                     match prepared.load(problem, wrench) {
                         Ok((record, scale)) => {
                             records.push(record);
@@ -303,7 +324,10 @@ impl<'a> Job<'a> {
             for piece in pieces {
                 let count = piece.scales.iter().filter(|&&scale| scale > 0.0).count();
                 let Some((mine, others)) = rest.split_at_checked(count) else {
-                    return Err(Error::Backend(format!("only {} answers came back", records.len())));
+                    return Err(Error::Backend(format!(
+                        "only {} answers came back",
+                        records.len()
+                    )));
                 };
                 jobs.push((contact, piece, mine));
                 rest = others;
@@ -311,7 +335,8 @@ impl<'a> Job<'a> {
         }
         jobs.into_par_iter().with_min_len(16).try_for_each(|(contact, piece, records)| {
             let Some(prepared) = &self.prepared[contact] else { return Ok(()) };
-            let searched = piece.answers.iter_mut().zip(&piece.scales).filter(|(_, scale)| **scale > 0.0);
+            let searched =
+                piece.answers.iter_mut().zip(&piece.scales).filter(|(_, scale)| **scale > 0.0);
             for ((answer, scale), record) in searched.zip(records) {
                 *answer = prepared.answer(record, *scale)?;
             }
@@ -324,14 +349,26 @@ impl<'a> Job<'a> {
 fn check(problem: &Problem<'_>, index: usize) -> Result<()> {
     let place = || format!("grip {index}");
     if !(problem.force.is_finite() && problem.force > 0.0) {
-        return Err(Error::input(place(), format!("gripping force {} N", problem.force), "give a positive force"));
+        return Err(Error::input(
+            place(),
+            format!("gripping force {} N", problem.force),
+            "give a positive force",
+        ));
     }
     if !problem.distance.is_finite() {
-        return Err(Error::input(place(), format!("distance between the faces {} m", problem.distance), "give a finite distance"));
+        return Err(Error::input(
+            place(),
+            format!("distance between the faces {} m", problem.distance),
+            "give a finite distance",
+        ));
     }
     for (load, wrench) in problem.wrenches.iter().enumerate() {
         if !(wrench.force.is_finite() && wrench.moment.is_finite()) {
-            return Err(Error::input(place(), format!("load {load} is not finite: {wrench:?}"), "give finite forces and moments"));
+            return Err(Error::input(
+                place(),
+                format!("load {load} is not finite: {wrench:?}"),
+                "give finite forces and moments",
+            ));
         }
     }
     Ok(())

@@ -1,9 +1,13 @@
-//! From contacts and wrenches in SI to the scaled 32-bit records of the kernels, and back. Everything that decides
-//! whether a load can be searched at all happens here in f64, once for every backend.
+//! From contacts and wrenches in SI to the scaled 32-bit records of the kernels, and back.
+//! Everything that decides whether a load can be searched at all happens here in f64, once for
+//! every backend.
 
 use glam::{DMat2, DVec2};
 
-use super::layout::{BOUNDED, COUPLED, ContactHeader, EdgeRecord, GROUP, GroupRecord, LoadRecord, OUT_OF_RANGE, SeedRecord, UNBOUNDED};
+use super::layout::{
+    BOUNDED, COUPLED, ContactHeader, EdgeRecord, GROUP, GroupRecord, LoadRecord, OUT_OF_RANGE,
+    SeedRecord, UNBOUNDED,
+};
 use super::{F32_TOLERANCE, Problem, Seed, SeedStatus};
 use crate::contact::Loops;
 use crate::error::{Error, Result};
@@ -11,18 +15,20 @@ use crate::geometry::overlay;
 use crate::geometry::polygon::{Moments, rings_moments};
 use crate::model::{Contact, Wrench};
 
-/// Faces count as congruent when their vertices agree to this over `perimeter / area`, in radii of gyration: the answer
-/// then changes by less than a tenth of the tolerance of the bounds. Parts come with single-precision coordinates.
+/// Faces count as congruent when their vertices agree to this over `perimeter / area`, in radii of
+/// gyration: the answer then changes by less than a tenth of the tolerance of the bounds. Parts
+/// come with single-precision coordinates.
 const CONGRUENT: f64 = 2e-6;
 
-/// Bounds need `radius * perimeter / area` below this (a square has 3): f32 rounds vertices by 6e-8 of the radius, so
-/// the integrals of a sliver are uncertain by that times this number.
+/// Bounds need `radius * perimeter / area` below this (a square has 3): f32 rounds vertices by 6e-8
+/// of the radius, so the integrals of a sliver are uncertain by that times this number.
 const RESOLVED: f64 = 60.0;
 
 /// Scaled numbers beyond this are not computed with: the load gets no bounds.
 const RANGE: f64 = 1e6;
 
-/// In-plane load over the gripping force below which there is no load: the square of less is not a number of f64.
+/// In-plane load over the gripping force below which there is no load: the square of less is not a
+/// number of f64.
 const NO_LOAD: f64 = 1e-150;
 
 /// Area over the square of the perimeter below which a face counts as no contact: a line.
@@ -40,19 +46,31 @@ pub(crate) struct Prepared {
     pub(crate) unit: f64,
 }
 
-/// Whether two faces have the same rings, each perhaps begun at another vertex, to within `tolerance` [m].
+/// Whether two faces have the same rings, each perhaps begun at another vertex, to within
+/// `tolerance` [m].
 fn congruent(a: &[(DVec2, DVec2)], b: &[(DVec2, DVec2)], tolerance: f64) -> bool {
-    let same = |a: &(DVec2, DVec2), b: &(DVec2, DVec2)| a.0.distance(b.0) <= tolerance && a.1.distance(b.1) <= tolerance;
+    let same = |a: &(DVec2, DVec2), b: &(DVec2, DVec2)| {
+        a.0.distance(b.0) <= tolerance && a.1.distance(b.1) <= tolerance
+    };
     // Mostly the faces list their vertices in the same order: look there first.
-    a.len() == b.len() && a.iter().zip(b).all(|(edge, other)| same(edge, other) || b.iter().any(|any| same(edge, any)))
+    a.len() == b.len()
+        && a.iter()
+            .zip(b)
+            .all(|(edge, other)| same(edge, other) || b.iter().any(|any| same(edge, any)))
 }
 
-/// The quadratic form of [`ContactHeader::variation_first`]: by Schwarz's inequality the integral of the magnitude of
-/// `p_I` on face I less `p_II` on face II is at most the root of the joint area times the integral of the square.
-fn variation(contact: &Contact, loops: [&Loops; 2], scaled: &impl Fn(DVec2) -> DVec2) -> ([f32; 4], [f32; 4], [f32; 2]) {
+/// The quadratic form of [`ContactHeader::variation_first`]: by Schwarz's inequality the integral
+/// of the magnitude of `p_I` on face I less `p_II` on face II is at most the root of the joint area
+/// times the integral of the square.
+fn variation(
+    contact: &Contact,
+    loops: [&Loops; 2],
+    scaled: &impl Fn(DVec2) -> DVec2,
+) -> ([f32; 4], [f32; 4], [f32; 2]) {
     let overlap = Loops::mapped(&overlay::intersect(&contact.face_i, &contact.face_ii), scaled);
     let [i, ii] = loops.map(|loops| {
-        let rings: Vec<Vec<DVec2>> = loops.rings().map(|ring| ring.iter().map(|&point| scaled(point)).collect()).collect();
+        let rings: Vec<Vec<DVec2>> =
+            loops.rings().map(|ring| ring.iter().map(|&point| scaled(point)).collect()).collect();
         about_origin(&rings_moments(&rings.iter().map(Vec::as_slice).collect::<Vec<_>>()))
     });
     let both = about_origin(&rings_moments(&overlap.rings().collect::<Vec<_>>()));
@@ -70,7 +88,11 @@ fn variation(contact: &Contact, loops: [&Loops; 2], scaled: &impl Fn(DVec2) -> D
 /// Area, first and second moments about the origin.
 fn about_origin(moments: &Moments) -> (f64, DVec2, DMat2) {
     let c = moments.centroid;
-    (moments.area, c * moments.area, moments.second + DMat2::from_cols(c * c.x, c * c.y) * moments.area)
+    (
+        moments.area,
+        c * moments.area,
+        moments.second + DMat2::from_cols(c * c.x, c * c.y) * moments.area,
+    )
 }
 
 impl Prepared {
@@ -80,24 +102,41 @@ impl Prepared {
     /// [`Error::Input`] when a coordinate is not finite.
     pub(crate) fn new(contact: &Contact, place: &str) -> Result<Option<Self>> {
         for (name, patch) in [("A_I", &contact.face_i), ("A_II", &contact.face_ii)] {
-            for point in patch.iter().flat_map(|polygon| polygon.outer.iter().chain(polygon.holes.iter().flatten())) {
+            for point in patch
+                .iter()
+                .flat_map(|polygon| polygon.outer.iter().chain(polygon.holes.iter().flatten()))
+            {
                 if !point.is_finite() {
-                    return Err(Error::input(place, format!("{name} has the vertex ({}, {})", point.x, point.y), "give finite coordinates"));
+                    return Err(Error::input(
+                        place,
+                        format!("{name} has the vertex ({}, {})", point.x, point.y),
+                        "give finite coordinates",
+                    ));
                 }
             }
         }
-        let [loops_i, loops_ii] = [&contact.face_i, &contact.face_ii].map(|patch| Loops::new(patch));
-        let [edges_i, edges_ii] = [&loops_i, &loops_ii].map(|loops| loops.edges().filter(|(a, b)| a != b).collect::<Vec<_>>());
-        let [on_i, on_ii] = [&loops_i, &loops_ii].map(|loops| rings_moments(&loops.rings().collect::<Vec<_>>()));
-        let perimeter = |edges: &[(DVec2, DVec2)]| edges.iter().map(|(a, b)| a.distance(*b)).sum::<f64>();
+        let [loops_i, loops_ii] =
+            [&contact.face_i, &contact.face_ii].map(|patch| Loops::new(patch));
+        let [edges_i, edges_ii] = [&loops_i, &loops_ii]
+            .map(|loops| loops.edges().filter(|(a, b)| a != b).collect::<Vec<_>>());
+        let [on_i, on_ii] =
+            [&loops_i, &loops_ii].map(|loops| rings_moments(&loops.rings().collect::<Vec<_>>()));
+        let perimeter =
+            |edges: &[(DVec2, DVec2)]| edges.iter().map(|(a, b)| a.distance(*b)).sum::<f64>();
         let (length_i, length_ii) = (perimeter(&edges_i), perimeter(&edges_ii));
-        let has_area = |face: &Moments, length: f64| face.area > NO_AREA * length * length && face.area.is_normal();
+        let has_area = |face: &Moments, length: f64| {
+            face.area > NO_AREA * length * length && face.area.is_normal()
+        };
         if !(has_area(&on_i, length_i) && has_area(&on_ii, length_ii)) {
             return Ok(None);
         }
         let area = on_i.area + on_ii.area;
         let origin = on_i.centroid + (on_ii.area / area) * (on_ii.centroid - on_i.centroid);
-        let polar = |face: &Moments| face.second.x_axis.x + face.second.y_axis.y + face.area * face.centroid.distance_squared(origin);
+        let polar = |face: &Moments| {
+            face.second.x_axis.x
+                + face.second.y_axis.y
+                + face.area * face.centroid.distance_squared(origin)
+        };
         let unit = ((polar(&on_i) + polar(&on_ii)) / area).sqrt();
         if !unit.is_normal() {
             return Ok(None);
@@ -105,22 +144,41 @@ impl Prepared {
         let same = congruent(&edges_i, &edges_ii, CONGRUENT * on_i.area / length_i);
         let scaled = |p: DVec2| (p - origin) / unit;
         let records = |edges: &[(DVec2, DVec2)]| -> Vec<EdgeRecord> {
-            let record = |&(a, b): &(DVec2, DVec2)| [scaled(a).as_vec2().to_array(), scaled(b).as_vec2().to_array()];
-            edges.iter().map(record).filter(|[a, b]| a != b).map(|[a, b]| [a[0], a[1], b[0], b[1]]).collect()
+            let record = |&(a, b): &(DVec2, DVec2)| {
+                [scaled(a).as_vec2().to_array(), scaled(b).as_vec2().to_array()]
+            };
+            edges
+                .iter()
+                .map(record)
+                .filter(|[a, b]| a != b)
+                .map(|[a, b]| [a[0], a[1], b[0], b[1]])
+                .collect()
         };
         let mut edges = records(&edges_i);
         let end_of_i = edges.len() as u32;
         if !same {
             edges.extend(records(&edges_ii));
         }
-        let radius = edges_i.iter().chain(&edges_ii).map(|edge| scaled(edge.0).length()).fold(0.0, f64::max);
+        let radius =
+            edges_i.iter().chain(&edges_ii).map(|edge| scaled(edge.0).length()).fold(0.0, f64::max);
         let stiffness = (on_i.second + on_ii.second) * unit.powi(-4);
         let compliance = stiffness.inverse();
-        let (variation_first, variation_second, variation_slope) = if same { Default::default() } else { variation(contact, [&loops_i, &loops_ii], &scaled) };
-        let (mean, half) = ((compliance.x_axis.x + compliance.y_axis.y) / 2.0, (compliance.x_axis.x - compliance.y_axis.y) / 2.0);
+        let (variation_first, variation_second, variation_slope) = if same {
+            Default::default()
+        } else {
+            variation(contact, [&loops_i, &loops_ii], &scaled)
+        };
+        let (mean, half) = (
+            (compliance.x_axis.x + compliance.y_axis.y) / 2.0,
+            (compliance.x_axis.x - compliance.y_axis.y) / 2.0,
+        );
         let softness = mean + half.hypot(compliance.y_axis.x);
-        let reach = |edges: &[(DVec2, DVec2)], centre: DVec2| edges.iter().map(|edge| edge.0.distance(centre) / unit).fold(0.0, f64::max);
-        let spread = (on_i.area * reach(&edges_i, on_i.centroid) + on_ii.area * reach(&edges_ii, on_ii.centroid)) / (unit * unit);
+        let reach = |edges: &[(DVec2, DVec2)], centre: DVec2| {
+            edges.iter().map(|edge| edge.0.distance(centre) / unit).fold(0.0, f64::max)
+        };
+        let spread = (on_i.area * reach(&edges_i, on_i.centroid)
+            + on_ii.area * reach(&edges_ii, on_ii.centroid))
+            / (unit * unit);
         let resolved = |face: &Moments, length: f64| radius * unit * length / face.area <= RESOLVED;
         let header = ContactHeader {
             edges_i: 0,
@@ -133,7 +191,11 @@ impl Prepared {
             area_ii: (on_ii.area / (unit * unit)) as f32,
             centroid_i: scaled(on_i.centroid).as_vec2().to_array(),
             centroid_ii: scaled(on_ii.centroid).as_vec2().to_array(),
-            compliance: [compliance.x_axis.x as f32, compliance.y_axis.x as f32, compliance.y_axis.y as f32],
+            compliance: [
+                compliance.x_axis.x as f32,
+                compliance.y_axis.x as f32,
+                compliance.y_axis.y as f32,
+            ],
             resolved: u32::from(resolved(&on_i, length_i) && resolved(&on_ii, length_ii)),
             variation_first,
             variation_second,
@@ -144,9 +206,14 @@ impl Prepared {
         Ok(Some(Self { header, edges, origin, unit }))
     }
 
-    /// The scaled record of a load, and the length of its in-plane wrench over the gripping force (by which `mu` of the
-    /// unit wrench is multiplied); or the reason why there is nothing to search.
-    pub(crate) fn load(&self, problem: &Problem<'_>, wrench: &Wrench) -> std::result::Result<(LoadRecord, f64), SeedStatus> {
+    /// The scaled record of a load, and the length of its in-plane wrench over the gripping force
+    /// (by which `mu` of the unit wrench is multiplied); or the reason why there is nothing to
+    /// search.
+    pub(crate) fn load(
+        &self,
+        problem: &Problem<'_>,
+        wrench: &Wrench,
+    ) -> std::result::Result<(LoadRecord, f64), SeedStatus> {
         let (force, unit, o) = (problem.force, self.unit, self.origin);
         let f = wrench.force;
         if f.z.abs() >= 2.0 * force {
@@ -157,18 +224,23 @@ impl Prepared {
         let m2 = wrench.moment.y / unit + o.x / unit * f.z;
         let m3 = wrench.moment.z / unit - (o.x / unit * f.y - o.y / unit * f.x);
         let in_plane = glam::DVec3::new(f.x, f.y, m3);
-        // By its largest component first: the squares of huge and tiny loads leave the range of f64.
+        // By its largest component first: the squares of huge and tiny loads leave the range of
+        // f64.
         let most = in_plane.abs().max_element();
         if most / force < NO_LOAD {
             return Err(SeedStatus::NoLoad);
         }
         let length = most * (in_plane / most).length();
         let direction = in_plane / length;
-        let numbers = [length / force, f.z / force, m1 / force, m2 / force, problem.distance / unit];
+        let numbers =
+            [length / force, f.z / force, m1 / force, m2 / force, problem.distance / unit];
         let usable = numbers.iter().all(|x| x.abs() <= RANGE);
         let [scale, f3, m1, m2, distance] = numbers.map(|x| x.clamp(-RANGE, RANGE) as f32);
         let distance = if usable { distance } else { OUT_OF_RANGE };
-        Ok((LoadRecord { wrench: direction.as_vec3().to_array(), scale, f3, m1, m2, distance }, length / force))
+        Ok((
+            LoadRecord { wrench: direction.as_vec3().to_array(), scale, f3, m1, m2, distance },
+            length / force,
+        ))
     }
 
     /// The answer in SI about the grip origin from the search's record and the load's scale.
@@ -180,13 +252,23 @@ impl Prepared {
             BOUNDED => SeedStatus::Bounded,
             COUPLED => SeedStatus::Coupled,
             UNBOUNDED => SeedStatus::Unbounded,
-            other => return Err(Error::Backend(format!("a load came back with status {other}: the kernel did not write it"))),
+            other => {
+                return Err(Error::Backend(format!(
+                    "a load came back with status {other}: the kernel did not write it"
+                )));
+            }
         };
         let [u1, u2, omega] = record.twist.map(f64::from);
         let omega = omega / self.unit;
         let twist = [u1 + omega * self.origin.y, u2 - omega * self.origin.x, omega];
         if status == SeedStatus::Unbounded {
-            return Ok(Seed { status, twist, lower: 0.0, upper: f64::INFINITY, estimate: scale * f64::from(record.lower) });
+            return Ok(Seed {
+                status,
+                twist,
+                lower: 0.0,
+                upper: f64::INFINITY,
+                estimate: scale * f64::from(record.lower),
+            });
         }
         let lower = scale * f64::from(record.lower) * (1.0 - F32_TOLERANCE);
         let upper = scale * f64::from(record.upper) * (1.0 + F32_TOLERANCE);
@@ -207,7 +289,12 @@ pub(crate) struct Chunk {
 
 impl Chunk {
     /// Adds a contact with its loads, in groups. A contact without loads is left out.
-    pub(crate) fn push(&mut self, prepared: &Prepared, loads: impl IntoIterator<Item = Vec<LoadRecord>>, twists: usize) {
+    pub(crate) fn push(
+        &mut self,
+        prepared: &Prepared,
+        loads: impl IntoIterator<Item = Vec<LoadRecord>>,
+        twists: usize,
+    ) {
         let first = self.loads.len();
         for part in loads {
             self.loads.extend(part);
@@ -223,7 +310,12 @@ impl Chunk {
         header.basis = self.basis as u32;
         for start in (first..self.loads.len()).step_by(GROUP) {
             let count = GROUP.min(self.loads.len() - start) as u32;
-            self.groups.push(GroupRecord { contact: self.contacts.len() as u32, first: start as u32, count, padding: 0 });
+            self.groups.push(GroupRecord {
+                contact: self.contacts.len() as u32,
+                first: start as u32,
+                count,
+                padding: 0,
+            });
         }
         self.edges.extend_from_slice(&prepared.edges);
         self.basis += basis_length(&header, twists);

@@ -1,4 +1,5 @@
-//! From seeds to final answers: the bounds decide which loads can be the worst, and only those are solved in f64.
+//! From seeds to final answers: the bounds decide which loads can be the worst, and only those are
+//! solved in f64.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -12,11 +13,13 @@ use super::{Backend, Batch, F32_TOLERANCE, Problem, Seed, SeedSet, SeedStatus};
 use crate::error::Result;
 use crate::mechanics::slip::{self, Field};
 use crate::mechanics::twist_out::TwistOut;
-use crate::mechanics::{Options, Pads, Refiner, Search, Separation, Start, refused, solve_next, solve_pads};
+use crate::mechanics::{
+    Options, Pads, Refiner, Search, Separation, Start, refused, solve_next, solve_pads,
+};
 use crate::model::{Contact, Score, Status};
 
-/// Values of `mu_s` that differ by less than this share count as equal, and the first load is taken as the worst:
-/// answers from different seeds agree better than this.
+/// Values of `mu_s` that differ by less than this share count as equal, and the first load is taken
+/// as the worst: answers from different seeds agree better than this.
 pub(crate) const TIE: f64 = 1e-9;
 
 /// Loads seeded at a time, which bounds the memory whatever the size of the batch.
@@ -46,9 +49,10 @@ pub struct ScoreOptions {
 /// The answer for one grip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scored {
-    /// Index of the worst load and its answer. Of loads without a usable `mu_s` the one with the least margin against
-    /// twisting out ([`TwistOut::margin`]); else the load with the largest `mu_s`. The first of those that tie. `None`
-    /// without loads, and for a grip that is `outranked`.
+    /// Index of the worst load and its answer. Of loads without a usable `mu_s` the one with the
+    /// least margin against twisting out ([`TwistOut::margin`]); else the load with the largest
+    /// `mu_s`. The first of those that tie. `None` without loads, and for a grip that is
+    /// `outranked`.
     pub worst: Option<(usize, Score)>,
     /// Answers of all loads under [`Polish::All`], mostly without [`Score::bounds`]; else empty.
     pub all: Vec<Score>,
@@ -61,20 +65,29 @@ pub struct Scored {
 }
 
 impl Backend {
-    /// Scores every grip under all its loads. The answers agree to 1e-9 whichever backend computed the seeds, and do
-    /// not depend on the number of threads.
+    /// Scores every grip under all its loads. The answers agree to 1e-9 whichever backend computed
+    /// the seeds, and do not depend on the number of threads.
     ///
     /// # Errors
     /// As [`Backend::seed`].
-    pub fn score(&self, batch: &Batch<'_>, seeds: &SeedSet, options: &ScoreOptions) -> Result<Vec<Scored>> {
+    pub fn score(
+        &self,
+        batch: &Batch<'_>,
+        seeds: &SeedSet,
+        options: &ScoreOptions,
+    ) -> Result<Vec<Scored>> {
         self.by_blocks(batch, seeds, |block, found| {
             let problems = &batch.problems[block];
             let pads = DistinctPads::new(problems);
-            pads.cases(problems, &found, options).into_par_iter().map(|case| case.score(None)).collect()
+            pads.cases(problems, &found, options)
+                .into_par_iter()
+                .map(|case| case.score(None))
+                .collect()
         })
     }
 
-    /// Seeds one block of the batch after another. While a block is seeded, the one before is solved.
+    /// Seeds one block of the batch after another. While a block is seeded, the one before is
+    /// solved.
     pub(super) fn by_blocks(
         &self,
         batch: &Batch<'_>,
@@ -85,7 +98,10 @@ impl Backend {
         let mut waiting: Option<(Range<usize>, Vec<Seed>)> = None;
         for block in blocks(&batch.problems) {
             let part = Batch { problems: batch.problems[block.clone()].to_vec() };
-            let (found, before) = rayon::join(|| self.seed(&part, seeds), || waiting.take().map(|(block, seeds)| solve(block, seeds)));
+            let (found, before) = rayon::join(
+                || self.seed(&part, seeds),
+                || waiting.take().map(|(block, seeds)| solve(block, seeds)),
+            );
             scored.extend(before.into_iter().flatten());
             waiting = Some((block, found?));
         }
@@ -134,7 +150,12 @@ impl DistinctPads {
     }
 
     /// Each problem with its contact and its part of the `seeds`.
-    pub(super) fn cases<'a>(&'a self, problems: &'a [Problem<'a>], seeds: &'a [Seed], options: &'a ScoreOptions) -> Vec<Case<'a>> {
+    pub(super) fn cases<'a>(
+        &'a self,
+        problems: &'a [Problem<'a>],
+        seeds: &'a [Seed],
+        options: &'a ScoreOptions,
+    ) -> Vec<Case<'a>> {
         let mut rest = seeds;
         let ready = problems.iter().zip(&self.slots).map(|(problem, &slot)| {
             let (seeds, others) = rest.split_at(problem.wrenches.len());
@@ -160,12 +181,15 @@ impl Case<'_> {
         (0..self.seeds.len()).map(|load| self.lower_of(load)).fold(0.0, f64::max)
     }
 
-    /// The seed's lower bound; without one, what holds for every pressure: no point of a face moves faster than its
-    /// fastest vertex, so `D(v)` is at most `sum N_k max |v|`.
+    /// The seed's lower bound; without one, what holds for every pressure: no point of a face moves
+    /// faster than its fastest vertex, so `D(v)` is at most `sum N_k max |v|`.
     fn lower_of(&self, load: usize) -> f64 {
         let seed = &self.seeds[load];
-        let (SeedStatus::Unbounded, Some(pads)) = (seed.status, self.pads) else { return seed.lower };
-        let load = pads.load(self.problem.distance, self.problem.force, &self.problem.wrenches[load]);
+        let (SeedStatus::Unbounded, Some(pads)) = (seed.status, self.pads) else {
+            return seed.lower;
+        };
+        let load =
+            pads.load(self.problem.distance, self.problem.force, &self.problem.wrenches[load]);
         let bound = |v: Vector3<f64>| {
             let speed = |x: &DVec2| DVec2::new(v.x - v.z * x.y, v.y + v.z * x.x).length_squared();
             let fastest = |k: usize| pads.hulls[k].iter().map(speed).fold(0.0, f64::max).sqrt();
@@ -177,11 +201,15 @@ impl Case<'_> {
         slide.max(turn).max(0.0) * load.size * (1.0 - F32_TOLERANCE)
     }
 
-    /// The grip's worst load. With `beaten`, which says whether a grip is out of the race whose `mu_s` is at least this
-    /// much, it ends without an answer as soon as that is so.
+    /// The grip's worst load. With `beaten`, which says whether a grip is out of the race whose
+    /// `mu_s` is at least this much, it ends without an answer as soon as that is so.
     pub(super) fn score(&self, beaten: Option<&(dyn Fn(f64) -> bool + Sync)>) -> Scored {
         if self.options.polish == Polish::All {
-            let all: Vec<Score> = (0..self.seeds.len()).into_par_iter().with_min_len(8).map(|load| self.solve(load)).collect();
+            let all: Vec<Score> = (0..self.seeds.len())
+                .into_par_iter()
+                .with_min_len(8)
+                .map(|load| self.solve(load))
+                .collect();
             let answers: Vec<(usize, Score)> = all.iter().copied().enumerate().collect();
             let worst = self.settle(self.worst(&answers));
             return Scored { worst, solved: all.len(), compared: 0, all, outranked: false };
@@ -191,11 +219,19 @@ impl Case<'_> {
         if beaten.is_some() && out(self.lower()) {
             return work.outranked();
         }
-        let has_bounds = |load: &usize| matches!(self.seeds[*load].status, SeedStatus::Bounded | SeedStatus::Coupled);
-        let (mut bounded, mut open): (Vec<usize>, Vec<usize>) = (0..self.seeds.len()).partition(has_bounds);
-        // Loads without bounds are solved. One that has no limit state is the worst, whatever the others are (a load with
-        // bounds has one): the nearest to twisting out comes first. In a race the most demanding does.
-        let urgency: Vec<f64> = if beaten.is_some() { open.iter().map(|&load| -self.seeds[load].estimate).collect() } else { self.margins(&open) };
+        let has_bounds = |load: &usize| {
+            matches!(self.seeds[*load].status, SeedStatus::Bounded | SeedStatus::Coupled)
+        };
+        let (mut bounded, mut open): (Vec<usize>, Vec<usize>) =
+            (0..self.seeds.len()).partition(has_bounds);
+        // Loads without bounds are solved. One that has no limit state is the worst, whatever the
+        // others are (a load with bounds has one): the nearest to twisting out comes first. In a
+        // race the most demanding does.
+        let urgency: Vec<f64> = if beaten.is_some() {
+            open.iter().map(|&load| -self.seeds[load].estimate).collect()
+        } else {
+            self.margins(&open)
+        };
         let mut order: Vec<usize> = (0..open.len()).collect();
         order.sort_by(|&a, &b| urgency[a].total_cmp(&urgency[b]).then(a.cmp(&b)));
         open = order.into_iter().map(|place| open[place]).collect();
@@ -209,11 +245,13 @@ impl Case<'_> {
                 return work.outranked();
             }
         }
-        // Then the others by falling upper bound, until none can reach the largest found. For congruent faces the slip
-        // problem alone decides `mu_s`: the seven equations are solved for the worst of them only.
+        // Then the others by falling upper bound, until none can reach the largest found. For
+        // congruent faces the slip problem alone decides `mu_s`: the seven equations are solved for
+        // the worst of them only.
         let floor = bounded.iter().map(|&load| self.seeds[load].lower).fold(largest, f64::max);
         bounded.retain(|&load| self.seeds[load].upper >= floor);
-        bounded.sort_by(|&a, &b| self.seeds[b].upper.total_cmp(&self.seeds[a].upper).then(a.cmp(&b)));
+        bounded
+            .sort_by(|&a, &b| self.seeds[b].upper.total_cmp(&self.seeds[a].upper).then(a.cmp(&b)));
         let mut slips: Vec<(usize, f64)> = Vec::new();
         // Ties with the largest are solved too, so that the first of them is found.
         // Congruent to rounding, not only to the single precision of the part's file.
@@ -240,7 +278,11 @@ impl Case<'_> {
         for (load, mu) in slips {
             let score = work.solve(load);
             // The first of those that tie is the answer.
-            if exact && usable(&score).is_some_and(|found| (found - mu).abs() <= TIE * mu && found >= largest * (1.0 - TIE)) {
+            if exact
+                && usable(&score).is_some_and(|found| {
+                    (found - mu).abs() <= TIE * mu && found >= largest * (1.0 - TIE)
+                })
+            {
                 break;
             }
         }
@@ -253,42 +295,76 @@ impl Case<'_> {
             return Vec::new();
         }
         let lever = TwistOut::new(self.problem.contact);
-        loads.iter().map(|&load| lever.margin(self.problem.force, &self.problem.wrenches[load])).collect()
+        loads
+            .iter()
+            .map(|&load| lever.margin(self.problem.force, &self.problem.wrenches[load]))
+            .collect()
     }
 
     fn options(&self, load: usize, search: Search) -> Options {
         let seed = &self.seeds[load];
-        let searched = matches!(seed.status, SeedStatus::Bounded | SeedStatus::Coupled | SeedStatus::Unbounded);
-        Options { separation: self.options.separation, refiner: self.options.refiner, seed: searched.then_some(seed.twist), search }
+        let searched = matches!(
+            seed.status,
+            SeedStatus::Bounded | SeedStatus::Coupled | SeedStatus::Unbounded
+        );
+        Options {
+            separation: self.options.separation,
+            refiner: self.options.refiner,
+            seed: searched.then_some(seed.twist),
+            search,
+        }
     }
 
     fn full(&self, load: usize, search: Search) -> Score {
         let options = self.options(load, search);
         match self.pads {
-            Some(pads) => solve_pads(pads, self.problem.distance, self.problem.force, &self.problem.wrenches[load], &options),
+            Some(pads) => solve_pads(
+                pads,
+                self.problem.distance,
+                self.problem.force,
+                &self.problem.wrenches[load],
+                &options,
+            ),
             None => refused(Status::NoContact, 0),
         }
     }
 
-    /// Further solutions are looked for where a load seems to have none, and for the worst one in the end.
+    /// Further solutions are looked for where a load seems to have none, and for the worst one in
+    /// the end.
     fn solve(&self, load: usize) -> Score {
         let score = self.full(load, Search::Off);
         if usable(&score).is_some() { score } else { self.full(load, Search::WhereNeeded) }
     }
 
     fn settle(&self, worst: Option<(usize, Score)>) -> Option<(usize, Score)> {
-        worst.map(|(load, score)| (load, if usable(&score).is_some() { self.full(load, Search::WhereNeeded) } else { score }))
+        worst.map(|(load, score)| {
+            (
+                load,
+                if usable(&score).is_some() { self.full(load, Search::WhereNeeded) } else { score },
+            )
+        })
     }
 
     /// The worst of some loads' answers, which come by rising load index.
     fn worst(&self, answers: &[(usize, Score)]) -> Option<(usize, Score)> {
-        let refused: Vec<usize> = answers.iter().filter(|(_, score)| usable(score).is_none()).map(|&(load, _)| load).collect();
-        let least = self.margins(&refused).into_iter().zip(&refused).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(b.1)));
+        let refused: Vec<usize> = answers
+            .iter()
+            .filter(|(_, score)| usable(score).is_none())
+            .map(|&(load, _)| load)
+            .collect();
+        let least = self
+            .margins(&refused)
+            .into_iter()
+            .zip(&refused)
+            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(b.1)));
         if let Some((_, worst)) = least {
             return answers.iter().find(|(load, _)| load == worst).copied();
         }
         let largest = answers.iter().filter_map(|(_, score)| usable(score)).fold(0.0, f64::max);
-        answers.iter().find(|(_, score)| usable(score).is_some_and(|mu| mu >= largest * (1.0 - TIE))).copied()
+        answers
+            .iter()
+            .find(|(_, score)| usable(score).is_some_and(|mu| mu >= largest * (1.0 - TIE)))
+            .copied()
     }
 }
 
@@ -307,14 +383,36 @@ const LIKE: f64 = 0.5;
 impl Work<'_> {
     /// As [`Self::solve`], beginning at the limit state of the load most like this one.
     fn solve_like(&mut self, load: usize) -> Score {
-        let (problem, Some(pads), Refiner::Newton) = (self.case.problem, self.case.pads, self.case.options.refiner) else { return self.solve(load) };
+        let (problem, Some(pads), Refiner::Newton) =
+            (self.case.problem, self.case.pads, self.case.options.refiner)
+        else {
+            return self.solve(load);
+        };
         let wrench = &problem.wrenches[load];
         let scaled = pads.load(problem.distance, problem.force, wrench);
-        let place = [scaled.direction.x, scaled.direction.y, scaled.direction.z, scaled.moment[0], scaled.moment[1], scaled.normal[0]];
+        let place = [
+            scaled.direction.x,
+            scaled.direction.y,
+            scaled.direction.z,
+            scaled.moment[0],
+            scaled.moment[1],
+            scaled.normal[0],
+        ];
         let apart = |other: &[f64; 6]| (0..6).map(|i| (place[i] - other[i]).powi(2)).sum::<f64>();
-        let nearest = self.states.iter().map(|(other, start)| (apart(other), start)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let nearest = self
+            .states
+            .iter()
+            .map(|(other, start)| (apart(other), start))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
         let mut near = nearest.filter(|(apart, _)| *apart < LIKE * LIKE).map(|(_, start)| *start);
-        let score = solve_next(pads, problem.distance, problem.force, wrench, &self.case.options(load, Search::Off), &mut near);
+        let score = solve_next(
+            pads,
+            problem.distance,
+            problem.force,
+            wrench,
+            &self.case.options(load, Search::Off),
+            &mut near,
+        );
         if usable(&score).is_none() {
             return self.solve(load);
         }
@@ -330,7 +428,13 @@ impl Work<'_> {
     }
 
     fn end(self, worst: Option<(usize, Score)>, outranked: bool) -> Scored {
-        Scored { worst, all: Vec::new(), solved: self.solved.len(), compared: self.compared, outranked }
+        Scored {
+            worst,
+            all: Vec::new(),
+            solved: self.solved.len(),
+            compared: self.compared,
+            outranked,
+        }
     }
 
     fn outranked(self) -> Scored {
@@ -354,7 +458,8 @@ impl Work<'_> {
 fn slip_only(pads: &Pads, problem: &Problem<'_>, load: usize, seed: [f64; 3]) -> f64 {
     let load = pads.load(problem.distance, problem.force, &problem.wrenches[load]);
     let field = Field { area: &pads.areas[0], p: [2.0 / pads.moments[0][0], 0.0, 0.0] };
-    slip::solve(&[field], load.direction, Some(pads.scaled_twist(seed)), Refiner::Newton).mu * load.size
+    slip::solve(&[field], load.direction, Some(pads.scaled_twist(seed)), Refiner::Newton).mu
+        * load.size
 }
 
 /// `mu_s` when the load is held.

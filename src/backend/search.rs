@@ -1,10 +1,12 @@
-//! The search for the best twist of each load, in f32: the twin of `shaders/search.wgsl`, same functions in the same
-//! order. There one invocation takes one load; here [`LANES`] loads go side by side through plain loops, which the
-//! compiler turns into vector instructions. No product is fused with a sum, so the instruction set changes no bit.
+//! The search for the best twist of each load, in f32: the twin of `shaders/search.wgsl`, same
+//! functions in the same order. There one invocation takes one load; here [`LANES`] loads go side
+//! by side through plain loops, which the compiler turns into vector instructions. No product is
+//! fused with a sum, so the instruction set changes no bit.
 
 use super::layout::{
-    BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader, DEGENERATE, EdgeRecord, LEAST_DISSIPATION, LEAST_VARIATION, LoadRecord,
-    OUT_OF_RANGE, SeedRecord, TILT_LIMIT, UNBOUNDED,
+    BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader, DEGENERATE,
+    EdgeRecord, LEAST_DISSIPATION, LEAST_VARIATION, LoadRecord, OUT_OF_RANGE, SeedRecord,
+    TILT_LIMIT, UNBOUNDED,
 };
 use super::seeds::{NEGATED, RING};
 use super::table::{CORNER, SLOTS, Table};
@@ -40,7 +42,8 @@ impl Loads {
     #[inline(always)]
     pub(crate) fn new(loads: &[LoadRecord]) -> Self {
         let zero = [0.0; LANES];
-        let mut all = Self { wrench: [zero; 3], scale: zero, f3: zero, m1: zero, m2: zero, distance: zero };
+        let mut all =
+            Self { wrench: [zero; 3], scale: zero, f3: zero, m1: zero, m2: zero, distance: zero };
         for (lane, load) in loads.iter().enumerate().take(LANES) {
             for m in 0..3 {
                 all.wrench[m][lane] = load.wrench[m];
@@ -55,7 +58,8 @@ impl Loads {
     }
 }
 
-/// Pressures at the origin and their common slope: `p_I = at_i + slope.x`, `p_II = at_ii - slope.x`.
+/// Pressures at the origin and their common slope: `p_I = at_i + slope.x`, `p_II = at_ii -
+/// slope.x`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Planes {
     pub(crate) at_i: Lanes,
@@ -85,7 +89,8 @@ fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// `a` where `first`, else `b`; by masks, because a choice becomes a store under a condition, which is slow.
+/// `a` where `first`, else `b`; by masks, because a choice becomes a store under a condition, which
+/// is slow.
 #[inline(always)]
 fn pick(first: bool, a: u32, b: u32) -> u32 {
     let mask = 0_u32.wrapping_sub(u32::from(first));
@@ -98,28 +103,35 @@ fn pick_number(first: bool, a: f32, b: f32) -> f32 {
 }
 
 impl Field<'_> {
-    /// Largest share of the slope, at most 1, that lifts neither pad. A pad lifts where the pressure drops by its mean.
+    /// Largest share of the slope, at most 1, that lifts neither pad. A pad lifts where the
+    /// pressure drops by its mean.
     #[inline(always)]
     fn free_share(&self, mean_i: &Lanes, mean_ii: &Lanes, slope: &[Lanes; 2]) -> Lanes {
         let mut drop = [[0.0; LANES]; 2];
-        for (face, (centroid, sign)) in [(self.header.centroid_i, -1.0), (self.header.centroid_ii, 1.0)].into_iter().enumerate() {
+        for (face, (centroid, sign)) in
+            [(self.header.centroid_i, -1.0), (self.header.centroid_ii, 1.0)].into_iter().enumerate()
+        {
             for edge in self.edges[face] {
                 let (x, y) = (sign * (edge[0] - centroid[0]), sign * (edge[1] - centroid[1]));
                 for lane in 0..LANES {
-                    drop[face][lane] = larger(drop[face][lane], slope[0][lane] * x + slope[1][lane] * y);
+                    drop[face][lane] =
+                        larger(drop[face][lane], slope[0][lane] * x + slope[1][lane] * y);
                 }
             }
         }
         let mut share = [1.0; LANES];
         for lane in 0..LANES {
-            let on_i = if drop[0][lane] > mean_i[lane] { mean_i[lane] / drop[0][lane] } else { 1.0 };
-            let on_ii = if drop[1][lane] > mean_ii[lane] { mean_ii[lane] / drop[1][lane] } else { 1.0 };
+            let on_i =
+                if drop[0][lane] > mean_i[lane] { mean_i[lane] / drop[0][lane] } else { 1.0 };
+            let on_ii =
+                if drop[1][lane] > mean_ii[lane] { mean_ii[lane] / drop[1][lane] } else { 1.0 };
             share[lane] = smaller(on_i, on_ii);
         }
         share
     }
 
-    /// Pressure from force and moment balance without friction in the tilt equations, shortened to full contact.
+    /// Pressure from force and moment balance without friction in the tilt equations, shortened to
+    /// full contact.
     #[inline(always)]
     pub(crate) fn planes(&self, loads: &Loads) -> Planes {
         let header = self.header;
@@ -153,8 +165,8 @@ impl Field<'_> {
         Planes { at_i, at_ii, slope, full }
     }
 
-    /// Whether congruent faces stay in full contact, with a margin, when the body slips with friction `mu` and the
-    /// integrals `g` of a [`Corner`].
+    /// Whether congruent faces stay in full contact, with a margin, when the body slips with
+    /// friction `mu` and the integrals `g` of a [`Corner`].
     #[inline(always)]
     fn full_contact(&self, loads: &Loads, mu: &Lanes, g: &[Lanes; 6]) -> [bool; LANES] {
         let header = self.header;
@@ -163,7 +175,8 @@ impl Field<'_> {
         let (mut slope, mut without, mut drop_i, mut drop_ii) = ([zero; 2], [zero; 2], zero, zero);
         let mut held = [false; LANES];
         for lane in 0..LANES {
-            // Tilt equations (6)(7) about the common centroid: slope = compliance * (moments + coupling * slope).
+            // Tilt equations (6)(7) about the common centroid: slope = compliance * (moments +
+            // coupling * slope).
             let reach = 0.5 * loads.distance[lane] * mu[lane];
             let x11 = 2.0 * reach * (k[0] * g[2][lane] + k[1] * g[3][lane]);
             let x12 = 2.0 * reach * (k[0] * g[4][lane] + k[1] * g[5][lane]);
@@ -190,34 +203,41 @@ impl Field<'_> {
             for lane in 0..LANES {
                 let with = slope[0][lane] * edge[0] + slope[1][lane] * edge[1];
                 let from = without[0][lane] * edge[0] + without[1][lane] * edge[1];
-                held[lane] &= larger(with, from) <= drop_ii[lane] && -smaller(with, from) <= drop_i[lane];
+                held[lane] &=
+                    larger(with, from) <= drop_ii[lane] && -smaller(with, from) <= drop_i[lane];
             }
         }
         held
     }
 
-    /// For different faces: the largest share by which the friction coupling can change the dissipation at any twist,
-    /// or a negative number where that is not known to be small. `upper` bounds `mu_s` without coupling.
+    /// For different faces: the largest share by which the friction coupling can change the
+    /// dissipation at any twist, or a negative number where that is not known to be small. `upper`
+    /// bounds `mu_s` without coupling.
     ///
-    /// Friction moves the slope by at most `softness |d|/2 mu V`, where `V`, the integral of the difference of the two
-    /// pressures over both areas, bounds the difference of the two friction forces over `mu`. `V` is at most its value
-    /// without coupling plus `spread` times the change of slope, and `mu` at most `upper` over 1 less the share. The
-    /// three together are a quadratic equation for the share; its smaller root cannot be left on the way from no
-    /// coupling to all of it.
+    /// Friction moves the slope by at most `softness |d|/2 mu V`, where `V`, the integral of the
+    /// difference of the two pressures over both areas, bounds the difference of the two friction
+    /// forces over `mu`. `V` is at most its value without coupling plus `spread` times the change
+    /// of slope, and `mu` at most `upper` over 1 less the share. The three together are a quadratic
+    /// equation for the share; its smaller root cannot be left on the way from no coupling to all
+    /// of it.
     #[inline(always)]
     fn coupled_share(&self, loads: &Loads, planes: &Planes, upper: &Lanes) -> Lanes {
         let header = self.header;
         let zero = [0.0; LANES];
-        // Largest relative change of pressure at a vertex per change of slope, as the squares of distance and pressure;
-        // and whether every vertex is pressed.
+        // Largest relative change of pressure at a vertex per change of slope, as the squares of
+        // distance and pressure; and whether every vertex is pressed.
         let (mut far, mut pressure, mut pressed) = (zero, [1.0; LANES], planes.full);
-        for (face, (centroid, sign)) in [(header.centroid_i, 1.0), (header.centroid_ii, -1.0)].into_iter().enumerate() {
+        for (face, (centroid, sign)) in
+            [(header.centroid_i, 1.0), (header.centroid_ii, -1.0)].into_iter().enumerate()
+        {
             let at = if face == 0 { &planes.at_i } else { &planes.at_ii };
             for edge in self.edges[face] {
                 let (x, y) = (edge[0] - centroid[0], edge[1] - centroid[1]);
                 let distance = x * x + y * y;
                 for lane in 0..LANES {
-                    let here = at[lane] + sign * (planes.slope[0][lane] * edge[0] + planes.slope[1][lane] * edge[1]);
+                    let here = at[lane]
+                        + sign
+                            * (planes.slope[0][lane] * edge[0] + planes.slope[1][lane] * edge[1]);
                     pressed[lane] &= here > CONTACT_MARGIN * at[lane].abs();
                     let square = here * here;
                     let worse = distance * pressure[lane] > far[lane] * square;
@@ -226,7 +246,8 @@ impl Field<'_> {
                 }
             }
         }
-        let ([q11, q22, q12, q33], [q13, q14, q23, q24]) = (header.variation_first, header.variation_second);
+        let ([q11, q22, q12, q33], [q13, q14, q23, q24]) =
+            (header.variation_first, header.variation_second);
         let [q34, q44] = header.variation_slope;
         let half_area = 0.5 * (header.area_i + header.area_ii);
         let mut shares = [-1.0; LANES];
@@ -234,9 +255,15 @@ impl Field<'_> {
             let mu = loads.scale[lane] * upper[lane];
             let distance = loads.distance[lane];
             let weak = mu * mu * distance * distance <= half_area && distance < OUT_OF_RANGE;
-            let (z1, z2, z3, z4) = (planes.at_i[lane], planes.at_ii[lane], planes.slope[0][lane], planes.slope[1][lane]);
+            let (z1, z2, z3, z4) = (
+                planes.at_i[lane],
+                planes.at_ii[lane],
+                planes.slope[0][lane],
+                planes.slope[1][lane],
+            );
             let square = q11 * z1 * z1 + q22 * z2 * z2 + q33 * z3 * z3 + q44 * z4 * z4;
-            let mixed = z1 * (q12 * z2 + q13 * z3 + q14 * z4) + z2 * (q23 * z3 + q24 * z4) + q34 * z3 * z4;
+            let mixed =
+                z1 * (q12 * z2 + q13 * z3 + q14 * z4) + z2 * (q23 * z3 + q24 * z4) + q34 * z3 * z4;
             let variation = larger(square + 2.0 * mixed, 0.0).sqrt() + LEAST_VARIATION;
             let reach = 0.5 * header.softness * distance.abs() * mu;
             let c = 1.0 - reach * header.spread;
@@ -251,9 +278,15 @@ impl Field<'_> {
 
     /// Bound and interpolated twist of one load from the triangles round its best twist.
     ///
-    /// In each triangle `w = a ga + b gb + c gc` by Cramer's rule; two of its numerators are products with `ga x w`.
+    /// In each triangle `w = a ga + b gb + c gc` by Cramer's rule; two of its numerators are
+    /// products with `ga x w`.
     #[inline(always)]
-    fn ring_of<const PRESSURES: usize>(&self, wrench: [f32; 3], pressures: [f32; PRESSURES], best: usize) -> Corner {
+    fn ring_of<const PRESSURES: usize>(
+        &self,
+        wrench: [f32; 3],
+        pressures: [f32; PRESSURES],
+        best: usize,
+    ) -> Corner {
         let own = self.table.corner(best);
         let sense = if dot(wrench, [own[0], own[1], own[2]]) < 0.0 { -1.0 } else { 1.0 };
         let w = wrench.map(|x| sense * x);
@@ -297,7 +330,11 @@ impl Field<'_> {
         let sum = a[chosen].abs() + b[chosen].abs() + c[chosen].abs();
         if upper < f32::MAX && sum > 0.0 {
             let ring = &self.rings[best];
-            let corners = [(best as u32, a[chosen]), (ring[chosen], b[chosen]), (ring[(chosen + 1) % RING], c[chosen])];
+            let corners = [
+                (best as u32, a[chosen]),
+                (ring[chosen], b[chosen]),
+                (ring[(chosen + 1) % RING], c[chosen]),
+            ];
             for (entry, share) in corners {
                 let share = if entry & NEGATED != 0 { -sense } else { sense } * share / sum;
                 let corner = self.table.corner((entry & !NEGATED) as usize);
@@ -308,13 +345,24 @@ impl Field<'_> {
         }
         let length = dot([mix[0], mix[1], mix[2]], [mix[0], mix[1], mix[2]]).sqrt();
         // Shares of opposite signs can cancel; the best twist itself always is a seed.
-        let twist = if length > 0.5 { [mix[0] / length, mix[1] / length, mix[2] / length] } else { [sense * own[0], sense * own[1], sense * own[2]] };
+        let twist = if length > 0.5 {
+            [mix[0] / length, mix[1] / length, mix[2] / length]
+        } else {
+            [sense * own[0], sense * own[1], sense * own[2]]
+        };
         Corner { twist, upper, g: [mix[3], mix[4], mix[5], mix[6], mix[7], mix[8]] }
     }
 
     /// Records of the loads whose best twists are `best` with the values `value`.
     #[inline(always)]
-    fn finish(&self, loads: &Loads, planes: &Planes, best: &[u32; LANES], value: &Lanes, out: &mut [SeedRecord]) {
+    fn finish(
+        &self,
+        loads: &Loads,
+        planes: &Planes,
+        best: &[u32; LANES],
+        value: &Lanes,
+        out: &mut [SeedRecord],
+    ) {
         let congruent = self.header.faces == 1;
         let mut corners = [Corner::default(); LANES];
         for lane in 0..out.len().min(LANES) {
@@ -323,7 +371,16 @@ impl Field<'_> {
             corners[lane] = if congruent {
                 self.ring_of(w, [planes.at_i[lane] + planes.at_ii[lane]], best)
             } else {
-                self.ring_of(w, [planes.at_i[lane], planes.at_ii[lane], planes.slope[0][lane], planes.slope[1][lane]], best)
+                self.ring_of(
+                    w,
+                    [
+                        planes.at_i[lane],
+                        planes.at_ii[lane],
+                        planes.slope[0][lane],
+                        planes.slope[1][lane],
+                    ],
+                    best,
+                )
             };
         }
         let (mut upper, mut lower, mut status) = ([0.0; LANES], *value, [UNBOUNDED; LANES]);
@@ -342,7 +399,8 @@ impl Field<'_> {
             }
             let held = self.full_contact(loads, &mu, &g);
             for lane in 0..LANES {
-                status[lane] = if held[lane] && upper[lane] < f32::MAX { BOUNDED } else { UNBOUNDED };
+                status[lane] =
+                    if held[lane] && upper[lane] < f32::MAX { BOUNDED } else { UNBOUNDED };
             }
         } else {
             let shares = self.coupled_share(loads, planes, &upper);
@@ -354,7 +412,14 @@ impl Field<'_> {
             }
         }
         for (lane, record) in out.iter_mut().enumerate().take(LANES) {
-            *record = SeedRecord { twist: corners[lane].twist, lower: lower[lane], upper: upper[lane], status: status[lane], best: best[lane], padding: 0 };
+            *record = SeedRecord {
+                twist: corners[lane].twist,
+                lower: lower[lane],
+                upper: upper[lane],
+                status: status[lane],
+                best: best[lane],
+                padding: 0,
+            };
         }
     }
 
@@ -380,7 +445,10 @@ impl Field<'_> {
             for (k, n) in self.table.parts().enumerate() {
                 for lane in 0..LANES {
                     let power = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
-                    let d = planes.at_i[lane] * n[3] + planes.at_ii[lane] * n[4] + planes.slope[0][lane] * n[5] + planes.slope[1][lane] * n[6];
+                    let d = planes.at_i[lane] * n[3]
+                        + planes.at_ii[lane] * n[4]
+                        + planes.slope[0][lane] * n[5]
+                        + planes.slope[1][lane] * n[6];
                     let d = larger(d, LEAST_DISSIPATION);
                     let better = power * least[lane] > value[lane] * d;
                     best[lane] = pick(better, k as u32, best[lane]);

@@ -1,9 +1,10 @@
-//! The fixed set of twists at which the seed stage evaluates every load: vertices of a geodesic sphere.
+//! The fixed set of twists at which the seed stage evaluates every load: vertices of a geodesic
+//! sphere.
 //!
-//! A twist `(u1, u2, omega)` and its negative have the same dissipation, so one of each antipodal pair is kept. The
-//! poles are rotations about the origin of the scaled pad frame, the equator are translations. Twists are ordered by
-//! falling `omega`: neighbours in the array have slip centres at similar distances, so a kernel's near and far
-//! branches diverge in few places.
+//! A twist `(u1, u2, omega)` and its negative have the same dissipation, so one of each antipodal
+//! pair is kept. The poles are rotations about the origin of the scaled pad frame, the equator are
+//! translations. Twists are ordered by falling `omega`: neighbours in the array have slip centres
+//! at similar distances, so a kernel's near and far branches diverge in few places.
 
 use std::collections::HashMap;
 
@@ -12,7 +13,8 @@ use crate::error::{Error, Result};
 /// Set in a [`SeedSet`] ring entry when the neighbour is the negative of the stored twist.
 pub const NEGATED: u32 = 1 << 31;
 
-/// Neighbours of a vertex; the twelve vertices of the icosahedron have five, the last entry then repeats the first.
+/// Neighbours of a vertex; the twelve vertices of the icosahedron have five, the last entry then
+/// repeats the first.
 pub const RING: usize = 6;
 
 /// Twists spread over half of the twist sphere, with their neighbours.
@@ -27,11 +29,12 @@ impl SeedSet {
     /// Largest frequency accepted: 20,481 twists.
     pub const MAX_FREQUENCY: u32 = 64;
 
-    /// The default's frequency. 81 twists: with interpolated seeds and support bounds, finer sets cost more in the
-    /// search than they save in the polish (`benches/RESULTS.md`).
+    /// The default's frequency. 81 twists: with interpolated seeds and support bounds, finer sets
+    /// cost more in the search than they save in the polish (`benches/RESULTS.md`).
     pub const DEFAULT_FREQUENCY: u32 = 4;
 
-    /// The set with every edge of the icosahedron divided into `frequency` parts: `5 frequency^2 + 1` twists.
+    /// The set with every edge of the icosahedron divided into `frequency` parts: `5 frequency^2 +
+    /// 1` twists.
     ///
     /// # Errors
     /// [`Error::Input`] when `frequency` is not in `1..=64`.
@@ -54,7 +57,11 @@ impl SeedSet {
         let largest = 5 * (Self::MAX_FREQUENCY as usize).pow(2) + 1;
         match (1..=Self::MAX_FREQUENCY).find(|&f| 5 * (f as usize).pow(2) + 1 >= count) {
             Some(frequency) if count > 0 => Ok(Self::build(frequency)),
-            _ => Err(Error::input("seed set", format!("{count} twists asked for"), format!("ask for 1 to {largest} twists"))),
+            _ => Err(Error::input(
+                "seed set",
+                format!("{count} twists asked for"),
+                format!("ask for 1 to {largest} twists"),
+            )),
         }
     }
 
@@ -78,16 +85,19 @@ impl SeedSet {
         &self.twists
     }
 
-    /// For each twist its neighbours in cyclic order: index into [`Self::twists`], with [`NEGATED`] set where the
-    /// neighbour is the stored twist's negative. Triangles of the sphere at twist `k` are `(k, ring[i], ring[i + 1])`.
+    /// For each twist its neighbours in cyclic order: index into [`Self::twists`], with [`NEGATED`]
+    /// set where the neighbour is the stored twist's negative. Triangles of the sphere at twist `k`
+    /// are `(k, ring[i], ring[i + 1])`.
     pub fn rings(&self) -> &[[u32; RING]] {
         &self.rings
     }
 
     fn build(frequency: u32) -> Self {
         let (points, triangles) = geodesic_sphere(frequency);
-        let index_of: HashMap<[i64; 3], usize> = points.iter().enumerate().map(|(i, &p)| (key(p), i)).collect();
-        let mut kept: Vec<usize> = (0..points.len()).filter(|&i| is_representative(points[i])).collect();
+        let index_of: HashMap<[i64; 3], usize> =
+            points.iter().enumerate().map(|(i, &p)| (key(p), i)).collect();
+        let mut kept: Vec<usize> =
+            (0..points.len()).filter(|&i| is_representative(points[i])).collect();
         kept.sort_by(|&a, &b| points[b][2].total_cmp(&points[a][2]).then(a.cmp(&b)));
         // Where each vertex of the whole sphere is found among the kept ones.
         let mut entry = vec![0_u32; points.len()];
@@ -104,8 +114,15 @@ impl SeedSet {
             followers[b].push((c, a));
             followers[c].push((a, b));
         }
-        let rings = kept.iter().map(|&vertex| ring(&followers[vertex]).map(|neighbour| entry[neighbour])).collect();
-        let twists = kept.iter().map(|&vertex| points[vertex].map(|x| x as f32)).map(|[x, y, z]| [x, y, z, 0.0]).collect();
+        let rings = kept
+            .iter()
+            .map(|&vertex| ring(&followers[vertex]).map(|neighbour| entry[neighbour]))
+            .collect();
+        let twists = kept
+            .iter()
+            .map(|&vertex| points[vertex].map(|x| x as f32))
+            .map(|[x, y, z]| [x, y, z, 0.0])
+            .collect();
         Self { frequency, twists, rings }
     }
 }
@@ -116,7 +133,8 @@ impl Default for SeedSet {
     }
 }
 
-/// One of `p` and `-p`: that with positive `omega`, on the equator that with positive `u2`, then `u1`.
+/// One of `p` and `-p`: that with positive `omega`, on the equator that with positive `u2`, then
+/// `u1`.
 fn is_representative([x, y, z]: [f64; 3]) -> bool {
     z > 0.0 || z == 0.0 && (y > 0.0 || y == 0.0 && x > 0.0)
 }
@@ -131,13 +149,14 @@ fn ring(followers: &[(usize, usize)]) -> [usize; RING] {
     ring
 }
 
-/// Coordinates rounded to 1e-6: equal for the copies of one vertex (they differ by rounding, ~1e-16), different for
-/// neighbours (at least 0.01 apart up to the largest frequency).
+/// Coordinates rounded to 1e-6: equal for the copies of one vertex (they differ by rounding,
+/// ~1e-16), different for neighbours (at least 0.01 apart up to the largest frequency).
 fn key(p: [f64; 3]) -> [i64; 3] {
     p.map(|x| (x * 1e6).round() as i64)
 }
 
-/// Vertices and outward triangles of the icosahedron with each face divided into `frequency^2` triangles (class I).
+/// Vertices and outward triangles of the icosahedron with each face divided into `frequency^2`
+/// triangles (class I).
 fn geodesic_sphere(frequency: u32) -> (Vec<[f64; 3]>, Vec<[usize; 3]>) {
     let phi = (1.0 + 5.0_f64.sqrt()) / 2.0;
     let mut corners: Vec<[f64; 3]> = Vec::with_capacity(12);
@@ -152,7 +171,8 @@ fn geodesic_sphere(frequency: u32) -> (Vec<[f64; 3]>, Vec<[usize; 3]>) {
     let mut index_of: HashMap<[i64; 3], usize> = HashMap::new();
     let mut vertex = |p: [f64; 3]| {
         let length = dot(p, p).sqrt();
-        // A coordinate that is zero but for rounding becomes zero: translations shall be exactly that.
+        // A coordinate that is zero but for rounding becomes zero: translations shall be exactly
+        // that.
         let p = p.map(|x| if (x / length).abs() < 1e-12 { 0.0 } else { x / length });
         *index_of.entry(key(p)).or_insert_with(|| {
             points.push(p);
@@ -165,7 +185,12 @@ fn geodesic_sphere(frequency: u32) -> (Vec<[f64; 3]>, Vec<[usize; 3]>) {
             for k in 0..12 {
                 let (a, b, c) = (corners[i], corners[j], corners[k]);
                 let first_of_cycle = i < j && i < k;
-                if !(first_of_cycle && adjacent(a, b) && adjacent(b, c) && adjacent(c, a) && dot(cross(a, b), c) > 0.0) {
+                if !(first_of_cycle
+                    && adjacent(a, b)
+                    && adjacent(b, c)
+                    && adjacent(c, a)
+                    && dot(cross(a, b), c) > 0.0)
+                {
                     continue;
                 }
                 let mut at = |s: usize, t: usize| {
@@ -206,15 +231,23 @@ mod tests {
             assert!(set.twists().is_sorted_by(|a, b| a[2] >= b[2]));
             let mut corners = 0;
             for (k, ring) in set.rings().iter().enumerate() {
-                let twist = |e: u32| set.twists()[(e & !NEGATED) as usize].map(|x| if e & NEGATED != 0 { -x } else { x });
+                let twist = |e: u32| {
+                    set.twists()[(e & !NEGATED) as usize]
+                        .map(|x| if e & NEGATED != 0 { -x } else { x })
+                };
                 let here = set.twists()[k];
                 assert!((here.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < 1e-6);
                 let valence = if ring[5] == ring[0] { 5 } else { 6 };
                 corners += usize::from(valence == 5);
                 for i in 0..valence {
                     let (a, b) = (twist(ring[i]), twist(ring[(i + 1) % valence]));
-                    let volume = here[0] * (a[1] * b[2] - a[2] * b[1]) + here[1] * (a[2] * b[0] - a[0] * b[2]) + here[2] * (a[0] * b[1] - a[1] * b[0]);
-                    assert!(volume > 0.0, "frequency {frequency}, twist {k}: ring not counter-clockwise");
+                    let volume = here[0] * (a[1] * b[2] - a[2] * b[1])
+                        + here[1] * (a[2] * b[0] - a[0] * b[2])
+                        + here[2] * (a[0] * b[1] - a[1] * b[0]);
+                    assert!(
+                        volume > 0.0,
+                        "frequency {frequency}, twist {k}: ring not counter-clockwise"
+                    );
                 }
             }
             assert_eq!(corners, 6, "half of the icosahedron's corners");

@@ -1,4 +1,5 @@
-//! What the processor's search reads of one contact for every load, laid out for it: a view of the gradient basis.
+//! What the processor's search reads of one contact for every load, laid out for it: a view of the
+//! gradient basis.
 
 use super::fan::{basis_far, basis_near, is_near};
 use super::layout::{BASIS, ContactHeader, EdgeRecord};
@@ -33,7 +34,8 @@ impl Table {
             [basis[first], basis[first + 1], basis[first + 2], basis[first + 3]]
         };
         let congruent = header.faces == 1;
-        // Gradients for a unit of each number that the pressure has: those of faces in common, or at_i, at_ii, slope.
+        // Gradients for a unit of each number that the pressure has: those of faces in common, or
+        // at_i, at_ii, slope.
         let gradients = |k: usize| -> [[f32; 4]; 4] {
             if congruent {
                 return [at(0, k, 0), [0.0; 4], [0.0; 4], [0.0; 4]];
@@ -47,8 +49,12 @@ impl Table {
         let pressures = if congruent { 1 } else { 4 };
         let ring_length = pressures * 3 * SLOTS;
         let mean = 2.0 / header.area_i;
-        let mut table =
-            Self { ring_length, parts: Vec::with_capacity(count * PARTS), rings: vec![0.0; count * ring_length], corners: vec![0.0; count * CORNER] };
+        let mut table = Self {
+            ring_length,
+            parts: Vec::with_capacity(count * PARTS),
+            rings: vec![0.0; count * ring_length],
+            corners: vec![0.0; count * CORNER],
+        };
         for (k, v) in seeds.twists().iter().enumerate() {
             let g = gradients(k);
             if congruent {
@@ -58,7 +64,8 @@ impl Table {
                 table.parts.extend([v[0], v[1], v[2], g[0][3], g[1][3], g[2][3], g[3][3], 0.0]);
             }
             let (one, x1, x2) = (at(0, k, 0), at(0, k, 1), at(0, k, 2));
-            table.corners[k * CORNER..k * CORNER + 9].copy_from_slice(&[v[0], v[1], v[2], one[0], one[1], x1[0], x1[1], x2[0], x2[1]]);
+            table.corners[k * CORNER..k * CORNER + 9]
+                .copy_from_slice(&[v[0], v[1], v[2], one[0], one[1], x1[0], x1[1], x2[0], x2[1]]);
             let ring = &mut table.rings[k * ring_length..(k + 1) * ring_length];
             let around = &seeds.rings()[k];
             for slot in 0..SLOTS {
@@ -75,8 +82,8 @@ impl Table {
         table
     }
 
-    /// For each twist what gives its value. Congruent faces: the twist over its dissipation (3). Otherwise: the twist
-    /// (3), and the dissipation for a unit of `at_i`, `at_ii`, `slope` (4).
+    /// For each twist what gives its value. Congruent faces: the twist over its dissipation (3).
+    /// Otherwise: the twist (3), and the dissipation for a unit of `at_i`, `at_ii`, `slope` (4).
     #[inline(always)]
     pub(crate) fn parts(&self) -> impl Iterator<Item = &[f32; PARTS]> {
         self.parts.as_chunks().0.iter()
@@ -88,15 +95,17 @@ impl Table {
         &self.rings[twist * self.ring_length..(twist + 1) * self.ring_length]
     }
 
-    /// A twist (3) and the first two components of its gradients on face I for the weights `1, x1, x2` (6).
+    /// A twist (3) and the first two components of its gradients on face I for the weights `1, x1,
+    /// x2` (6).
     #[inline(always)]
     pub(crate) fn corner(&self, twist: usize) -> &[f32] {
         &self.corners[twist * CORNER..(twist + 1) * CORNER]
     }
 }
 
-/// The gradient basis of one contact at every twist, as the GPU's kernel writes it: `[face][twist][weight]`, and in each
-/// the components `g1, g2, torque` and their product with the twist.
+/// The gradient basis of one contact at every twist, as the GPU's kernel writes it:
+/// `[face][twist][weight]`, and in each the components `g1, g2, torque` and their product with the
+/// twist.
 fn contact_basis(header: &ContactHeader, edges: [&[EdgeRecord]; 2], seeds: &SeedSet) -> Vec<f32> {
     let mut out = Vec::with_capacity(header.faces as usize * seeds.len() * BASIS * 4);
     let mut push = |v: &[f32; 4], g: [f32; 9]| {
@@ -106,13 +115,15 @@ fn contact_basis(header: &ContactHeader, edges: [&[EdgeRecord]; 2], seeds: &Seed
     };
     // Twists come by falling rotation: the near ones first.
     let twists = seeds.twists();
-    let (near, far) = twists.split_at(twists.partition_point(|v| is_near(header.radius, [v[0], v[1], v[2]])));
+    let (near, far) =
+        twists.split_at(twists.partition_point(|v| is_near(header.radius, [v[0], v[1], v[2]])));
     for edges in &edges[..header.faces as usize] {
         for v in near {
             push(v, basis_near(edges, [v[0], v[1], v[2]]));
         }
         for some in far.chunks(FAR_LANES) {
-            let v = [0, 1, 2].map(|m| std::array::from_fn(|lane| some[lane.min(some.len() - 1)][m]));
+            let v =
+                [0, 1, 2].map(|m| std::array::from_fn(|lane| some[lane.min(some.len() - 1)][m]));
             let g = far_widest(edges, &v);
             for (lane, v) in some.iter().enumerate() {
                 push(v, g.map(|g| g[lane]));
@@ -125,11 +136,15 @@ fn contact_basis(header: &ContactHeader, edges: [&[EdgeRecord]; 2], seeds: &Seed
 /// Far twists integrated side by side.
 const FAR_LANES: usize = 8;
 
-/// [`basis_far`] with the widest vectors that the processor has; the same operations in the same order.
+/// [`basis_far`] with the widest vectors that the processor has; the same operations in the same
+/// order.
 fn far_widest(edges: &[EdgeRecord], v: &[[f32; FAR_LANES]; 3]) -> [[f32; FAR_LANES]; 9] {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
-        #[allow(unsafe_code, reason = "twice the speed of the baseline's vectors; the feature was just detected")]
+        #[allow(
+            unsafe_code,
+            reason = "twice the speed of the baseline's vectors; the feature was just detected"
+        )]
         // SAFETY: the function needs AVX2, which this processor has.
         return unsafe { far_avx2(edges, v) };
     }

@@ -1,4 +1,5 @@
-//! A race for the best grips: those whose bounds show that they cannot be among them are not solved to the end.
+//! A race for the best grips: those whose bounds show that they cannot be among them are not solved
+//! to the end.
 
 use rayon::prelude::*;
 
@@ -6,11 +7,12 @@ use super::score::{Case, DistinctPads, usable};
 use super::{Backend, Batch, ScoreOptions, Scored, SeedSet};
 use crate::error::Result;
 
-/// A merit this share below that of the last of the best still counts as one of them: far above what answers from
-/// different seeds differ by, and what counts as a tie in the order of the grips.
+/// A merit this share below that of the last of the best still counts as one of them: far above
+/// what answers from different seeds differ by, and what counts as a tie in the order of the grips.
 const MARGIN: f64 = 1e-6;
 
-/// Grips solved before the merits found are looked at again: few at first, when most is learnt from each, then more.
+/// Grips solved before the merits found are looked at again: few at first, when most is learnt from
+/// each, then more.
 const ROUNDS: std::ops::RangeInclusive<usize> = 64..=1024;
 
 /// The merits of the best grips so far, over any number of batches.
@@ -36,17 +38,19 @@ impl Best {
 
     /// Whether a grip with no more than this merit is surely not among the best.
     pub fn beats(&self, merit: f64) -> bool {
-        self.merits.len() == self.keep && self.merits.last().is_some_and(|&last| merit < last - MARGIN * last.abs())
+        self.merits.len() == self.keep
+            && self.merits.last().is_some_and(|&last| merit < last - MARGIN * last.abs())
     }
 }
 
 impl Backend {
-    /// As [`Backend::score`] under [`super::Polish::Worst`], but grips that cannot be among the `best` are left
-    /// unsolved ([`Scored::outranked`]). `merit` values a grip (by its place in the batch) by the `mu_s` of its worst
-    /// load, and must not rise with it. The most promising grips of a batch are solved first.
+    /// As [`Backend::score`] under [`super::Polish::Worst`], but grips that cannot be among the
+    /// `best` are left unsolved ([`Scored::outranked`]). `merit` values a grip (by its place in the
+    /// batch) by the `mu_s` of its worst load, and must not rise with it. The most promising grips
+    /// of a batch are solved first.
     ///
-    /// The best grips and their answers are those of [`Backend::score`]. How many others are solved too depends
-    /// on how the grips are cut into batches, not on the number of threads.
+    /// The best grips and their answers are those of [`Backend::score`]. How many others are solved
+    /// too depends on how the grips are cut into batches, not on the number of threads.
     ///
     /// # Errors
     /// As [`Backend::seed`].
@@ -67,15 +71,26 @@ impl Backend {
     }
 }
 
-fn race(cases: &[Case<'_>], best: &mut Best, merit: &(dyn Fn(usize, f64) -> f64 + Sync)) -> Vec<Scored> {
-    let mut order: Vec<(f64, usize)> = cases.par_iter().enumerate().map(|(index, case)| (merit(index, case.lower()), index)).collect();
+fn race(
+    cases: &[Case<'_>],
+    best: &mut Best,
+    merit: &(dyn Fn(usize, f64) -> f64 + Sync),
+) -> Vec<Scored> {
+    let mut order: Vec<(f64, usize)> = cases
+        .par_iter()
+        .enumerate()
+        .map(|(index, case)| (merit(index, case.lower()), index))
+        .collect();
     order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     let mut scored: Vec<Option<Scored>> = vec![None; cases.len()];
     let (mut rest, mut round) = (order.as_slice(), *ROUNDS.start());
     while !rest.is_empty() {
         let (now, later) = rest.split_at(round.min(rest.len()));
         let known = &*best;
-        let answers: Vec<Scored> = now.par_iter().map(|&(_, index)| cases[index].score(Some(&|mu| known.beats(merit(index, mu))))).collect();
+        let answers: Vec<Scored> = now
+            .par_iter()
+            .map(|&(_, index)| cases[index].score(Some(&|mu| known.beats(merit(index, mu)))))
+            .collect();
         for (&(_, index), answer) in now.iter().zip(answers) {
             if let Some(mu) = answer.worst.as_ref().and_then(|(_, score)| usable(score)) {
                 best.insert(merit(index, mu));
@@ -98,7 +113,12 @@ mod tests {
             assert!(!best.beats(0.0));
             best.insert(merit);
         }
-        assert!(best.beats(0.5) && !best.beats(1.0 - 1e-9) && !best.beats(1.0) && !best.beats(f64::INFINITY));
+        assert!(
+            best.beats(0.5)
+                && !best.beats(1.0 - 1e-9)
+                && !best.beats(1.0)
+                && !best.beats(f64::INFINITY)
+        );
         best.insert(4.0);
         assert!(best.beats(2.9) && !best.beats(3.0));
         best.insert(2.0);

@@ -5,10 +5,12 @@ use gripfast::backend::{Choice, SeedSet, Selection, select};
 
 #[derive(Debug, ClapArgs)]
 pub(crate) struct BackendArgs {
-    /// Where slip twists are searched: auto, cpu or gpu. gpu without a graphics processor is an error; the answers are the same.
+    /// Where slip twists are searched: auto, cpu or gpu. gpu without a graphics processor is an
+    /// error; the answers are the same.
     #[arg(long, default_value = "auto", value_name = "auto|cpu|gpu")]
     pub(crate) backend: Choice,
-    /// Graphics adapter, by its number or part of its name as `gripfast devices` lists them [default: GRIPFAST_ADAPTER].
+    /// Graphics adapter, by its number or part of its name as `gripfast devices` lists them
+    /// [default: GRIPFAST_ADAPTER].
     #[arg(long, value_name = "NAME|INDEX")]
     pub(crate) adapter: Option<String>,
     /// Slip twists tried for each load before the exact solver, at least.

@@ -7,17 +7,22 @@ use std::time::{Duration, Instant};
 
 use clap::Args as ClapArgs;
 use glam::{DVec2, DVec3};
-use gripfast::backend::{Backend, Batch, Choice, Polish, Problem, ScoreOptions, Scored, Seed, SeedSet, SeedStatus};
+use gripfast::backend::{
+    Backend, Batch, Choice, Polish, Problem, ScoreOptions, Scored, Seed, SeedSet, SeedStatus,
+};
 use gripfast::load::sphere;
 use gripfast::model::{Contact, Polygon, Wrench};
 use serde_json::json;
 
 use super::backend::{self, BackendArgs};
 
-/// Measures seed evaluations, exact solves and scored grips per second, and checks the GPU against the processor.
+/// Measures seed evaluations, exact solves and scored grips per second, and checks the GPU against
+/// the processor.
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "EXAMPLES:\n  gripfast bench\n  gripfast bench --backend gpu --json\n  gripfast bench --backend cpu --seconds 3 --seeds 321\n\n\
-Times include upload and readback. Each workload runs once to warm up, then until the time is over. A software adapter is checked, its times mean nothing.")]
+#[command(
+    after_help = "EXAMPLES:\n  gripfast bench\n  gripfast bench --backend gpu --json\n  gripfast bench --backend cpu --seconds 3 --seeds 321\n\n\
+Times include upload and readback. Each workload runs once to warm up, then until the time is over. A software adapter is checked, its times mean nothing."
+)]
 pub(crate) struct Args {
     #[command(flatten)]
     backend: BackendArgs,
@@ -64,7 +69,16 @@ enum Task {
 impl Workload {
     fn batch(&self) -> Batch<'_> {
         let pairs = self.contacts.iter().zip(&self.wrenches);
-        Batch { problems: pairs.map(|(contact, wrenches)| Problem { contact, distance: self.distance, force: self.force, wrenches }).collect() }
+        Batch {
+            problems: pairs
+                .map(|(contact, wrenches)| Problem {
+                    contact,
+                    distance: self.distance,
+                    force: self.force,
+                    wrenches,
+                })
+                .collect(),
+        }
     }
 
     fn loads(&self) -> usize {
@@ -81,14 +95,21 @@ struct Measured {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    anyhow::ensure!(args.seconds.is_finite() && args.seconds > 0.0, "--seconds {}: give a positive number", args.seconds);
+    anyhow::ensure!(
+        args.seconds.is_finite() && args.seconds > 0.0,
+        "--seconds {}: give a positive number",
+        args.seconds
+    );
     backend::use_threads(args.threads)?;
     let selection = args.backend.select()?;
     let set = args.backend.seed_set()?;
     let backends: Vec<Backend> = match selection.backend {
         Backend::Cpu => vec![Backend::Cpu],
         // The processor first: the GPU is checked against it.
-        #[allow(unreachable_patterns, reason = "the only backend of a build without the feature `gpu`")]
+        #[allow(
+            unreachable_patterns,
+            reason = "the only backend of a build without the feature `gpu`"
+        )]
         other => vec![Backend::Cpu, other],
     };
     let software = is_software(&backends);
@@ -100,11 +121,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     for workload in workloads(args.grips as usize, args.loads as usize) {
         let mut first: Option<Measured> = None;
         for backend in &backends {
-            let measured = measure(backend, &workload, &set, Duration::from_secs_f64(args.seconds))?;
+            let measured =
+                measure(backend, &workload, &set, Duration::from_secs_f64(args.seconds))?;
             let check = first.as_ref().map(|first| compare(first, &measured));
             agreed &= check.as_ref().is_none_or(|check| check.is_ok());
             let solved: usize = measured.scored.iter().map(|scored| scored.solved).sum();
-            let per_second = |count: usize| count as f64 * f64::from(measured.runs) / measured.seconds;
+            let per_second =
+                |count: usize| count as f64 * f64::from(measured.runs) / measured.seconds;
             rows.push(json!({
                 "workload": workload.name,
                 "what": workload.what,
@@ -144,9 +167,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             "agrees",
         ]);
         for row in &rows {
-            let number = |key: &str| row[key].as_f64().map_or_else(String::new, |value| format!("{value:.3e}"));
+            let number = |key: &str| {
+                row[key].as_f64().map_or_else(String::new, |value| format!("{value:.3e}"))
+            };
             let agrees = match (&row["agrees_with_cpu"], &row["difference"]) {
-                (serde_json::Value::Bool(true), most) => format!("to {:.0e}", most.as_f64().unwrap_or(0.0)),
+                (serde_json::Value::Bool(true), most) => {
+                    format!("to {:.0e}", most.as_f64().unwrap_or(0.0))
+                }
                 (serde_json::Value::Bool(false), why) => format!("NO: {why}"),
                 _ => String::new(),
             };
@@ -164,7 +191,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         writeln!(out, "{}", table.to_string().trim_end())?;
         writeln!(out, "{threads} threads, {} twists", set.len())?;
         if software {
-            writeln!(out, "the adapter is software: its answers are checked, its times mean nothing")?;
+            writeln!(
+                out,
+                "the adapter is software: its answers are checked, its times mean nothing"
+            )?;
         }
     }
     anyhow::ensure!(agreed, "the backends disagree");
@@ -181,13 +211,22 @@ fn is_software(_: &[Backend]) -> bool {
     false
 }
 
-/// Runs once to warm up, then until `least` has passed. Both backends return when the answers are in memory.
-fn measure(backend: &Backend, workload: &Workload, set: &SeedSet, least: Duration) -> anyhow::Result<Measured> {
+/// Runs once to warm up, then until `least` has passed. Both backends return when the answers are
+/// in memory.
+fn measure(
+    backend: &Backend,
+    workload: &Workload,
+    set: &SeedSet,
+    least: Duration,
+) -> anyhow::Result<Measured> {
     let batch = workload.batch();
     let once = || -> anyhow::Result<(Vec<Seed>, Vec<Scored>)> {
         Ok(match workload.task {
             Task::Seed => (backend.seed(&batch, set)?, Vec::new()),
-            Task::Score(polish) => (Vec::new(), backend.score(&batch, set, &ScoreOptions { polish, ..ScoreOptions::default() })?),
+            Task::Score(polish) => (
+                Vec::new(),
+                backend.score(&batch, set, &ScoreOptions { polish, ..ScoreOptions::default() })?,
+            ),
         })
     };
     let (seeds, scored) = once()?;
@@ -217,8 +256,15 @@ fn compare(a: &Measured, b: &Measured) -> Result<f64, String> {
     for (i, (x, y)) in a.scored.iter().zip(&b.scored).enumerate() {
         let (Some((load_x, x)), Some((load_y, y))) = (x.worst, y.worst) else { continue };
         let difference = x.mu_s.zip(y.mu_s).map_or(0.0, |(x, y)| relative(x, y));
-        if load_x != load_y || x.status != y.status || difference.is_nan() || difference > ANSWER_TOLERANCE {
-            return Err(format!("grip {i}: load {load_x} {:?} and load {load_y} {:?}", x.mu_s, y.mu_s));
+        if load_x != load_y
+            || x.status != y.status
+            || difference.is_nan()
+            || difference > ANSWER_TOLERANCE
+        {
+            return Err(format!(
+                "grip {i}: load {load_x} {:?} and load {load_y} {:?}",
+                x.mu_s, y.mu_s
+            ));
         }
         most = most.max(difference);
     }
@@ -228,7 +274,13 @@ fn compare(a: &Measured, b: &Measured) -> Result<f64, String> {
 /// A rectangle's corners; `cut` takes one corner off, as the edge of a face does.
 fn pad(centre: DVec2, cut: f64) -> Polygon {
     let (a, b) = (0.011, 0.01);
-    let mut outer = vec![DVec2::new(-a, -b), DVec2::new(a, -b), DVec2::new(a, b - cut), DVec2::new(a - cut, b), DVec2::new(-a, b)];
+    let mut outer = vec![
+        DVec2::new(-a, -b),
+        DVec2::new(a, -b),
+        DVec2::new(a, b - cut),
+        DVec2::new(a - cut, b),
+        DVec2::new(-a, b),
+    ];
     if cut == 0.0 {
         outer.remove(3);
     }
@@ -237,9 +289,17 @@ fn pad(centre: DVec2, cut: f64) -> Polygon {
 
 fn workloads(grips: usize, loads: usize) -> Vec<Workload> {
     let directions = sphere::directions(loads);
-    let ball = |point: DVec3| -> Vec<Wrench> { directions.iter().map(|&force| Wrench { force, moment: point.cross(force) }).collect() };
+    let ball = |point: DVec3| -> Vec<Wrench> {
+        directions.iter().map(|&force| Wrench { force, moment: point.cross(force) }).collect()
+    };
     // Grips spread over a part: the centre of mass lies elsewhere in each.
-    let point = |i: usize| DVec3::new(0.02 * (i as f64 * 0.618).fract(), 0.02 * (i as f64 * 0.755).fract(), 0.004 * (i as f64 * 0.57).fract());
+    let point = |i: usize| {
+        DVec3::new(
+            0.02 * (i as f64 * 0.618).fract(),
+            0.02 * (i as f64 * 0.755).fract(),
+            0.004 * (i as f64 * 0.57).fract(),
+        )
+    };
     let shared = |count: usize| {
         let face = vec![pad(DVec2::ZERO, 0.0)];
         let contact = Arc::new(Contact { face_i: face.clone(), face_ii: face });
@@ -248,7 +308,12 @@ fn workloads(grips: usize, loads: usize) -> Vec<Workload> {
     let own = |count: usize, same: bool| -> Vec<Arc<Contact>> {
         let cut = |i: usize| 0.001 + 0.006 * (i as f64 * 0.618).fract();
         (0..count)
-            .map(|i| Arc::new(Contact { face_i: vec![pad(DVec2::ZERO, cut(i))], face_ii: vec![pad(DVec2::ZERO, cut(if same { i } else { i + 1 }))] }))
+            .map(|i| {
+                Arc::new(Contact {
+                    face_i: vec![pad(DVec2::ZERO, cut(i))],
+                    face_ii: vec![pad(DVec2::ZERO, cut(if same { i } else { i + 1 }))],
+                })
+            })
             .collect()
     };
     let workload = |name, what, contacts: Vec<Arc<Contact>>, task| {
@@ -258,10 +323,35 @@ fn workloads(grips: usize, loads: usize) -> Vec<Workload> {
     vec![
         workload("seed_shared", "seeds, pads wholly on the faces", shared(grips), Task::Seed),
         workload("seed_own", "seeds, a contact for each grip", own(grips, true), Task::Seed),
-        workload("seed_different", "seeds, different areas on the faces", own(grips, false), Task::Seed),
-        workload("score_shared", "worst load, pads wholly on the faces", shared(grips), Task::Score(Polish::Worst)),
-        workload("score_own", "worst load, a contact for each grip", own(grips, true), Task::Score(Polish::Worst)),
-        workload("score_different", "worst load, different areas", own((grips / 20).max(1), false), Task::Score(Polish::Worst)),
-        workload("solve_all", "every load exactly, pads wholly on the faces", shared((grips / 20).max(1)), Task::Score(Polish::All)),
+        workload(
+            "seed_different",
+            "seeds, different areas on the faces",
+            own(grips, false),
+            Task::Seed,
+        ),
+        workload(
+            "score_shared",
+            "worst load, pads wholly on the faces",
+            shared(grips),
+            Task::Score(Polish::Worst),
+        ),
+        workload(
+            "score_own",
+            "worst load, a contact for each grip",
+            own(grips, true),
+            Task::Score(Polish::Worst),
+        ),
+        workload(
+            "score_different",
+            "worst load, different areas",
+            own((grips / 20).max(1), false),
+            Task::Score(Polish::Worst),
+        ),
+        workload(
+            "solve_all",
+            "every load exactly, pads wholly on the faces",
+            shared((grips / 20).max(1)),
+            Task::Score(Polish::All),
+        ),
     ]
 }

@@ -18,7 +18,8 @@ pub(crate) struct CandidateArgs {
     /// Step of the approach angle.
     #[arg(long, default_value = "15deg")]
     angle_step: String,
-    /// Smallest contact area on either face, as a share of the most that the face pair allows (pad or overlap).
+    /// Smallest contact area on either face, as a share of the most that the face pair allows (pad
+    /// or overlap).
     #[arg(long, default_value_t = 0.25, value_name = "SHARE")]
     min_contact: f64,
     /// Largest distance of the grip from the centre of mass.
@@ -30,16 +31,19 @@ pub(crate) struct CandidateArgs {
     /// The gripper must stay above this plane, e.g. +z:0mm (normal and height, part frame).
     #[arg(long, value_name = "DIR:HEIGHT", allow_hyphen_values = true)]
     ground: Option<String>,
-    /// Box that the gripper must not enter: x,y,z:x,y,z with units, e.g. 0mm,0mm,0mm:10mm,20mm,5mm; may be repeated.
+    /// Box that the gripper must not enter: x,y,z:x,y,z with units, e.g. 0mm,0mm,0mm:10mm,20mm,5mm;
+    /// may be repeated.
     #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
     keep_out: Vec<String>,
     /// Only these planar faces, e.g. 0,1,4 (see `gripfast part`).
     #[arg(long, value_delimiter = ',', value_name = "FACES")]
     faces: Option<Vec<u32>>,
-    /// Only planar faces that lie wholly in this box, and those of --faces: x,y,z:x,y,z with units; may be repeated.
+    /// Only planar faces that lie wholly in this box, and those of --faces: x,y,z:x,y,z with units;
+    /// may be repeated.
     #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
     faces_in: Vec<String>,
-    /// Grips that close on the part from outside, that open in a slot or bore (needs a gripper with outer pads), or both.
+    /// Grips that close on the part from outside, that open in a slot or bore (needs a gripper with
+    /// outer pads), or both.
     #[arg(long, value_enum, default_value = "outside")]
     grips: Side,
     /// List each grip with exchanged jaws as well.
@@ -68,12 +72,24 @@ impl CandidateArgs {
             spacing: self.spacing.as_deref().map(|text| length("--spacing", text)).transpose()?,
             angle_step: Quantity::Angle.parse("--angle-step", &self.angle_step)?,
             min_contact: self.min_contact,
-            max_offset: self.max_offset.as_deref().map(|text| length("--max-offset", text)).transpose()?,
+            max_offset: self
+                .max_offset
+                .as_deref()
+                .map(|text| length("--max-offset", text))
+                .transpose()?,
             approach_cone: self.approach.as_deref().map(cone).transpose()?,
             ground: self.ground.as_deref().map(ground).transpose()?,
-            keep_out: self.keep_out.iter().map(|text| corners("--keep-out", text)).collect::<Result<_>>()?,
+            keep_out: self
+                .keep_out
+                .iter()
+                .map(|text| corners("--keep-out", text))
+                .collect::<Result<_>>()?,
             faces: self.faces.clone(),
-            faces_in: self.faces_in.iter().map(|text| corners("--faces-in", text)).collect::<Result<_>>()?,
+            faces_in: self
+                .faces_in
+                .iter()
+                .map(|text| corners("--faces-in", text))
+                .collect::<Result<_>>()?,
             outside: self.grips != Side::Inside,
             inside: self.grips != Side::Outside,
             flips: self.flips,
@@ -89,7 +105,10 @@ impl CandidateArgs {
     }
 
     /// The settings that decide what is proposed, for the result file.
-    pub(crate) fn settings(options: &ProposeOptions, gripper: &Gripper) -> Vec<(&'static str, serde_json::Value)> {
+    pub(crate) fn settings(
+        options: &ProposeOptions,
+        gripper: &Gripper,
+    ) -> Vec<(&'static str, serde_json::Value)> {
         vec![
             ("spacing_m", options.spacing(gripper).into()),
             ("angle_step_rad", options.angle_step.into()),
@@ -100,8 +119,20 @@ impl CandidateArgs {
             ("flips", options.flips.into()),
             ("outside", options.outside.into()),
             ("inside", options.inside.into()),
-            ("approach_cone", options.approach_cone.map(|cone| json!({"axis": cone.axis, "half_angle_rad": cone.half_angle})).into()),
-            ("ground", options.ground.map(|ground| json!({"normal": ground.normal, "height_m": ground.offset})).into()),
+            (
+                "approach_cone",
+                options
+                    .approach_cone
+                    .map(|cone| json!({"axis": cone.axis, "half_angle_rad": cone.half_angle}))
+                    .into(),
+            ),
+            (
+                "ground",
+                options
+                    .ground
+                    .map(|ground| json!({"normal": ground.normal, "height_m": ground.offset}))
+                    .into(),
+            ),
             ("keep_out_m", json!(options.keep_out)),
             ("faces", json!(options.faces)),
             ("faces_in_m", json!(options.faces_in)),
@@ -125,8 +156,12 @@ impl CandidateArgs {
             clearance: number("clearance_m").unwrap_or(defaults.clearance),
             outside: value("outside").as_bool().unwrap_or(defaults.outside),
             inside: value("inside").as_bool().unwrap_or(defaults.inside),
-            approach_cone: vector(&cone["axis"]).zip(cone["half_angle_rad"].as_f64()).map(|(axis, half_angle)| Cone { axis, half_angle }),
-            ground: vector(&ground["normal"]).zip(ground["height_m"].as_f64()).map(|(normal, offset)| Ground { normal, offset }),
+            approach_cone: vector(&cone["axis"])
+                .zip(cone["half_angle_rad"].as_f64())
+                .map(|(axis, half_angle)| Cone { axis, half_angle }),
+            ground: vector(&ground["normal"])
+                .zip(ground["height_m"].as_f64())
+                .map(|(normal, offset)| Ground { normal, offset }),
             keep_out: boxes("keep_out_m"),
             faces: serde_json::from_value(value("faces").clone()).unwrap_or_default(),
             faces_in: boxes("faces_in_m"),
@@ -147,33 +182,53 @@ pub(crate) fn direction(flag: &str, text: &str) -> Result<DVec3> {
         _ => None,
     };
     let numbers = || {
-        let numbers: Vec<f64> = text.split('/').map(str::parse).collect::<std::result::Result<_, _>>().ok()?;
+        let numbers: Vec<f64> =
+            text.split('/').map(str::parse).collect::<std::result::Result<_, _>>().ok()?;
         let vector = DVec3::from_array(numbers.try_into().ok()?);
         (vector.is_finite() && vector.length() > 0.0).then_some(vector)
     };
-    axis(text).or_else(numbers).ok_or_else(|| Error::input(flag, format!("'{text}' is no direction"), "give +x, -z, ... or three numbers such as 0/0.5/-1"))
+    axis(text).or_else(numbers).ok_or_else(|| {
+        Error::input(
+            flag,
+            format!("'{text}' is no direction"),
+            "give +x, -z, ... or three numbers such as 0/0.5/-1",
+        )
+    })
 }
 
 fn two<'a>(flag: &str, text: &'a str, shape: &str) -> Result<(&'a str, &'a str)> {
-    text.split_once(':').ok_or_else(|| Error::input(flag, format!("'{text}' has no colon"), format!("give {shape}")))
+    text.split_once(':').ok_or_else(|| {
+        Error::input(flag, format!("'{text}' has no colon"), format!("give {shape}"))
+    })
 }
 
 fn cone(text: &str) -> Result<Cone> {
     let (axis, angle) = two("--approach", text, "DIR:ANGLE, e.g. -z:45deg")?;
-    Ok(Cone { axis: direction("--approach", axis)?, half_angle: Quantity::Angle.parse("--approach", angle)? })
+    Ok(Cone {
+        axis: direction("--approach", axis)?,
+        half_angle: Quantity::Angle.parse("--approach", angle)?,
+    })
 }
 
 fn ground(text: &str) -> Result<Ground> {
     let (normal, height) = two("--ground", text, "DIR:HEIGHT, e.g. +z:0mm")?;
-    Ok(Ground { normal: direction("--ground", normal)?, offset: Quantity::Length.parse("--ground", height)? })
+    Ok(Ground {
+        normal: direction("--ground", normal)?,
+        offset: Quantity::Length.parse("--ground", height)?,
+    })
 }
 
 /// Smallest and largest corner of a box.
 fn corners(flag: &str, text: &str) -> Result<[DVec3; 2]> {
     let (low, high) = two(flag, text, "LOW:HIGH, e.g. 0mm,0mm,0mm:10mm,20mm,5mm")?;
     let corner = |text: &str| -> Result<DVec3> {
-        let values: Vec<f64> = text.split(',').map(|value| Quantity::Length.parse(flag, value)).collect::<Result<_>>()?;
-        let values: [f64; 3] = values.try_into().map_err(|_| Error::input(flag, format!("'{text}' is not three lengths"), "give x,y,z with units"))?;
+        let values: Vec<f64> = text
+            .split(',')
+            .map(|value| Quantity::Length.parse(flag, value))
+            .collect::<Result<_>>()?;
+        let values: [f64; 3] = values.try_into().map_err(|_| {
+            Error::input(flag, format!("'{text}' is not three lengths"), "give x,y,z with units")
+        })?;
         Ok(DVec3::from_array(values))
     };
     Ok([corner(low)?, corner(high)?])

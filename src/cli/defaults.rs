@@ -1,4 +1,5 @@
-//! `gripfast.toml`: a project's own defaults, one table for each subcommand, keys named as the flags.
+//! `gripfast.toml`: a project's own defaults, one table for each subcommand, keys named as the
+//! flags.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -9,26 +10,48 @@ use clap::Command;
 /// Name of the file, looked for in the current folder.
 pub(crate) const FILE: &str = "gripfast.toml";
 
-/// The command line with the file's flags put right after the subcommand, where flags given by the user override them.
-pub(crate) fn apply(command: &Command, arguments: Vec<OsString>, file: &Path) -> anyhow::Result<Vec<OsString>> {
+/// The command line with the file's flags put right after the subcommand, where flags given by the
+/// user override them.
+pub(crate) fn apply(
+    command: &Command,
+    arguments: Vec<OsString>,
+    file: &Path,
+) -> anyhow::Result<Vec<OsString>> {
     let text = match std::fs::read_to_string(file) {
         Ok(text) => text,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(arguments),
-        Err(error) => return Err(error).with_context(|| format!("{}: cannot read", file.display())),
+        Err(error) => {
+            return Err(error).with_context(|| format!("{}: cannot read", file.display()));
+        }
     };
-    let table: toml::Table = text.parse().map_err(|error| anyhow::anyhow!("{}: {error}", file.display()))?;
+    let table: toml::Table =
+        text.parse().map_err(|error| anyhow::anyhow!("{}: {error}", file.display()))?;
     for name in table.keys() {
         if command.find_subcommand(name).is_none() {
             let known: Vec<_> = command.get_subcommands().map(Command::get_name).collect();
-            bail!("{}: [{name}] is no subcommand; use one of: {}", file.display(), known.join(", "));
+            bail!(
+                "{}: [{name}] is no subcommand; use one of: {}",
+                file.display(),
+                known.join(", ")
+            );
         }
     }
-    let Some(place) = arguments.iter().skip(1).position(|argument| !argument.to_string_lossy().starts_with('-')).map(|index| index + 1) else {
+    let Some(place) = arguments
+        .iter()
+        .skip(1)
+        .position(|argument| !argument.to_string_lossy().starts_with('-'))
+        .map(|index| index + 1)
+    else {
         return Ok(arguments);
     };
     let name = arguments[place].to_string_lossy().into_owned();
-    let (Some(subcommand), Some(defaults)) = (command.find_subcommand(&name), table.get(&name)) else { return Ok(arguments) };
-    let Some(defaults) = defaults.as_table() else { bail!("{}: [{name}] is not a table", file.display()) };
+    let (Some(subcommand), Some(defaults)) = (command.find_subcommand(&name), table.get(&name))
+    else {
+        return Ok(arguments);
+    };
+    let Some(defaults) = defaults.as_table() else {
+        bail!("{}: [{name}] is not a table", file.display())
+    };
     let mut flags = Vec::new();
     for (key, value) in defaults {
         let at = || format!("{}: [{name}] {key}", file.display());
@@ -63,13 +86,21 @@ mod tests {
         let file = folder.path().join(FILE);
         std::fs::write(&file, text)?;
         let line = line.split(' ').map(OsString::from).collect();
-        Ok(apply(&super::super::Cli::command(), line, &file)?.into_iter().map(|part| part.to_string_lossy().into_owned()).collect())
+        Ok(apply(&super::super::Cli::command(), line, &file)?
+            .into_iter()
+            .map(|part| part.to_string_lossy().into_owned())
+            .collect())
     }
 
     #[test]
     fn flags_of_the_file_stand_before_those_of_the_user() {
-        let got = applied("[solve]\njson = true\nsafety = 2\n", "gripfast solve case.json --safety 3").unwrap();
-        assert_eq!(got, ["gripfast", "solve", "--json", "--safety=2", "case.json", "--safety", "3"]);
+        let got =
+            applied("[solve]\njson = true\nsafety = 2\n", "gripfast solve case.json --safety 3")
+                .unwrap();
+        assert_eq!(
+            got,
+            ["gripfast", "solve", "--json", "--safety=2", "case.json", "--safety", "3"]
+        );
         use clap::Parser;
         assert!(super::super::Cli::try_parse_from(got).is_ok());
     }
@@ -78,12 +109,24 @@ mod tests {
     fn a_list_repeats_its_flag() {
         let got = applied("[plan]\nkeep-out = [\"a\", \"b\"]\n", "gripfast plan x").unwrap();
         assert_eq!(got, ["gripfast", "plan", "--keep-out=a", "--keep-out=b", "x"]);
-        assert!(applied("[plan]\nkeep-out = [[1]]\n", "gripfast plan x").unwrap_err().to_string().contains("keep-out"));
+        assert!(
+            applied("[plan]\nkeep-out = [[1]]\n", "gripfast plan x")
+                .unwrap_err()
+                .to_string()
+                .contains("keep-out")
+        );
     }
 
     #[test]
     fn unknown_keys_are_refused_by_name() {
-        assert!(applied("[solve]\nfrce = 1\n", "gripfast solve x").unwrap_err().to_string().contains("frce"));
-        assert!(applied("[slove]\n", "gripfast solve x").unwrap_err().to_string().contains("slove"));
+        assert!(
+            applied("[solve]\nfrce = 1\n", "gripfast solve x")
+                .unwrap_err()
+                .to_string()
+                .contains("frce")
+        );
+        assert!(
+            applied("[slove]\n", "gripfast solve x").unwrap_err().to_string().contains("slove")
+        );
     }
 }

@@ -7,8 +7,10 @@ use clap::Args as ClapArgs;
 
 /// Lists the graphics adapters: number, name, driver, type, limits.
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "EXAMPLES:\n  gripfast devices\n  gripfast devices --json\n  WGPU_BACKEND=vulkan gripfast devices\n\n\
-`--backend auto` and `gpu` take the first discrete, integrated or virtual GPU; a software adapter only when `--adapter` or GRIPFAST_ADAPTER names it.")]
+#[command(
+    after_help = "EXAMPLES:\n  gripfast devices\n  gripfast devices --json\n  WGPU_BACKEND=vulkan gripfast devices\n\n\
+`--backend auto` and `gpu` take the first discrete, integrated or virtual GPU; a software adapter only when `--adapter` or GRIPFAST_ADAPTER names it."
+)]
 pub(crate) struct Args {
     /// A JSON list on standard output.
     #[arg(long)]
@@ -27,7 +29,16 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     } else {
         let mut table = comfy_table::Table::new();
         table.load_style(comfy_table::presets::NOTHING);
-        table.set_header(["", "name", "type", "interface", "driver", "largest binding", "workgroup", "taken by auto"]);
+        table.set_header([
+            "",
+            "name",
+            "type",
+            "interface",
+            "driver",
+            "largest binding",
+            "workgroup",
+            "taken by auto",
+        ]);
         for adapter in &adapters {
             table.add_row([
                 adapter.index.to_string(),
@@ -36,7 +47,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
                 adapter.api.clone(),
                 adapter.driver.clone(),
                 format!("{} MiB", adapter.max_binding >> 20),
-                format!("{} lanes, {} KiB", adapter.max_invocations, adapter.workgroup_memory >> 10),
+                format!(
+                    "{} lanes, {} KiB",
+                    adapter.max_invocations,
+                    adapter.workgroup_memory >> 10
+                ),
                 if adapter.counts_as_gpu { "yes" } else { "no: software" }.to_owned(),
             ]);
         }
@@ -47,7 +62,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 #[cfg(not(feature = "gpu"))]
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let text = if args.json { "[]" } else { "this build has no GPU support (cargo feature `gpu`); everything runs on the processor" };
+    let text = if args.json {
+        "[]"
+    } else {
+        "this build has no GPU support (cargo feature `gpu`); everything runs on the processor"
+    };
     writeln!(std::io::stdout().lock(), "{text}")?;
     Ok(ExitCode::from(1))
 }

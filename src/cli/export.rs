@@ -15,10 +15,12 @@ pub(crate) const GLB_TOP: usize = 10;
 
 /// Writes a result file in the format of another program.
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "EXAMPLES:\n  gripfast export grips.json -o grips.csv\n  gripfast export grips.json -o grips.npz --top 1000\n  \
+#[command(
+    after_help = "EXAMPLES:\n  gripfast export grips.json -o grips.csv\n  gripfast export grips.json -o grips.npz --top 1000\n  \
 gripfast export grips.json --format isaac_grasp -o grips.yaml --joint panda_finger_joint1:0.5 --origin 103.4mm\n  \
 gripfast export grips.json --format moveit -o - --origin flange\n\nFORMATS (docs/formats.md describes each field):\n  \
-json, jsonl   native          csv, parquet  a table\n  isaac_grasp   YAML            graspgen      JSON\n  moveit        YAML            graspnet      .npz\n  acronym       HDF5            glb           part with grippers, to look at")]
+json, jsonl   native          csv, parquet  a table\n  isaac_grasp   YAML            graspgen      JSON\n  moveit        YAML            graspnet      .npz\n  acronym       HDF5            glb           part with grippers, to look at"
+)]
 pub(crate) struct Args {
     /// Result file written by `gripfast plan -o`, JSON or JSON Lines.
     grips: PathBuf,
@@ -28,12 +30,13 @@ pub(crate) struct Args {
     /// File to write; `-` is standard output.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Axes of the tool frame: standard, moveit (z approach, y closing), graspgen (z, x), graspnet, dexnet (x, y),
-    /// flange or tool (as the gripper file states them).
-    /// The format's own when not given.
+    /// Axes of the tool frame: standard, moveit (z approach, y closing), graspgen (z, x), graspnet,
+    /// dexnet (x, y), flange or tool (as the gripper file states them). The format's own when not
+    /// given.
     #[arg(long, value_name = "NAME")]
     convention: Option<String>,
-    /// Origin of the tool frame: pads (midway between them), flange, tool, or a distance behind the pads.
+    /// Origin of the tool frame: pads (midway between them), flange, tool, or a distance behind the
+    /// pads.
     #[arg(long, value_name = "ORIGIN", default_value = "pads")]
     origin: String,
     /// Write only the best N (glb: 10 when not given).
@@ -42,11 +45,12 @@ pub(crate) struct Args {
     /// Distance of the pads before closing; as planned when not given.
     #[arg(long, value_name = "LENGTH")]
     opening: Option<String>,
-    /// A joint of the gripper as NAME:SCALE:OFFSET, position = SCALE x distance of the pads in metres + OFFSET
-    /// (isaac_grasp, moveit). Give it once for each joint.
+    /// A joint of the gripper as NAME:SCALE:OFFSET, position = SCALE x distance of the pads in
+    /// metres + OFFSET (isaac_grasp, moveit). Give it once for each joint.
     #[arg(long, value_name = "JOINT", allow_hyphen_values = true)]
     joint: Vec<String>,
-    /// Friction of the pads on the part, for formats that hold pass or fail; the gripper's when not given.
+    /// Friction of the pads on the part, for formats that hold pass or fail; the gripper's when not
+    /// given.
     #[arg(long, value_name = "MU")]
     pad_friction: Option<f64>,
     /// Straight way of approach and retreat (moveit).
@@ -65,24 +69,44 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let to_stdout = args.output.as_os_str() == "-";
     let format = match &args.format {
         Some(name) => Format::parse("--format", name)?,
-        None if to_stdout => anyhow::bail!(gripfast::error::Error::input("-o -", "standard output has no ending that names a format", "add --format")),
+        None if to_stdout => anyhow::bail!(gripfast::error::Error::input(
+            "-o -",
+            "standard output has no ending that names a format",
+            "add --format"
+        )),
         None => Format::from_path(&args.output)?,
     };
     let length = |place: &str, text: &str| -> anyhow::Result<f64> {
         let value = Quantity::Length.parse(place, text)?;
         if value < 0.0 {
-            anyhow::bail!(gripfast::error::Error::input(place, format!("'{text}' is negative"), "give a length of zero or more"));
+            anyhow::bail!(gripfast::error::Error::input(
+                place,
+                format!("'{text}' is negative"),
+                "give a length of zero or more"
+            ));
         }
         Ok(value)
     };
     if let Some(friction) = args.pad_friction
         && !(friction.is_finite() && friction >= 0.0)
     {
-        anyhow::bail!(gripfast::error::Error::input("--pad-friction", format!("{friction} is no friction coefficient"), "give a number of zero or more"));
+        anyhow::bail!(gripfast::error::Error::input(
+            "--pad-friction",
+            format!("{friction} is no friction coefficient"),
+            "give a number of zero or more"
+        ));
     }
-    let joints = args.joint.iter().map(|text| Joint::parse("--joint", text)).collect::<Result<Vec<_>, _>>()?;
+    let joints = args
+        .joint
+        .iter()
+        .map(|text| Joint::parse("--joint", text))
+        .collect::<Result<Vec<_>, _>>()?;
     let options = Options {
-        convention: args.convention.as_deref().map(|name| Convention::parse("--convention", name)).transpose()?,
+        convention: args
+            .convention
+            .as_deref()
+            .map(|name| Convention::parse("--convention", name))
+            .transpose()?,
         origin: Origin::parse("--origin", &args.origin)?,
         top: args.top.or((format == Format::Glb).then_some(GLB_TOP)),
         opening: args.opening.as_deref().map(|text| length("--opening", text)).transpose()?,
@@ -92,7 +116,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         part_frame: args.part_frame,
     };
     let set = GripSet::read(&args.grips)?;
-    let part = if format == Format::Glb { Some(read_part(&set, &args.grips, args.part.as_deref())?) } else { None };
+    let part = if format == Format::Glb {
+        Some(read_part(&set, &args.grips, args.part.as_deref())?)
+    } else {
+        None
+    };
     let mesh = part.as_ref().map(|part| &part.mesh);
     if to_stdout {
         let mut output = std::io::stdout();
@@ -106,8 +134,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The part of a result: the file given, or the one named in it, from the working folder or beside the result file.
-pub(crate) fn read_part(set: &GripSet, result: &Path, given: Option<&Path>) -> anyhow::Result<Part> {
+/// The part of a result: the file given, or the one named in it, from the working folder or beside
+/// the result file.
+pub(crate) fn read_part(
+    set: &GripSet,
+    result: &Path,
+    given: Option<&Path>,
+) -> anyhow::Result<Part> {
     let named = Path::new(&set.part.file);
     let beside = result.parent().map(|folder| folder.join(named));
     let path = match given {
@@ -122,6 +155,7 @@ pub(crate) fn read_part(set: &GripSet, result: &Path, given: Option<&Path>) -> a
             )),
         },
     };
-    let unit = Unit::ALL.into_iter().find(|unit| (unit.metres() / set.part.unit_m - 1.0).abs() < 1e-9);
+    let unit =
+        Unit::ALL.into_iter().find(|unit| (unit.metres() / set.part.unit_m - 1.0).abs() < 1e-9);
     Ok(Part::read(&path, &ReadOptions { unit })?)
 }

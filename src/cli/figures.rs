@@ -9,7 +9,8 @@ use clap::Args as ClapArgs;
 use gripfast::error::Error;
 use gripfast::{file, report};
 
-/// Draws the figures of the paper behind the mechanics, computed anew, as SVG with their numbers as CSV.
+/// Draws the figures of the paper behind the mechanics, computed anew, as SVG with their numbers as
+/// CSV.
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "EXAMPLES:\n  gripfast figures\n  gripfast figures -o docs/figures\n\n\
 figure4    the line of separation turns with the moment about the closing axis\n\
@@ -24,7 +25,8 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    std::fs::create_dir_all(&args.output).map_err(|error| Error::io(&args.output, "make the folder", error))?;
+    std::fs::create_dir_all(&args.output)
+        .map_err(|error| Error::io(&args.output, "make the folder", error))?;
     let mut out = std::io::stdout().lock();
     for figure in report::figures::all()? {
         let drawing = args.output.join(figure.name).with_extension("svg");
@@ -37,7 +39,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         let bytes = csv.into_inner().context("table")?;
         file::write(&table, |writer| writer.write_all(&bytes))?;
-        writeln!(out, "{}\n  {}\n  {}  {}", figure.title, figure.finding, drawing.display(), table.display())?;
+        writeln!(
+            out,
+            "{}\n  {}\n  {}  {}",
+            figure.title,
+            figure.finding,
+            drawing.display(),
+            table.display()
+        )?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -12,8 +12,10 @@ use gripfast::gripper::{self, Body, Gripper, Shape, catalogue, check, drawing};
 
 /// Lists, prints and checks grippers.
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "EXAMPLES:\n  gripfast gripper list\n  gripfast gripper show generic > my-gripper.toml\n  \
-gripfast gripper check my-gripper.toml --svg my-gripper.svg\n\nThe file is described in docs/gripper-file.md.")]
+#[command(
+    after_help = "EXAMPLES:\n  gripfast gripper list\n  gripfast gripper show generic > my-gripper.toml\n  \
+gripfast gripper check my-gripper.toml --svg my-gripper.svg\n\nThe file is described in docs/gripper-file.md."
+)]
 pub(crate) struct Args {
     #[command(subcommand)]
     action: Action,
@@ -31,7 +33,9 @@ enum Action {
         gripper: String,
     },
     /// Reads a gripper, prints its dimensions with their sources, and warns of what is doubtful.
-    #[command(after_help = "EXAMPLES:\n  gripfast gripper check robotiq-2f85\n  gripfast gripper check my-gripper.toml --svg my-gripper.svg")]
+    #[command(
+        after_help = "EXAMPLES:\n  gripfast gripper check robotiq-2f85\n  gripfast gripper check my-gripper.toml --svg my-gripper.svg"
+    )]
     Check {
         /// Shipped name or gripper file.
         gripper: String,
@@ -59,7 +63,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 fn list() -> anyhow::Result<()> {
-    let mut table = new_table(&["gripper", "name", "stroke", "force", "pad x1 x x2", "friction", "unverified"]);
+    let mut table =
+        new_table(&["gripper", "name", "stroke", "force", "pad x1 x x2", "friction", "unverified"]);
     for (short, _) in catalogue::CATALOGUE {
         let gripper = gripper::find(short)?;
         let pad = Bounds2::of(&gripper.pad).size() * 1e3;
@@ -75,40 +80,57 @@ fn list() -> anyhow::Result<()> {
         ]);
     }
     println!("{table}");
-    println!("`gripfast gripper check NAME` says where each value comes from; unverified ones are estimates.");
+    println!(
+        "`gripfast gripper check NAME` says where each value comes from; unverified ones are estimates."
+    );
     Ok(())
 }
 
 fn describe(gripper: &Gripper) -> String {
     let mut table = new_table(&["dimension", "value", "source"]);
     let mut row = |key: String, value: String| {
-        let source = gripper
-            .sources
-            .get(&key)
-            .map_or("no source given".to_string(), |source| if source.verified { source.text.clone() } else { format!("UNVERIFIED: {}", source.text) });
+        let source = gripper.sources.get(&key).map_or("no source given".to_string(), |source| {
+            if source.verified {
+                source.text.clone()
+            } else {
+                format!("UNVERIFIED: {}", source.text)
+            }
+        });
         table.add_row([key, value, source]);
     };
     row("stroke".into(), range(gripper.stroke, 1e3, "mm"));
     row("force".into(), range(gripper.force, 1.0, "N"));
     let pad = Bounds2::of(&gripper.pad).size() * 1e3;
-    row("pad.size".into(), format!("{} x {} mm (x1, x2)", short_number(pad.x), short_number(pad.y)));
+    row(
+        "pad.size".into(),
+        format!("{} x {} mm (x1, x2)", short_number(pad.x), short_number(pad.y)),
+    );
     if let Some(value) = gripper.pad_thickness {
         row("pad.thickness".into(), format!("{} mm", short_number(value * 1e3)));
     }
     if let Some(value) = gripper.pad_modulus {
         row("pad.modulus".into(), format!("{} MPa", short_number(value * 1e-6)));
     }
-    row("pad.friction".into(), gripper.pad_friction.map_or("not stated".into(), |value| value.to_string()));
+    row(
+        "pad.friction".into(),
+        gripper.pad_friction.map_or("not stated".into(), |value| value.to_string()),
+    );
     for (table, bodies) in [("finger", &gripper.fingers), ("palm", &gripper.palm)] {
         for body in bodies {
             row(format!("{table}.{}", body.name), body_text(body));
         }
     }
     if let Some(frame) = gripper.grip_from_flange {
-        row("flange".into(), format!("{} mm behind the pads' middle", short_number(-frame.origin.x * 1e3)));
+        row(
+            "flange".into(),
+            format!("{} mm behind the pads' middle", short_number(-frame.origin.x * 1e3)),
+        );
     }
-    let throat = check::throat(gripper).map_or(String::new(), |throat| format!("\nthroat (pad's rear edge to palm): {} mm", short_number(throat * 1e3)));
-    let warnings: Vec<String> = gripper::check(gripper).iter().map(|warning| format!("\nwarning: {warning}")).collect();
+    let throat = check::throat(gripper).map_or(String::new(), |throat| {
+        format!("\nthroat (pad's rear edge to palm): {} mm", short_number(throat * 1e3))
+    });
+    let warnings: Vec<String> =
+        gripper::check(gripper).iter().map(|warning| format!("\nwarning: {warning}")).collect();
     format!("{}\n{table}{throat}{}", gripper.name, warnings.concat())
 }
 
@@ -135,6 +157,9 @@ fn short_number(value: f64) -> String {
 
 fn new_table(header: &[&str]) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_FULL_CONDENSED).set_content_arrangement(comfy_table::ContentArrangement::Dynamic).set_header(header.to_vec());
+    table
+        .load_style(presets::UTF8_FULL_CONDENSED)
+        .set_content_arrangement(comfy_table::ContentArrangement::Dynamic)
+        .set_header(header.to_vec());
     table
 }

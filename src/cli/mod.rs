@@ -22,12 +22,15 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
-/// Finds and ranks every two-finger grip on a CAD part by the smallest friction coefficient that holds it.
+/// Finds and ranks every two-finger grip on a CAD part by the smallest friction coefficient that
+/// holds it.
 #[derive(Debug, Parser)]
 #[command(name = "gripfast", version, about, propagate_version = true, args_override_self = true)]
-#[command(after_help = "EXAMPLES:\n  gripfast plan bracket.stl --gripper robotiq-2f85 --mass 350g --accel 2g -o grips.json --report bracket.html\n  \
+#[command(
+    after_help = "EXAMPLES:\n  gripfast plan bracket.stl --gripper robotiq-2f85 --mass 350g --accel 2g -o grips.json --report bracket.html\n  \
 gripfast why grips.json 962\n  gripfast export grips.json -o grips.csv\n  gripfast pick grips.json --scene cell.toml\n\nEXIT CODES:\n  0  done    1  done, but nothing found    2  bad input, bad usage or a failed run\n\n\
-PROJECT DEFAULTS:\n  A file gripfast.toml in the current folder sets flags, one table for each subcommand, e.g.\n    [plan]\n    gripper = \"robotiq-2f85\"\n    mass = \"350g\"")]
+PROJECT DEFAULTS:\n  A file gripfast.toml in the current folder sets flags, one table for each subcommand, e.g.\n    [plan]\n    gripper = \"robotiq-2f85\"\n    mass = \"350g\""
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -54,22 +57,23 @@ enum Command {
 /// Parses the command line and runs the subcommand.
 pub(crate) fn main() -> ExitCode {
     let outcome =
-        defaults::apply(&Cli::command(), std::env::args_os().collect(), Path::new(defaults::FILE)).and_then(|line| match Cli::parse_from(line).command {
-            Command::Part(args) => part::run(args),
-            Command::Plan(args) => plan::run(*args),
-            Command::Solve(args) => solve::run(args),
-            Command::Why(args) => why::run(args),
-            Command::Score(args) => score::run(args),
-            Command::Devices(args) => devices::run(args),
-            Command::Bench(args) => bench::run(args),
-            Command::Report(args) => report::run(args),
-            Command::Gripper(args) => gripper::run(args),
-            Command::Figures(args) => figures::run(args),
-            Command::Export(args) => export::run(args),
-            Command::Pick(args) => pick::run(args),
-            Command::Completions(args) => shell::completions(args),
-            Command::Man(args) => shell::man(args),
-        });
+        defaults::apply(&Cli::command(), std::env::args_os().collect(), Path::new(defaults::FILE))
+            .and_then(|line| match Cli::parse_from(line).command {
+                Command::Part(args) => part::run(args),
+                Command::Plan(args) => plan::run(*args),
+                Command::Solve(args) => solve::run(args),
+                Command::Why(args) => why::run(args),
+                Command::Score(args) => score::run(args),
+                Command::Devices(args) => devices::run(args),
+                Command::Bench(args) => bench::run(args),
+                Command::Report(args) => report::run(args),
+                Command::Gripper(args) => gripper::run(args),
+                Command::Figures(args) => figures::run(args),
+                Command::Export(args) => export::run(args),
+                Command::Pick(args) => pick::run(args),
+                Command::Completions(args) => shell::completions(args),
+                Command::Man(args) => shell::man(args),
+            });
     match outcome {
         Ok(code) => code,
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
@@ -82,7 +86,9 @@ pub(crate) fn main() -> ExitCode {
 
 /// The error with its causes, without those that it already names.
 fn message(error: &anyhow::Error) -> String {
-    error.chain().skip(1).map(ToString::to_string).fold(error.to_string(), |text, cause| if text.contains(&cause) { text } else { format!("{text}: {cause}") })
+    error.chain().skip(1).map(ToString::to_string).fold(error.to_string(), |text, cause| {
+        if text.contains(&cause) { text } else { format!("{text}: {cause}") }
+    })
 }
 
 /// Whether the reader of our output has gone (`gripfast .. | head`): no failure of ours.

@@ -12,7 +12,8 @@ use gripfast::part::{FacePair, Part, PlanarFace, ReadOptions, Unit, drawing};
 use gripfast::units::Quantity;
 use serde_json::json;
 
-/// Reads a part, checks its mesh, and lists its planar faces and the pairs of them that can be gripped.
+/// Reads a part, checks its mesh, and lists its planar faces and the pairs of them that can be
+/// gripped.
 #[derive(Debug, ClapArgs)]
 #[command(
     after_help = "EXAMPLES:\n  gripfast part bracket.stl\n  gripfast part bracket.stl --unit in --density 2.7g/cm3\n  gripfast part bracket.3mf --mass 350g --json\n  gripfast part bracket.stl --plot faces.svg\n\n\
@@ -21,7 +22,8 @@ Reads STL, OBJ, PLY, OFF, 3MF and glTF/GLB, each also as .gz; STEP where built w
 pub(crate) struct Args {
     /// Part file.
     part: PathBuf,
-    /// Unit of the file's numbers: mm, cm, m, um, in or ft. Default: the file's own (3MF, glTF), else mm.
+    /// Unit of the file's numbers: mm, cm, m, um, in or ft. Default: the file's own (3MF, glTF),
+    /// else mm.
     #[arg(long)]
     unit: Option<Unit>,
     /// Density, for the mass and the inertia.
@@ -51,20 +53,28 @@ pub(crate) struct Args {
 const ROWS: usize = 10;
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let density = args.density.as_deref().map(|text| Quantity::Density.parse("--density", text)).transpose()?;
+    let density = args
+        .density
+        .as_deref()
+        .map(|text| Quantity::Density.parse("--density", text))
+        .transpose()?;
     let mass = args.mass.as_deref().map(|text| Quantity::Mass.parse("--mass", text)).transpose()?;
     for (flag, value) in [("--density", density), ("--mass", mass)] {
         anyhow::ensure!(value.is_none_or(|value| value > 0.0), "{flag}: must be positive");
     }
     let stroke = match args.stroke.as_deref() {
-        Some([min, max]) => [Quantity::Length.parse("--stroke", min)?, Quantity::Length.parse("--stroke", max)?],
+        Some([min, max]) => {
+            [Quantity::Length.parse("--stroke", min)?, Quantity::Length.parse("--stroke", max)?]
+        }
         _ => [0.0, f64::INFINITY],
     };
     let part = Part::read(&args.part, &ReadOptions { unit: args.unit })?;
     let volume = part.mass_properties(1.0).volume;
     let density = match mass {
         Some(mass) if volume > 0.0 => Some(mass / volume),
-        Some(_) => anyhow::bail!("{}: encloses no volume, so a mass gives no density", args.part.display()),
+        Some(_) => {
+            anyhow::bail!("{}: encloses no volume, so a mass gives no density", args.part.display())
+        }
         None => density,
     };
     let mut pairs = part.pairs(stroke[0], stroke[1]);
@@ -77,10 +87,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let mut out = std::io::stdout().lock();
     if args.json {
-        serde_json::to_writer_pretty(&mut out, &to_json(&part, &pairs, density)).context("writing JSON")?;
+        serde_json::to_writer_pretty(&mut out, &to_json(&part, &pairs, density))
+            .context("writing JSON")?;
         writeln!(out)?;
     } else {
-        write!(out, "{}", to_text(&part, &pairs, density, if args.faces { usize::MAX } else { ROWS }))?;
+        write!(
+            out,
+            "{}",
+            to_text(&part, &pairs, density, if args.faces { usize::MAX } else { ROWS })
+        )?;
     }
     Ok(if pairs.is_empty() { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
@@ -88,11 +103,20 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 fn to_text(part: &Part, pairs: &[FacePair], density: Option<f64>, rows: usize) -> String {
     let (low, high) = part.mesh.bounding_box();
     let size = (high - low) * 1e3;
-    let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == part.unit_m).map_or(String::new(), |unit| unit.to_string());
+    let unit = Unit::ALL
+        .into_iter()
+        .find(|unit| unit.metres() == part.unit_m)
+        .map_or(String::new(), |unit| unit.to_string());
     let mut text = format!("{}\n", part.file.display());
     let mut line = |name: &str, value: String| text += &format!("  {name:<15} {value}\n");
-    line("size", format!("{:.3} x {:.3} x {:.3} mm (unit of the file: {unit})", size.x, size.y, size.z));
-    line("triangles", format!("{}, {} vertices", part.mesh.triangles.len(), part.mesh.vertices.len()));
+    line(
+        "size",
+        format!("{:.3} x {:.3} x {:.3} mm (unit of the file: {unit})", size.x, size.y, size.z),
+    );
+    line(
+        "triangles",
+        format!("{}, {} vertices", part.mesh.triangles.len(), part.mesh.vertices.len()),
+    );
     for (index, finding) in part.health.lines().into_iter().enumerate() {
         line(if index == 0 { "surface" } else { "" }, finding);
     }
@@ -103,9 +127,21 @@ fn to_text(part: &Part, pairs: &[FacePair], density: Option<f64>, rows: usize) -
         line("mass", format!("{:.4} kg at {:.1} kg/m3", mass.mass, density));
         let inertia = mass.inertia * 1e6;
         let (xx, yy, zz) = (inertia.x_axis.x, inertia.y_axis.y, inertia.z_axis.z);
-        line("inertia", format!("xx, yy, zz: {} kg mm2 about the centre of mass", triple(DVec3::new(xx, yy, zz), 4)));
+        line(
+            "inertia",
+            format!(
+                "xx, yy, zz: {} kg mm2 about the centre of mass",
+                triple(DVec3::new(xx, yy, zz), 4)
+            ),
+        );
         let (xy, yz, zx) = (inertia.x_axis.y, inertia.y_axis.z, inertia.z_axis.x);
-        line("", format!("xy, yz, zx: {} kg mm2 (elements of the matrix)", triple(DVec3::new(xy, yz, zx), 4)));
+        line(
+            "",
+            format!(
+                "xy, yz, zx: {} kg mm2 (elements of the matrix)",
+                triple(DVec3::new(xy, yz, zx), 4)
+            ),
+        );
     }
     text += &format!("\n{} planar faces\n", part.faces.len());
     text += &face_table(&part.faces, rows);
@@ -125,19 +161,32 @@ fn table(header: &[&str]) -> Table {
 
 fn finish(table: &Table, total: usize, rows: usize) -> String {
     let more = total.saturating_sub(rows);
-    let rest = if more > 0 { format!("  ... and {more} smaller ones (--faces lists all)\n") } else { String::new() };
+    let rest = if more > 0 {
+        format!("  ... and {more} smaller ones (--faces lists all)\n")
+    } else {
+        String::new()
+    };
     if total == 0 { String::new() } else { format!("{}\n{rest}", table.trim_fmt()) }
 }
 
 /// A fixed number of decimals, never `-0.00`.
 fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
-    if text.starts_with('-') && !text.contains(|digit: char| ('1'..='9').contains(&digit)) { text[1..].to_string() } else { text }
+    if text.starts_with('-') && !text.contains(|digit: char| ('1'..='9').contains(&digit)) {
+        text[1..].to_string()
+    } else {
+        text
+    }
 }
 
 /// Three numbers with a fixed number of decimals.
 fn triple(value: DVec3, decimals: usize) -> String {
-    format!("{} {} {}", fixed(value.x, decimals), fixed(value.y, decimals), fixed(value.z, decimals))
+    format!(
+        "{} {} {}",
+        fixed(value.x, decimals),
+        fixed(value.y, decimals),
+        fixed(value.z, decimals)
+    )
 }
 
 fn face_table(faces: &[PlanarFace], rows: usize) -> String {

@@ -15,7 +15,8 @@ use serde_json::json;
 /// Passed-over grips that are listed in words; the rest is counted.
 const LISTED: usize = 10;
 
-/// Picks the first grip of a ranked list that is free in a scene, and says why the ones before it are not.
+/// Picks the first grip of a ranked list that is free in a scene, and says why the ones before it
+/// are not.
 #[derive(Debug, ClapArgs)]
 #[command(
     after_help = "EXAMPLES:\n  gripfast pick grips.json --scene cell.toml\n  gripfast pick grips.json --scene cell.toml --json --convention moveit --origin flange\n\n\
@@ -31,11 +32,12 @@ pub(crate) struct Args {
     /// Print JSON, with the reason for every grip passed over.
     #[arg(long)]
     json: bool,
-    /// Axes of the tool frame: standard, moveit (z approach, y closing), graspgen (z, x), graspnet, dexnet (x, y),
-    /// flange or tool (as the gripper file states them).
+    /// Axes of the tool frame: standard, moveit (z approach, y closing), graspgen (z, x), graspnet,
+    /// dexnet (x, y), flange or tool (as the gripper file states them).
     #[arg(long, value_name = "NAME", default_value = "standard")]
     convention: String,
-    /// Origin of the tool frame: pads (midway between them), flange, tool, or a distance behind the pads.
+    /// Origin of the tool frame: pads (midway between them), flange, tool, or a distance behind the
+    /// pads.
     #[arg(long, value_name = "ORIGIN", default_value = "pads")]
     origin: String,
 }
@@ -57,7 +59,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         *counts.entry(picker.category(reason)).or_default() += 1;
     }
     let chosen = pick.chosen.map(|index| &set.grips[index]);
-    let pose = chosen.map(|grip| scene.world_from_part.compose(&grip.grip.part_from_grip).compose(&grip_from_tool));
+    let pose = chosen.map(|grip| {
+        scene.world_from_part.compose(&grip.grip.part_from_grip).compose(&grip_from_tool)
+    });
     let tool_frame = format!("{}, origin {origin}", convention.axes());
     let mut out = std::io::stdout().lock();
     if args.json {
@@ -82,11 +86,20 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
                 "tool_frame": tool_frame,
             })
         });
-        serde_json::to_writer(&mut out, &json!({"chosen": chosen, "passed": passed, "counts": counts, "grips": set.grips.len(), "seconds": seconds}))?;
+        serde_json::to_writer(
+            &mut out,
+            &json!({"chosen": chosen, "passed": passed, "counts": counts, "grips": set.grips.len(), "seconds": seconds}),
+        )?;
         writeln!(out)?;
     } else {
         for (reason, grip) in pick.passed.iter().zip(&set.grips).take(LISTED) {
-            writeln!(out, "passed over: rank {}, id {}: {}", grip.rank, grip.grip.id, picker.describe(reason))?;
+            writeln!(
+                out,
+                "passed over: rank {}, id {}: {}",
+                grip.rank,
+                grip.grip.id,
+                picker.describe(reason)
+            )?;
         }
         if pick.passed.len() > LISTED {
             writeln!(out, "passed over: {} in all:", pick.passed.len())?;
@@ -105,13 +118,24 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
                 if let Some(mu_s) = grip.worst.mu_s {
                     writeln!(out, "  smallest friction that holds  {mu_s:.4}")?;
                 }
-                writeln!(out, "  pads                          {:.2} mm apart, opened to {:.2} mm", grip.grip.width * 1e3, picker.opened(&grip.grip) * 1e3)?;
+                writeln!(
+                    out,
+                    "  pads                          {:.2} mm apart, opened to {:.2} mm",
+                    grip.grip.width * 1e3,
+                    picker.opened(&grip.grip) * 1e3
+                )?;
                 writeln!(out, "  tool in the world             x {x:.3}  y {y:.3}  z {z:.3} mm")?;
                 writeln!(out, "  orientation (qx qy qz qw)     {qx:.6} {qy:.6} {qz:.6} {qw:.6}")?;
                 writeln!(out, "  tool frame                    {tool_frame}")?;
             }
         }
-        writeln!(out, "looked at {} of {} grips in {:.2} ms", pick.passed.len() + usize::from(chosen.is_some()), set.grips.len(), seconds * 1e3)?;
+        writeln!(
+            out,
+            "looked at {} of {} grips in {:.2} ms",
+            pick.passed.len() + usize::from(chosen.is_some()),
+            set.grips.len(),
+            seconds * 1e3
+        )?;
     }
     Ok(if chosen.is_some() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

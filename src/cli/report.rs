@@ -21,10 +21,12 @@ pub(crate) const WHOLE: usize = 20;
 
 /// Writes a result file as one HTML page with the part in three dimensions, which needs no network.
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "EXAMPLES:\n  gripfast report grips.json\n  gripfast report grips.json --part bracket.stl -o bracket.html\n\n\
+#[command(
+    after_help = "EXAMPLES:\n  gripfast report grips.json\n  gripfast report grips.json --part bracket.stl -o bracket.html\n\n\
 Without --part the part file that the result names is used: as written there, or else beside the result file.\n\
 When neither exists, the part is drawn as its bounding box.\n\n\
-The friction over all loads is shown for the best 20 grips, and for others whose loads the result keeps (plan --polish all).")]
+The friction over all loads is shown for the best 20 grips, and for others whose loads the result keeps (plan --polish all)."
+)]
 pub(crate) struct Args {
     /// Result file of `gripfast plan -o`, JSON or JSON Lines.
     grips: PathBuf,
@@ -40,7 +42,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut set = GripSet::read(&args.grips)?;
     let output = args.output.unwrap_or_else(|| args.grips.with_extension("html"));
     if output == args.grips {
-        return Err(Error::input("-o", format!("'{}' is the result file itself", output.display()), "give another name").into());
+        return Err(Error::input(
+            "-o",
+            format!("'{}' is the result file itself", output.display()),
+            "give another name",
+        )
+        .into());
     }
     let part = match args.part.as_deref() {
         Some(path) => Some(read_part(path, &set.part)?),
@@ -50,7 +57,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         eprintln!("warning: {error}\n  the page shows the worst loads only");
     }
     report::write(&set, part.as_ref().map(|part| &part.mesh), &output)?;
-    let size = std::fs::metadata(&output).with_context(|| format!("cannot read back {}", output.display()))?.len();
+    let size = std::fs::metadata(&output)
+        .with_context(|| format!("cannot read back {}", output.display()))?
+        .len();
     eprintln!("{}: {} grips, {:.1} MB", output.display(), set.grips.len(), size as f64 / 1e6);
     Ok(ExitCode::SUCCESS)
 }
@@ -59,29 +68,59 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 fn solve_every_load(set: &mut GripSet) -> gripfast::error::Result<()> {
     let setting = |name: &str| set.provenance.settings.get(name);
     let Some(force) = setting("force_n").and_then(serde_json::Value::as_f64) else {
-        return Err(Error::input("result file", "does not say the gripping force (settings.force_n)", "write it anew with `gripfast plan`"));
+        return Err(Error::input(
+            "result file",
+            "does not say the gripping force (settings.force_n)",
+            "write it anew with `gripfast plan`",
+        ));
     };
-    let is = |name: &str, value: &str| setting(name).and_then(serde_json::Value::as_str) == Some(value);
+    let is =
+        |name: &str, value: &str| setting(name).and_then(serde_json::Value::as_str) == Some(value);
     let score = ScoreOptions {
         polish: Polish::All,
-        separation: if is("separation", "discard") { Separation::Discard } else { Separation::Solve },
+        separation: if is("separation", "discard") {
+            Separation::Discard
+        } else {
+            Separation::Solve
+        },
         refiner: if is("refiner", "shanno") { Refiner::Shanno } else { Refiner::Newton },
     };
-    let settings = Settings { force, weights: Weights::default(), delta: 0.0, mu_c: 0.0, pad_friction: None, score };
+    let settings = Settings {
+        force,
+        weights: Weights::default(),
+        delta: 0.0,
+        mu_c: 0.0,
+        pad_friction: None,
+        score,
+    };
     let seeds = SeedSet::default();
-    let assessor = Assessor { loads: &set.loads, mass: set.part.mass, settings: &settings, backend: &Backend::Cpu, seeds: &seeds };
-    assessor.solve_every_load(&mut set.grips.iter_mut().take(WHOLE).collect::<Vec<&mut RankedGrip>>())
+    let assessor = Assessor {
+        loads: &set.loads,
+        mass: set.part.mass,
+        settings: &settings,
+        backend: &Backend::Cpu,
+        seeds: &seeds,
+    };
+    assessor
+        .solve_every_load(&mut set.grips.iter_mut().take(WHOLE).collect::<Vec<&mut RankedGrip>>())
 }
 
 /// The part that the result names; says why when it cannot be had.
 fn recorded_part(grips: &Path, summary: &PartSummary) -> Option<Part> {
     let recorded = Path::new(&summary.file);
     let beside = recorded.file_name().map(|name| grips.with_file_name(name));
-    let Some(path) = [Some(recorded.to_path_buf()), beside].into_iter().flatten().find(|path| path.is_file()) else {
-        eprintln!("warning: {}: not found; the part is drawn as its bounding box (--part FILE names it)", summary.file);
+    let Some(path) =
+        [Some(recorded.to_path_buf()), beside].into_iter().flatten().find(|path| path.is_file())
+    else {
+        eprintln!(
+            "warning: {}: not found; the part is drawn as its bounding box (--part FILE names it)",
+            summary.file
+        );
         return None;
     };
-    read_part(&path, summary).inspect_err(|error| eprintln!("warning: {error}\n  the part is drawn as its bounding box")).ok()
+    read_part(&path, summary)
+        .inspect_err(|error| eprintln!("warning: {error}\n  the part is drawn as its bounding box"))
+        .ok()
 }
 
 /// Reads the part and makes sure that it is the one of the result.
@@ -94,8 +133,14 @@ fn read_part(path: &Path, summary: &PartSummary) -> gripfast::error::Result<Part
     if off.is_nan() || off > tolerance {
         let size = (high - low) * 1e3;
         let expected = (summary.bbox_max - summary.bbox_min) * 1e3;
-        let problem = format!("is not the part of this result: its size is {size:.2} mm, or it lies elsewhere; the result's is {expected:.2} mm");
-        return Err(Error::input(path.display().to_string(), problem, "give the file that was planned on"));
+        let problem = format!(
+            "is not the part of this result: its size is {size:.2} mm, or it lies elsewhere; the result's is {expected:.2} mm"
+        );
+        return Err(Error::input(
+            path.display().to_string(),
+            problem,
+            "give the file that was planned on",
+        ));
     }
     Ok(part)
 }

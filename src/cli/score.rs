@@ -23,7 +23,8 @@ use serde_json::Value;
 use super::backend::{self, BackendArgs};
 use super::solve::{RefinerArg, SeparationArg};
 
-/// Scores many contact pairs under many loads: the worst load of each and the friction coefficient it needs.
+/// Scores many contact pairs under many loads: the worst load of each and the friction coefficient
+/// it needs.
 #[derive(Debug, ClapArgs)]
 #[command(
     after_help = "EXAMPLES:\n  gripfast score pairs.jsonl --loads ball:500 > scores.jsonl\n  gripfast score pairs.json --loads wrenches.csv --polish all -o scores.jsonl\n  gripfast score grips.json --loads gravity,ball:200\n\n\
@@ -34,13 +35,15 @@ larger than memory), or a result file of `gripfast plan`. A contact pair may car
 pub(crate) struct Args {
     /// Contact pairs or a result file; `-` for standard input.
     grips: PathBuf,
-    /// Loads on every grip: a CSV or JSON list of wrenches, `ball:N` and what else `plan` takes. Default: the file's own.
+    /// Loads on every grip: a CSV or JSON list of wrenches, `ball:N` and what else `plan` takes.
+    /// Default: the file's own.
     #[arg(long, value_name = "FILE|SET")]
     loads: Option<String>,
     /// Gripping force, e.g. 80N. Default: the file's own.
     #[arg(long, value_name = "FORCE")]
     force: Option<String>,
-    /// Which loads are solved exactly: those that can be the worst, or all (then `mu_by_load` is in the output).
+    /// Which loads are solved exactly: those that can be the worst, or all (then `mu_by_load` is in
+    /// the output).
     #[arg(long, value_enum, default_value = "worst")]
     polish: PolishArg,
     /// Pads that separate under a load: solve with the contact left, or discard as the paper does.
@@ -118,12 +121,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     backend::use_threads(args.threads)?;
     let selection = args.backend.select()?;
     let seeds = args.backend.seed_set()?;
-    let force = args.force.as_deref().map(|text| Quantity::Force.parse("--force", text)).transpose()?;
+    let force =
+        args.force.as_deref().map(|text| Quantity::Force.parse("--force", text)).transpose()?;
     let name = args.grips.display().to_string();
     let mut input: Box<dyn BufRead> = if args.grips == Path::new("-") {
         Box::new(BufReader::new(std::io::stdin().lock()))
     } else {
-        Box::new(BufReader::new(File::open(&args.grips).map_err(|error| Error::io(&args.grips, "read", error))?))
+        Box::new(BufReader::new(
+            File::open(&args.grips).map_err(|error| Error::io(&args.grips, "read", error))?,
+        ))
     };
     let source = Source::open(&mut *input, &name)?;
     let (source, mass) = match source {
@@ -131,13 +137,40 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             let mass = set.part.mass;
             (Source::Result(set), mass)
         }
-        // Loads in the grip frame: as if the centre of mass were the grip's origin. What needs a mass is refused.
-        other => (other, MassProperties { volume: 0.0, mass: f64::NAN, centre_of_mass: DVec3::ZERO, inertia: DMat3::ZERO }),
+        // Loads in the grip frame: as if the centre of mass were the grip's origin. What needs a
+        // mass is refused.
+        other => (
+            other,
+            MassProperties {
+                volume: 0.0,
+                mass: f64::NAN,
+                centre_of_mass: DVec3::ZERO,
+                inertia: DMat3::ZERO,
+            },
+        ),
     };
-    let common = args.loads.as_deref().map(|text| LoadSet::parse("--loads", text)?.cases(&mass)).transpose()?;
-    let (names, common): (Vec<String>, Vec<Wrench>) = common.unwrap_or_default().into_iter().map(|case| (case.name, case.wrench)).unzip();
-    let options = ScoreOptions { polish: args.polish.into(), separation: args.separation.into(), refiner: args.refiner.into() };
-    let job = Job { backend: &selection.backend, seeds: &seeds, options, names: &names, common: &common, given: args.loads.is_some(), force, name: &name };
+    let common = args
+        .loads
+        .as_deref()
+        .map(|text| LoadSet::parse("--loads", text)?.cases(&mass))
+        .transpose()?;
+    let (names, common): (Vec<String>, Vec<Wrench>) =
+        common.unwrap_or_default().into_iter().map(|case| (case.name, case.wrench)).unzip();
+    let options = ScoreOptions {
+        polish: args.polish.into(),
+        separation: args.separation.into(),
+        refiner: args.refiner.into(),
+    };
+    let job = Job {
+        backend: &selection.backend,
+        seeds: &seeds,
+        options,
+        names: &names,
+        common: &common,
+        given: args.loads.is_some(),
+        force,
+        name: &name,
+    };
     if !args.quiet {
         eprintln!("backend {}", selection.reason);
     }
@@ -218,8 +251,13 @@ impl<'a> Source<'a> {
         if let Ok(set) = GripSet::parse(name, &text) {
             return Ok(Self::Result(Box::new(set)));
         }
-        let value: Value =
-            serde_json::from_slice(&text).map_err(|error| Error::input(name, format!("is not JSON: {error}"), "give contact pairs as JSON or JSON Lines"))?;
+        let value: Value = serde_json::from_slice(&text).map_err(|error| {
+            Error::input(
+                name,
+                format!("is not JSON: {error}"),
+                "give contact pairs as JSON or JSON Lines",
+            )
+        })?;
         Ok(match value {
             Value::Object(mut object) => match object.remove("cases") {
                 Some(Value::Array(list)) => Self::List(list),
@@ -249,7 +287,12 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    fn run(&self, source: Source<'_>, out: &mut impl Write, counts: &mut Counts) -> anyhow::Result<()> {
+    fn run(
+        &self,
+        source: Source<'_>,
+        out: &mut impl Write,
+        counts: &mut Counts,
+    ) -> anyhow::Result<()> {
         let mut block = Block::default();
         let mut take = |entry: Entry, out: &mut dyn Write| -> anyhow::Result<()> {
             block.loads += match &entry.wrenches {
@@ -272,8 +315,13 @@ impl Job<'_> {
                     if line.trim().is_empty() {
                         continue;
                     }
-                    let value =
-                        serde_json::from_str(&line).map_err(|error| Error::input(&place, format!("is not JSON: {error}"), "give one contact pair per line"))?;
+                    let value = serde_json::from_str(&line).map_err(|error| {
+                        Error::input(
+                            &place,
+                            format!("is not JSON: {error}"),
+                            "give one contact pair per line",
+                        )
+                    })?;
                     if contacts.len() >= BLOCK_GRIPS {
                         contacts.clear();
                     }
@@ -283,19 +331,41 @@ impl Job<'_> {
             Source::List(list) => {
                 let mut contacts = HashMap::new();
                 for (index, value) in list.into_iter().enumerate() {
-                    take(self.entry(&format!("{}: [{index}]", self.name), value, &mut contacts)?, out)?;
+                    take(
+                        self.entry(&format!("{}: [{index}]", self.name), value, &mut contacts)?,
+                        out,
+                    )?;
                 }
             }
             Source::Result(set) => {
-                let force = self.force.or_else(|| set.provenance.settings.get("force_n").and_then(Value::as_f64));
-                let force = force.ok_or_else(|| Error::input(self.name, "states no gripping force", "give --force"))?;
+                let force = self
+                    .force
+                    .or_else(|| set.provenance.settings.get("force_n").and_then(Value::as_f64));
+                let force = force.ok_or_else(|| {
+                    Error::input(self.name, "states no gripping force", "give --force")
+                })?;
                 let own: Vec<Wrench> = set.loads.iter().map(|load| load.wrench).collect();
                 let loads = if self.given { self.common } else { &own };
                 for ranked in set.grips {
                     let grip = ranked.grip;
-                    let wrenches = loads.iter().map(|wrench| wrench_in_grip(wrench, set.part.mass.centre_of_mass, &grip.part_from_grip)).collect();
+                    let wrenches = loads
+                        .iter()
+                        .map(|wrench| {
+                            wrench_in_grip(
+                                wrench,
+                                set.part.mass.centre_of_mass,
+                                &grip.part_from_grip,
+                            )
+                        })
+                        .collect();
                     let (id, distance) = (Some(grip.id.into()), grip.distance());
-                    let entry = Entry { id, contact: grip.contact, distance, force, wrenches: Wrenches::Own(wrenches) };
+                    let entry = Entry {
+                        id,
+                        contact: grip.contact,
+                        distance,
+                        force,
+                        wrenches: Wrenches::Own(wrenches),
+                    };
                     take(entry, out)?;
                 }
             }
@@ -303,8 +373,14 @@ impl Job<'_> {
         self.score(&mut block, out, counts)
     }
 
-    /// A contact pair as a file states it. Pairs with equal contacts share them, and so the work on them.
-    fn entry(&self, place: &str, mut value: Value, contacts: &mut HashMap<Vec<u64>, Arc<Contact>>) -> anyhow::Result<Entry> {
+    /// A contact pair as a file states it. Pairs with equal contacts share them, and so the work on
+    /// them.
+    fn entry(
+        &self,
+        place: &str,
+        mut value: Value,
+        contacts: &mut HashMap<Vec<u64>, Arc<Contact>>,
+    ) -> anyhow::Result<Entry> {
         let mut own = None;
         let mut id = None;
         if let Value::Object(object) = &mut value {
@@ -322,15 +398,24 @@ impl Job<'_> {
         let case = gripfast::case::parse(place, value)?;
         let wrenches = match own {
             _ if self.given => Wrenches::Common,
-            Some(Value::Array(list)) => Wrenches::Own(list.into_iter().map(|item| wrench(place, item)).collect::<Result<_, _>>()?),
+            Some(Value::Array(list)) => Wrenches::Own(
+                list.into_iter().map(|item| wrench(place, item)).collect::<Result<_, _>>()?,
+            ),
             Some(_) => bail!("{place}: \"loads\" is not a list"),
             None => Wrenches::Own(vec![case.wrench]),
         };
-        let contact = Arc::clone(contacts.entry(key(&case.contact)).or_insert_with(|| Arc::new(case.contact)));
+        let contact = Arc::clone(
+            contacts.entry(key(&case.contact)).or_insert_with(|| Arc::new(case.contact)),
+        );
         Ok(Entry { id, contact, distance: case.distance, force: case.force, wrenches })
     }
 
-    fn score(&self, block: &mut Block, out: &mut dyn Write, counts: &mut Counts) -> anyhow::Result<()> {
+    fn score(
+        &self,
+        block: &mut Block,
+        out: &mut dyn Write,
+        counts: &mut Counts,
+    ) -> anyhow::Result<()> {
         let entries = std::mem::take(&mut block.entries);
         block.loads = 0;
         let problems = entries
@@ -345,8 +430,10 @@ impl Job<'_> {
                 },
             })
             .collect();
-        let scored =
-            self.backend.score(&Batch { problems }, self.seeds, &self.options).with_context(|| format!("{}: grips from {}", self.name, counts.grips))?;
+        let scored = self
+            .backend
+            .score(&Batch { problems }, self.seeds, &self.options)
+            .with_context(|| format!("{}: grips from {}", self.name, counts.grips))?;
         for (entry, Scored { worst, all, solved, compared, .. }) in entries.iter().zip(scored) {
             let index = counts.grips;
             counts.grips += 1;
@@ -358,9 +445,13 @@ impl Job<'_> {
             };
             let Some((load, score)) = worst else { continue };
             counts.held += u64::from(score.status.holds());
-            let load_name = matches!(entry.wrenches, Wrenches::Common).then(|| self.names[load].as_str());
+            let load_name =
+                matches!(entry.wrenches, Wrenches::Common).then(|| self.names[load].as_str());
             let mu_by_load = all.iter().map(|score| score.mu_s).collect();
-            serde_json::to_writer(&mut *out, &Line { id: entry.id.as_ref(), index, load, load_name, score, solved, mu_by_load })?;
+            serde_json::to_writer(
+                &mut *out,
+                &Line { id: entry.id.as_ref(), index, load, load_name, score, solved, mu_by_load },
+            )?;
             out.write_all(b"\n")?;
         }
         Ok(())
@@ -382,8 +473,13 @@ fn wrench(place: &str, value: Value) -> Result<Wrench, Error> {
         #[serde(rename = "M", default)]
         moment: DVec3,
     }
-    let raw: Raw =
-        serde_json::from_value(value).map_err(|error| Error::input(place, format!("\"loads\": {error}"), "a load is {\"F\":[f1,f2,f3],\"M\":[m1,m2,m3]}"))?;
+    let raw: Raw = serde_json::from_value(value).map_err(|error| {
+        Error::input(
+            place,
+            format!("\"loads\": {error}"),
+            "a load is {\"F\":[f1,f2,f3],\"M\":[m1,m2,m3]}",
+        )
+    })?;
     Ok(Wrench { force: raw.force, moment: raw.moment })
 }
 

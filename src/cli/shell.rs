@@ -33,7 +33,9 @@ pub(crate) fn completions(args: CompletionsArgs) -> anyhow::Result<ExitCode> {
 }
 
 pub(crate) fn man(args: ManArgs) -> anyhow::Result<ExitCode> {
-    let failed = |error: std::io::Error| gripfast::error::Error::io(&args.folder, "write manual pages into", error);
+    let failed = |error: std::io::Error| {
+        gripfast::error::Error::io(&args.folder, "write manual pages into", error)
+    };
     std::fs::create_dir_all(&args.folder).map_err(failed)?;
     clap_mangen::generate_to(super::Cli::command(), &args.folder).map_err(failed)?;
     writeln!(std::io::stdout(), "manual pages written to {}", args.folder.display())?;

@@ -26,16 +26,19 @@ pub(crate) struct Args {
     /// Also the iterations, the certificate and what each number means.
     #[arg(long)]
     explain: bool,
-    /// Also draws the contact pair as SVG: pads, pressure, separation line, slip centre, friction directions.
+    /// Also draws the contact pair as SVG: pads, pressure, separation line, slip centre, friction
+    /// directions.
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Pads that separate under the load: solve with the contact left, or discard as the paper does.
+    /// Pads that separate under the load: solve with the contact left, or discard as the paper
+    /// does.
     #[arg(long, value_enum, default_value = "solve")]
     separation: SeparationArg,
     /// Minimiser that polishes the solution.
     #[arg(long, value_enum, default_value = "newton")]
     refiner: RefinerArg,
-    /// How to solve: our method, the paper's error function, or the earlier method with the slip centre at the centroid.
+    /// How to solve: our method, the paper's error function, or the earlier method with the slip
+    /// centre at the centroid.
     #[arg(long, value_enum, default_value = "gripfast")]
     method: Method,
     /// Friction coefficient of the pads: also tells the force needed and the load multiple held.
@@ -113,26 +116,41 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !(args.safety.is_finite() && args.safety > 0.0) {
         anyhow::bail!("--safety {}: give a positive number", args.safety);
     }
-    let options = Options { separation: args.separation.into(), refiner: args.refiner.into(), ..Options::default() };
+    let options = Options {
+        separation: args.separation.into(),
+        refiner: args.refiner.into(),
+        ..Options::default()
+    };
     let mut out = std::io::stdout().lock();
     let cases = case::read(&args.case)?;
     let mut any = false;
     for (index, case) in cases.iter().enumerate() {
         let place = || case.id.clone().unwrap_or_else(|| format!("case {}", index + 1));
-        let (contact, distance, force, wrench) = (&case.contact, case.distance, case.force, &case.wrench);
+        let (contact, distance, force, wrench) =
+            (&case.contact, case.distance, case.force, &case.wrench);
         let answer = match args.method {
-            Method::Gripfast => mechanics::solve(contact, distance, force, wrench, &options).map(|score| (score, None)),
+            Method::Gripfast => mechanics::solve(contact, distance, force, wrench, &options)
+                .map(|score| (score, None)),
             Method::Paper => {
-                let all_starts = paper::Options { all_starts: args.explain, ..paper::Options::default() };
-                paper::solve(contact, distance, force, wrench, &all_starts).map(|report| (report.score, Some(report)))
+                let all_starts =
+                    paper::Options { all_starts: args.explain, ..paper::Options::default() };
+                paper::solve(contact, distance, force, wrench, &all_starts)
+                    .map(|report| (report.score, Some(report)))
             }
-            Method::Centroid => wolter::solve(contact, distance, force, wrench).map(|score| (score, None)),
+            Method::Centroid => {
+                wolter::solve(contact, distance, force, wrench).map(|score| (score, None))
+            }
         };
-        let (score, report) = answer.map_err(|error| anyhow::anyhow!("{}: {}: {error}", args.case.display(), place()))?;
+        let (score, report) = answer
+            .map_err(|error| anyhow::anyhow!("{}: {}: {error}", args.case.display(), place()))?;
         any |= score.status.holds();
         if let Some(path) = &args.plot {
             let path = if cases.len() > 1 {
-                path.with_file_name(format!("{}-{}.svg", path.file_stem().unwrap_or_default().to_string_lossy(), place()))
+                path.with_file_name(format!(
+                    "{}-{}.svg",
+                    path.file_stem().unwrap_or_default().to_string_lossy(),
+                    place()
+                ))
             } else {
                 path.clone()
             };
@@ -141,14 +159,31 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         let inverse = args.pad_friction.and_then(|friction| {
             let pads = Pads::new(&case.contact)?;
-            let multiple = inverse::load_multiple(&pads, case.distance, case.force, &case.wrench, friction, &options);
+            let multiple = inverse::load_multiple(
+                &pads,
+                case.distance,
+                case.force,
+                &case.wrench,
+                friction,
+                &options,
+            );
             Some(Inverse {
-                force_needed: inverse::force_needed(&pads, case.distance, &case.wrench, friction / args.safety, &options),
+                force_needed: inverse::force_needed(
+                    &pads,
+                    case.distance,
+                    &case.wrench,
+                    friction / args.safety,
+                    &options,
+                ),
                 load_multiple: multiple.is_finite().then_some(multiple),
             })
         });
         if args.json {
-            writeln!(out, "{}", serde_json::to_string(&Answer { id: case.id.as_deref(), score, inverse })?)?;
+            writeln!(
+                out,
+                "{}",
+                serde_json::to_string(&Answer { id: case.id.as_deref(), score, inverse })?
+            )?;
         } else {
             if cases.len() > 1 {
                 writeln!(out, "{}{}", if index > 0 { "\n" } else { "" }, place())?;
@@ -162,10 +197,20 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(if any { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-fn print(out: &mut impl Write, case: &Case, score: &Score, inverse: Option<&Inverse>, args: &Args) -> anyhow::Result<()> {
+fn print(
+    out: &mut impl Write,
+    case: &Case,
+    score: &Score,
+    inverse: Option<&Inverse>,
+    args: &Args,
+) -> anyhow::Result<()> {
     let mm = 1e3;
     match score.mu_s {
-        Some(mu) => writeln!(out, "smallest friction coefficient that holds  {mu:.6}{}", note(score.status))?,
+        Some(mu) => writeln!(
+            out,
+            "smallest friction coefficient that holds  {mu:.6}{}",
+            note(score.status)
+        )?,
         None => writeln!(out, "no answer: {}", reason(score.status))?,
     }
     match score.slip {
@@ -173,16 +218,38 @@ fn print(out: &mut impl Write, case: &Case, score: &Score, inverse: Option<&Inve
             let turn = if sense > 0 { "counter-clockwise" } else { "clockwise" };
             // Rounded first: no negative zeros.
             let [x, y] = c.map(|value| (value * mm * 1e4).round() / 1e4 + 0.0);
-            writeln!(out, "about to turn                             {turn} about ({x:.4}, {y:.4}) mm")?;
+            writeln!(
+                out,
+                "about to turn                             {turn} about ({x:.4}, {y:.4}) mm"
+            )?;
         }
-        Some(Slip::Translation { direction }) => writeln!(out, "about to slide                            along ({:.4}, {:.4})", direction[0], direction[1])?,
-        Some(Slip::None) => writeln!(out, "nothing slips                             the load has no part in the pad plane")?,
+        Some(Slip::Translation { direction }) => writeln!(
+            out,
+            "about to slide                            along ({:.4}, {:.4})",
+            direction[0], direction[1]
+        )?,
+        Some(Slip::None) => writeln!(
+            out,
+            "nothing slips                             the load has no part in the pad plane"
+        )?,
         None => {}
     }
     if let Some(p) = score.pressure {
         let per_mm = 1e-3;
-        writeln!(out, "pressure on face I  [Pa, x in mm]         {:.6e} {:+.6e} x1 {:+.6e} x2", p.a_i0, p.a1 * per_mm, p.a2 * per_mm)?;
-        writeln!(out, "pressure on face II [Pa, x in mm]         {:.6e} {:+.6e} x1 {:+.6e} x2", p.a_ii0, 0.0 - p.a1 * per_mm, 0.0 - p.a2 * per_mm)?;
+        writeln!(
+            out,
+            "pressure on face I  [Pa, x in mm]         {:.6e} {:+.6e} x1 {:+.6e} x2",
+            p.a_i0,
+            p.a1 * per_mm,
+            p.a2 * per_mm
+        )?;
+        writeln!(
+            out,
+            "pressure on face II [Pa, x in mm]         {:.6e} {:+.6e} x1 {:+.6e} x2",
+            p.a_ii0,
+            0.0 - p.a1 * per_mm,
+            0.0 - p.a2 * per_mm
+        )?;
         let area = |patch: &[gripfast::model::Polygon]| gripfast::geometry::patch_area(patch);
         let share = |left: f64, patch: &[gripfast::model::Polygon]| 100.0 * left / area(patch);
         writeln!(
@@ -202,9 +269,14 @@ fn print(out: &mut impl Write, case: &Case, score: &Score, inverse: Option<&Inve
                 args.pad_friction.unwrap_or_default(),
                 args.safety
             )?,
-            None => writeln!(out, "gripping force needed                     none is enough at this pad friction")?,
+            None => writeln!(
+                out,
+                "gripping force needed                     none is enough at this pad friction"
+            )?,
         }
-        let multiple = inverse.load_multiple.map_or("any: there is no load".into(), |multiple| format!("{multiple:.4}"));
+        let multiple = inverse
+            .load_multiple
+            .map_or("any: there is no load".into(), |multiple| format!("{multiple:.4}"));
         writeln!(out, "load multiple held                        {multiple}")?;
     }
     if args.explain {
@@ -215,10 +287,22 @@ fn print(out: &mut impl Write, case: &Case, score: &Score, inverse: Option<&Inve
             (_, RefinerArg::Shanno) => "refiner shanno",
         };
         if let Some(bounds) = score.bounds {
-            writeln!(out, "certificate for this pressure             {:.15} <= mu_s <= {:.15}", bounds.lower, bounds.upper)?;
+            writeln!(
+                out,
+                "certificate for this pressure             {:.15} <= mu_s <= {:.15}",
+                bounds.lower, bounds.upper
+            )?;
         }
-        writeln!(out, "largest residual of the seven equations   {:.2e}  (forces over Fn, moments over Fn sqrt(A))", score.residual)?;
-        writeln!(out, "evaluations of the integrals              {}  ({solver})", score.evaluations)?;
+        writeln!(
+            out,
+            "largest residual of the seven equations   {:.2e}  (forces over Fn, moments over Fn sqrt(A))",
+            score.residual
+        )?;
+        writeln!(
+            out,
+            "evaluations of the integrals              {}  ({solver})",
+            score.evaluations
+        )?;
     }
     Ok(())
 }
@@ -226,7 +310,8 @@ fn print(out: &mut impl Write, case: &Case, score: &Score, inverse: Option<&Inve
 /// What each start of the paper's method came to.
 fn print_runs(out: &mut impl Write, report: &paper::Report) -> anyhow::Result<()> {
     for (index, run) in report.runs.iter().enumerate() {
-        let taken = if report.published == Some(index) { "  <- taken by the paper's rule" } else { "" };
+        let taken =
+            if report.published == Some(index) { "  <- taken by the paper's rule" } else { "" };
         writeln!(
             out,
             "start {}: {:?}, mu {:.9}, E {:.1e}, residual {:.1e}, {} evaluations{taken}",
@@ -243,7 +328,9 @@ fn print_runs(out: &mut impl Write, report: &paper::Report) -> anyhow::Result<()
 
 fn note(status: Status) -> &'static str {
     match status {
-        Status::Ambiguous => "   (ambiguous: another limit state exists; this is the one on the branch from d = 0, or the smallest)",
+        Status::Ambiguous => {
+            "   (ambiguous: another limit state exists; this is the one on the branch from d = 0, or the smallest)"
+        }
         Status::Separating => "   (discarded: the pads separate)",
         Status::NotConverged => "   (NOT a solution: the seven equations do not hold)",
         _ => "",

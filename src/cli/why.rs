@@ -14,10 +14,13 @@ use gripfast::units::Quantity;
 
 use super::candidates::CandidateArgs;
 
-/// Explains one grip of a result file: every test with body and place, and what its score is made of.
+/// Explains one grip of a result file: every test with body and place, and what its score is made
+/// of.
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "EXAMPLES:\n  gripfast why grips.json 962\n  gripfast why grips.json 962 --part bracket.stl\n\n\
-For a pose that is not in the list use `gripfast plan .. --why X,Y,ANGLE,SITE`.")]
+#[command(
+    after_help = "EXAMPLES:\n  gripfast why grips.json 962\n  gripfast why grips.json 962 --part bracket.stl\n\n\
+For a pose that is not in the list use `gripfast plan .. --why X,Y,ANGLE,SITE`."
+)]
 pub(crate) struct Args {
     /// Result file of `gripfast plan`.
     grips: PathBuf,
@@ -39,24 +42,49 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         )
         .into());
     };
-    let gripper: Gripper =
-        serde_json::from_value(set.gripper.clone()).map_err(|error| Error::input(&file, format!("gripper: {error}"), "make the file again"))?;
+    let gripper: Gripper = serde_json::from_value(set.gripper.clone())
+        .map_err(|error| Error::input(&file, format!("gripper: {error}"), "make the file again"))?;
     let path = args.part.unwrap_or_else(|| PathBuf::from(&set.part.file));
     let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == set.part.unit_m);
     let part = Part::read(&path, &ReadOptions { unit })?;
-    let proposer = Proposer::new(&part, &gripper, &CandidateArgs::from_settings(&set.provenance.settings))?;
-    let explanation = proposer.explain_pose(ranked.grip.face_i, ranked.grip.face_ii, &ranked.grip.part_from_grip)?;
+    let proposer =
+        Proposer::new(&part, &gripper, &CandidateArgs::from_settings(&set.provenance.settings))?;
+    let explanation = proposer.explain_pose(
+        ranked.grip.face_i,
+        ranked.grip.face_ii,
+        &ranked.grip.part_from_grip,
+    )?;
     let mut out = std::io::stdout().lock();
     print(&mut out, &explanation)?;
     let worst = &ranked.worst;
-    writeln!(out, "rank {} of {}: score {}", ranked.rank, set.summary.ranked, ranked.score.map_or("-".into(), |score| format!("{score:.4}")))?;
-    writeln!(out, "worst load: {}", set.loads.get(worst.load as usize).map_or("?", |load| load.name.as_str()))?;
+    writeln!(
+        out,
+        "rank {} of {}: score {}",
+        ranked.rank,
+        set.summary.ranked,
+        ranked.score.map_or("-".into(), |score| format!("{score:.4}"))
+    )?;
+    writeln!(
+        out,
+        "worst load: {}",
+        set.loads.get(worst.load as usize).map_or("?", |load| load.name.as_str())
+    )?;
     // Rounded first: no negative zeros.
-    let tidy = |values: glam::DVec3, step: f64| (values * step).round().to_array().map(|value| value / step + 0.0);
+    let tidy = |values: glam::DVec3, step: f64| {
+        (values * step).round().to_array().map(|value| value / step + 0.0)
+    };
     let [f, m] = [tidy(worst.wrench.force, 1e4), tidy(worst.wrench.moment, 1e5)];
-    writeln!(out, "  in the grip frame: F ({:.4}, {:.4}, {:.4}) N, M ({:.5}, {:.5}, {:.5}) N m", f[0], f[1], f[2], m[0], m[1], m[2])?;
+    writeln!(
+        out,
+        "  in the grip frame: F ({:.4}, {:.4}, {:.4}) N, M ({:.5}, {:.5}, {:.5}) N m",
+        f[0], f[1], f[2], m[0], m[1], m[2]
+    )?;
     if let (Some(mu), Some(bounds)) = (worst.mu_s, worst.bounds) {
-        writeln!(out, "  mu_s {mu:.9}, certified between {:.9} and {:.9} for its pressure, residual {:.1e}", bounds.lower, bounds.upper, worst.residual)?;
+        writeln!(
+            out,
+            "  mu_s {mu:.9}, certified between {:.9} and {:.9} for its pressure, residual {:.1e}",
+            bounds.lower, bounds.upper, worst.residual
+        )?;
     }
     writeln!(
         out,
@@ -72,8 +100,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 /// How much more it holds, and what was asked for besides.
 fn limits(out: &mut impl Write, ranked: &RankedGrip, set: &GripSet) -> std::io::Result<()> {
-    if let (Some(safety), Some(needed), Some(multiple)) = (ranked.safety, ranked.force_needed, ranked.load_multiple) {
-        let friction = set.provenance.settings.get("pad_friction").and_then(serde_json::Value::as_f64);
+    if let (Some(safety), Some(needed), Some(multiple)) =
+        (ranked.safety, ranked.force_needed, ranked.load_multiple)
+    {
+        let friction =
+            set.provenance.settings.get("pad_friction").and_then(serde_json::Value::as_f64);
         let friction = friction.map_or(String::new(), |friction| format!(" {friction}"));
         writeln!(
             out,
@@ -113,7 +144,9 @@ pub(crate) fn pose(text: &str) -> Result<(glam::DVec2, f64, usize)> {
             "give X,Y,ANGLE,SITE, e.g. 3mm,-2mm,30deg,0 (position and angle in the plane of the face pair)",
         ));
     };
-    let site = site.parse().map_err(|_| Error::input(flag, format!("'{site}' is no site number"), "count sites (face pairs) from 0"))?;
+    let site = site.parse().map_err(|_| {
+        Error::input(flag, format!("'{site}' is no site number"), "count sites (face pairs) from 0")
+    })?;
     let length = |text: &str| Quantity::Length.parse(flag, text);
     Ok((glam::DVec2::new(length(x)?, length(y)?), Quantity::Angle.parse(flag, angle)?, site))
 }
@@ -121,14 +154,33 @@ pub(crate) fn pose(text: &str) -> Result<(glam::DVec2, f64, usize)> {
 /// Every test of an explanation, one a line.
 pub(crate) fn print(out: &mut impl Write, explanation: &Explanation) -> anyhow::Result<()> {
     let o = explanation.part_from_grip.origin * 1e3;
-    writeln!(out, "pose at ({:.3}, {:.3}, {:.3}) mm on face pair {}, width {:.3} mm", o.x, o.y, o.z, explanation.site, explanation.width * 1e3)?;
+    writeln!(
+        out,
+        "pose at ({:.3}, {:.3}, {:.3}) mm on face pair {}, width {:.3} mm",
+        o.x,
+        o.y,
+        o.z,
+        explanation.site,
+        explanation.width * 1e3
+    )?;
     for check in &explanation.checks {
-        writeln!(out, "  {} {:28} {}", if check.passed { "ok  " } else { "FAIL" }, check.name, check.detail)?;
+        writeln!(
+            out,
+            "  {} {:28} {}",
+            if check.passed { "ok  " } else { "FAIL" },
+            check.name,
+            check.detail
+        )?;
     }
     match (&explanation.rejection, explanation.place) {
-        (Some(reason), Some(at)) => {
-            writeln!(out, "rejected: {} at ({:.3}, {:.3}, {:.3}) mm", reason.name().replace('_', " "), at.x * 1e3, at.y * 1e3, at.z * 1e3)?
-        }
+        (Some(reason), Some(at)) => writeln!(
+            out,
+            "rejected: {} at ({:.3}, {:.3}, {:.3}) mm",
+            reason.name().replace('_', " "),
+            at.x * 1e3,
+            at.y * 1e3,
+            at.z * 1e3
+        )?,
         (Some(reason), None) => writeln!(out, "rejected: {}", reason.name().replace('_', " "))?,
         (None, _) => writeln!(out, "free of interference")?,
     }

@@ -1,8 +1,9 @@
-//! Closed forms over the triangle fan from the slip centre (paper 3.5): every integral is a sum over directed edges.
+//! Closed forms over the triangle fan from the slip centre (paper 3.5): every integral is a sum
+//! over directed edges.
 //!
-//! For an edge `A -> B` seen from the slip centre: unit tangent `t`, normal `n = (t2, -t1)`, `h = A x t` (distance of the
-//! line, signed), `s = t . y`, `r = |y|`, `[.]` the value at `B` minus that at `A`, and
-//! `L = asinh(s2/|h|) - asinh(s1/|h|)`. With `e = y/r`:
+//! For an edge `A -> B` seen from the slip centre: unit tangent `t`, normal `n = (t2, -t1)`, `h = A
+//! x t` (distance of the line, signed), `s = t . y`, `r = |y|`, `[.]` the value at `B` minus that
+//! at `A`, and `L = asinh(s2/|h|) - asinh(s1/|h|)`. With `e = y/r`:
 //!
 //! ```text
 //! int e_i       = (h/2)(h n_i L + t_i dr)                       int r     = (h/3) R0
@@ -18,8 +19,9 @@ use glam::DVec2;
 use super::lanes::{Block, LANES, total, widest};
 use super::{Friction, Loops};
 
-/// Below this distance of the line from the slip centre (in the pad's length scale) an edge contributes nothing: every
-/// term carries a factor `h`, and `h^2` in the logarithm must not underflow.
+/// Below this distance of the line from the slip centre (in the pad's length scale) an edge
+/// contributes nothing: every term carries a factor `h`, and `h^2` in the logarithm must not
+/// underflow.
 const H_MIN: f64 = 1e-140;
 
 /// Sums over the edges, all relative to the slip centre.
@@ -70,7 +72,10 @@ fn sums_of(edges: &[Block], Centre { c, p: [pc, p1, p2] }: Centre) -> Sums {
             let nearer = if q1 < q2 { q1 } else { q2 };
             let numerator = if astride { q1 * q2 } else { nearer + (l + dr.abs()) };
             let denominator = if astride { hh } else { nearer };
-            let log = ln_ratio(if counts { numerator } else { 1.0 }, if counts { denominator } else { 1.0 });
+            let log = ln_ratio(
+                if counts { numerator } else { 1.0 },
+                if counts { denominator } else { 1.0 },
+            );
             let inverse = 1.0 / product;
             let inv = -dr * inverse;
             let ds = (s2 * r1 - s1 * r2) * inverse;
@@ -108,8 +113,8 @@ fn sums_of(edges: &[Block], Centre { c, p: [pc, p1, p2] }: Centre) -> Sums {
     Sums { e: [e1, e2], ye: [ye11, ye12, ye22], r, yr: [yr1, yr2], q: [q11, q12, q22] }
 }
 
-/// Coefficients of `(atanh(s)/s - 1)/s^2` in powers of `s^2` up to `s = 1/3`: interpolated at the Chebyshev nodes, so
-/// that twice the function times `s^3` is right to 4e-18.
+/// Coefficients of `(atanh(s)/s - 1)/s^2` in powers of `s^2` up to `s = 1/3`: interpolated at the
+/// Chebyshev nodes, so that twice the function times `s^3` is right to 4e-18.
 const ATANH: [f64; 10] = [
     0.3333333333333333,
     0.20000000000007292,
@@ -123,8 +128,8 @@ const ATANH: [f64; 10] = [
     0.08082022805971766,
 ];
 
-/// `ln(a/b)` of positive normal numbers to 2e-16 or its last bit, without branches: the difference of the exponents, and
-/// `2 atanh((m - n)/(m + n))` of the significands.
+/// `ln(a/b)` of positive normal numbers to 2e-16 or its last bit, without branches: the difference
+/// of the exponents, and `2 atanh((m - n)/(m + n))` of the significands.
 #[inline(always)]
 fn ln_ratio(a: f64, b: f64) -> f64 {
     const FRACTION: u64 = (1 << 52) - 1;
@@ -132,7 +137,8 @@ fn ln_ratio(a: f64, b: f64) -> f64 {
     // Integers added to the last bits of this number are added to its value.
     const WHOLE: f64 = 6_755_399_441_055_744.0;
     let (a, b) = (a.to_bits(), b.to_bits());
-    let exponent = f64::from_bits((a >> 52).wrapping_sub(b >> 52).wrapping_add(WHOLE.to_bits())) - WHOLE;
+    let exponent =
+        f64::from_bits((a >> 52).wrapping_sub(b >> 52).wrapping_add(WHOLE.to_bits())) - WHOLE;
     let (m, n) = (f64::from_bits(a & FRACTION | ONE), f64::from_bits(b & FRACTION | ONE));
     let s = (m - n) / (m + n);
     let z = s * s;
@@ -154,15 +160,21 @@ pub(super) fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3]) -> Friction {
     assemble(&sums(area.blocks(), centre), c, omega)
 }
 
-/// From sums about the slip centre to integrals in the pad frame: `x = c + y`, `t = sgn(omega) (-e2, e1)`.
+/// From sums about the slip centre to integrals in the pad frame: `x = c + y`, `t = sgn(omega)
+/// (-e2, e1)`.
 fn assemble(sums: &Sums, c: DVec2, omega: f64) -> Friction {
     let sign = omega.signum();
-    // int w t and int w (x cross t) for the weight w with moments (e1, e2) = int w e and r = int w |y|.
+    // int w t and int w (x cross t) for the weight w with moments (e1, e2) = int w e and r = int w
+    // |y|.
     let row = |e1: f64, e2: f64, r: f64| [-sign * e2, sign * e1, sign * (c.x * e1 + c.y * e2 + r)];
     let g0 = row(sums.e[0], sums.e[1], sums.r);
     let gy1 = row(sums.ye[0], sums.ye[1], sums.yr[0]);
     let gy2 = row(sums.ye[1], sums.ye[2], sums.yr[1]);
-    let g = [g0, std::array::from_fn(|i| c.x * g0[i] + gy1[i]), std::array::from_fn(|i| c.y * g0[i] + gy2[i])];
+    let g = [
+        g0,
+        std::array::from_fn(|i| c.x * g0[i] + gy1[i]),
+        std::array::from_fn(|i| c.y * g0[i] + gy2[i]),
+    ];
     let scale = 1.0 / omega.abs();
     let [h11, h12, h22] = sums.q.map(|q| scale * q);
     // B H B^T with B = [[1, 0], [0, 1], [-c2, c1]]
@@ -179,7 +191,9 @@ mod tests {
 
     #[test]
     fn vectors_of_any_width_give_the_same_bits() {
-        let outer = (0..7).map(|i| (1.0 + 0.3 * f64::from(i % 3)) * DVec2::from_angle(f64::from(i) * 0.9)).collect();
+        let outer = (0..7)
+            .map(|i| (1.0 + 0.3 * f64::from(i % 3)) * DVec2::from_angle(f64::from(i) * 0.9))
+            .collect();
         let area = Loops::new(&[Polygon { outer, holes: Vec::new() }]);
         for i in 0..200 {
             let c = 0.01 * f64::from(i) * DVec2::from_angle(f64::from(i));
@@ -198,7 +212,10 @@ mod tests {
                 let (got, want) = (ln_ratio(a, b), (a / b).ln());
                 // The quotient's rounding is not in what is measured.
                 let want = if (a / b - 1.0).abs() < 0.5 { ((a - b) / b).ln_1p() } else { want };
-                assert!((got - want).abs() <= 3e-16 + 4e-16 * want.abs(), "ln({a:e}/{b:e}): {got:e} {want:e}");
+                assert!(
+                    (got - want).abs() <= 3e-16 + 4e-16 * want.abs(),
+                    "ln({a:e}/{b:e}): {got:e} {want:e}"
+                );
             }
         }
     }

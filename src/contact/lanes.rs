@@ -2,14 +2,16 @@
 
 use glam::DVec2;
 
-/// Edges in one block. The loops over it are written so that the compiler turns them into vector instructions: four
-/// numbers wide where the processor can, else two at a time, with the same bits in the result.
+/// Edges in one block. The loops over it are written so that the compiler turns them into vector
+/// instructions: four numbers wide where the processor can, else two at a time, with the same bits
+/// in the result.
 pub(super) const LANES: usize = 4;
 
 /// Numbers of the edges of a block.
 pub(super) type Lane = [f64; LANES];
 
-/// Directed edges `a -> b` with unit tangent `t` and length. Unused places hold an edge of length zero.
+/// Directed edges `a -> b` with unit tangent `t` and length. Unused places hold an edge of length
+/// zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(32))]
 pub(super) struct Block {
@@ -23,10 +25,19 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// Edges of length zero at a point; tangents and lengths of what is put in come with [`Block::measure`].
+    /// Edges of length zero at a point; tangents and lengths of what is put in come with
+    /// [`Block::measure`].
     pub(super) fn at(point: DVec2) -> Self {
         let (x, y) = ([point.x; LANES], [point.y; LANES]);
-        Self { ax: x, ay: y, bx: x, by: y, t1: [0.0; LANES], t2: [0.0; LANES], length: [0.0; LANES] }
+        Self {
+            ax: x,
+            ay: y,
+            bx: x,
+            by: y,
+            t1: [0.0; LANES],
+            t2: [0.0; LANES],
+            length: [0.0; LANES],
+        }
     }
 
     /// Tangents and lengths from the points.
@@ -48,8 +59,8 @@ pub(super) fn total(lane: &Lane) -> f64 {
     (lane[0] + lane[2]) + (lane[1] + lane[3])
 }
 
-/// Defines a function that runs `$kernel` (which must be `#[inline(always)]`) compiled for the widest vectors that the
-/// processor at hand has.
+/// Defines a function that runs `$kernel` (which must be `#[inline(always)]`) compiled for the
+/// widest vectors that the processor at hand has.
 macro_rules! widest {
     ($(#[$doc:meta])* fn $name:ident($($argument:ident: $type:ty),*) -> $out:ty = $kernel:ident) => {
         $(#[$doc])*

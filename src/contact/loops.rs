@@ -5,8 +5,8 @@ use glam::DVec2;
 use super::lanes::{Block, LANES, total, widest};
 use crate::model::Polygon;
 
-/// The boundary loops of a contact area: outer loops counter-clockwise, holes clockwise. All integrals are sums over
-/// directed edges, so which loop belongs to which does not matter.
+/// The boundary loops of a contact area: outer loops counter-clockwise, holes clockwise. All
+/// integrals are sums over directed edges, so which loop belongs to which does not matter.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Loops {
     points: Vec<DVec2>,
@@ -46,7 +46,8 @@ impl Loops {
             return;
         }
         let anchor = ring[0];
-        let area: f64 = (1..ring.len() - 1).map(|i| (ring[i] - anchor).perp_dot(ring[i + 1] - anchor)).sum();
+        let area: f64 =
+            (1..ring.len() - 1).map(|i| (ring[i] - anchor).perp_dot(ring[i + 1] - anchor)).sum();
         let start = self.points.len();
         self.points.extend(ring.iter().map(|&point| map(point)));
         if area * sense < 0.0 {
@@ -82,7 +83,10 @@ impl Loops {
 
     /// Directed edges of all loops.
     pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> {
-        self.rings().flat_map(|ring| (0..ring.len()).map(move |i| (ring[if i == 0 { ring.len() - 1 } else { i - 1 }], ring[i])))
+        self.rings().flat_map(|ring| {
+            (0..ring.len())
+                .map(move |i| (ring[if i == 0 { ring.len() - 1 } else { i - 1 }], ring[i]))
+        })
     }
 
     /// A point in the middle of the loops' points.
@@ -113,7 +117,12 @@ impl Loops {
             high = high.max(point);
         }
         self.middle = if self.points.is_empty() { DVec2::ZERO } else { (low + high) / 2.0 };
-        self.radius = self.points.iter().map(|point| point.distance_squared(self.middle)).fold(0.0, f64::max).sqrt();
+        self.radius = self
+            .points
+            .iter()
+            .map(|point| point.distance_squared(self.middle))
+            .fold(0.0, f64::max)
+            .sqrt();
         self.blocks.clear();
         self.blocks.reserve(self.points.len().div_ceil(LANES));
         let (mut count, mut start) = (0, 0);
@@ -125,7 +134,8 @@ impl Loops {
                     self.blocks.push(Block::at(b));
                 }
                 let block = &mut self.blocks[count / LANES];
-                (block.ax[lane], block.ay[lane], block.bx[lane], block.by[lane]) = (a.x, a.y, b.x, b.y);
+                (block.ax[lane], block.ay[lane], block.bx[lane], block.by[lane]) =
+                    (a.x, a.y, b.x, b.y);
                 (a, count) = (b, count + 1);
             }
             start = end;
@@ -133,8 +143,9 @@ impl Loops {
         self.moments = moments(&mut self.blocks, self.middle);
     }
 
-    /// Writes into `out` the part of the area where `p0 + p1 x1 + p2 x2 >= 0` (equations (19)(20)): each loop cut by
-    /// the line. Loops that fall apart stay joined by edges along the line, which cancel in every integral.
+    /// Writes into `out` the part of the area where `p0 + p1 x1 + p2 x2 >= 0` (equations (19)(20)):
+    /// each loop cut by the line. Loops that fall apart stay joined by edges along the line, which
+    /// cancel in every integral.
     pub fn clip_into(&self, p: [f64; 3], out: &mut Self) {
         out.points.clear();
         out.ends.clear();
@@ -167,8 +178,9 @@ impl Loops {
         }
     }
 
-    /// [`Self::moments`] from the strips between the edges and the line where `p` is zero. Triangles from one point to every
-    /// edge would be far larger than a thin contact, or than contacts far apart.
+    /// [`Self::moments`] from the strips between the edges and the line where `p` is zero.
+    /// Triangles from one point to every edge would be far larger than a thin contact, or than
+    /// contacts far apart.
     fn moments_of_strips(&self, p: [f64; 3]) -> [f64; 6] {
         let slope = DVec2::new(p[1], p[2]);
         let down = slope / -slope.length_squared();
@@ -204,9 +216,17 @@ fn moments_of(edges: &mut [Block], o: DVec2) -> [f64; 6] {
             lanes[5][i] += cross * (ay * ay + ay * by + by * by);
         }
     }
-    // About a point of the area, then moved: a sliver far from the origin keeps its relative accuracy.
+    // About a point of the area, then moved: a sliver far from the origin keeps its relative
+    // accuracy.
     let sums = lanes.each_ref().map(total);
-    let m = [sums[0] / 2.0, sums[1] / 6.0, sums[2] / 6.0, sums[3] / 12.0, sums[4] / 24.0, sums[5] / 12.0];
+    let m = [
+        sums[0] / 2.0,
+        sums[1] / 6.0,
+        sums[2] / 6.0,
+        sums[3] / 12.0,
+        sums[4] / 24.0,
+        sums[5] / 12.0,
+    ];
     moved(m, o)
 }
 

@@ -7,20 +7,39 @@ use crate::model::Polygon;
 
 fn polygon(outer: &[(f64, f64)], holes: &[&[(f64, f64)]]) -> Loops {
     let ring = |points: &[(f64, f64)]| points.iter().map(|&(x, y)| DVec2::new(x, y)).collect();
-    Loops::new(&[Polygon { outer: ring(outer), holes: holes.iter().map(|hole| ring(hole)).collect() }])
+    Loops::new(&[Polygon {
+        outer: ring(outer),
+        holes: holes.iter().map(|hole| ring(hole)).collect(),
+    }])
 }
 
 fn notched() -> Loops {
     polygon(
-        &[(-0.7, -0.5), (0.6, -0.6), (0.7, 0.5), (0.2, 0.5), (0.1, -0.1), (-0.2, 0.1), (-0.3, 0.6), (-0.8, 0.4)],
+        &[
+            (-0.7, -0.5),
+            (0.6, -0.6),
+            (0.7, 0.5),
+            (0.2, 0.5),
+            (0.1, -0.1),
+            (-0.2, 0.1),
+            (-0.3, 0.6),
+            (-0.8, 0.4),
+        ],
         &[&[(-0.5, -0.3), (-0.2, -0.35), (-0.3, -0.1)]],
     )
 }
 
-/// 24-point Gauss on dyadic pieces that shrink towards `s = 0`: exact for the smooth and the nearly singular integrand.
+/// 24-point Gauss on dyadic pieces that shrink towards `s = 0`: exact for the smooth and the nearly
+/// singular integrand.
 fn integrate(s1: f64, s2: f64, f: &dyn Fn(f64) -> [f64; 13]) -> [f64; 13] {
-    const X: [f64; 6] =
-        [0.125_233_408_511_468_92, 0.367_831_498_998_180_2, 0.587_317_954_286_617_4, 0.769_902_674_194_304_7, 0.904_117_256_370_474_9, 0.981_560_634_246_719_3];
+    const X: [f64; 6] = [
+        0.125_233_408_511_468_92,
+        0.367_831_498_998_180_2,
+        0.587_317_954_286_617_4,
+        0.769_902_674_194_304_7,
+        0.904_117_256_370_474_9,
+        0.981_560_634_246_719_3,
+    ];
     const W: [f64; 6] = [
         0.249_147_045_813_402_8,
         0.233_492_536_538_354_8,
@@ -57,8 +76,9 @@ fn integrate(s1: f64, s2: f64, f: &dyn Fn(f64) -> [f64; 13]) -> [f64; 13] {
     sum
 }
 
-/// Friction integrals by one-dimensional quadrature: with `x = c + lambda y`, `y` on the edge, the radial integral of a
-/// homogeneous integrand of degree `k` is `1/(k + 2)` times its value on the edge, and the area element is `h ds`.
+/// Friction integrals by one-dimensional quadrature: with `x = c + lambda y`, `y` on the edge, the
+/// radial integral of a homogeneous integrand of degree `k` is `1/(k + 2)` times its value on the
+/// edge, and the area element is `h ds`.
 fn oracle(area: &Loops, twist: [f64; 3], p: [f64; 3]) -> Friction {
     let [u1, u2, omega] = twist;
     let c = DVec2::new(-u2 / omega, u1 / omega);
@@ -82,7 +102,10 @@ fn oracle(area: &Loops, twist: [f64; 3], p: [f64; 3]) -> Friction {
                 let degree0 = [v.x, v.y, c.perp_dot(v)];
                 let degree1 = [0.0, 0.0, y.perp_dot(v)];
                 for i in 0..3 {
-                    value[3 * m + i] = h * (w0 * degree0[i] / 2.0 + (w1 * degree0[i] + w0 * degree1[i]) / 3.0 + w1 * degree1[i] / 4.0);
+                    value[3 * m + i] = h
+                        * (w0 * degree0[i] / 2.0
+                            + (w1 * degree0[i] + w0 * degree1[i]) / 3.0
+                            + w1 * degree1[i] / 4.0);
                 }
             }
             let (p0, p1) = (p[0] + p[1] * c.x + p[2] * c.y, p[1] * y.x + p[2] * y.y);
@@ -101,7 +124,8 @@ fn oracle(area: &Loops, twist: [f64; 3], p: [f64; 3]) -> Friction {
         let lift = [[1.0, 0.0], [0.0, 1.0], [-c.y, c.x]];
         for i in 0..3 {
             for j in 0..3 {
-                out.hessian[i][j] += lift[i][0] * (h11 * lift[j][0] + h12 * lift[j][1]) + lift[i][1] * (h12 * lift[j][0] + h22 * lift[j][1]);
+                out.hessian[i][j] += lift[i][0] * (h11 * lift[j][0] + h12 * lift[j][1])
+                    + lift[i][1] * (h12 * lift[j][0] + h22 * lift[j][1]);
             }
         }
     }
@@ -158,7 +182,8 @@ fn far_field_joins_the_fan_and_runs_into_translation() {
     for angle in [0.1f64, 1.3, 2.9, 4.4] {
         let centre = area.middle() + 3.01 * area.radius() * DVec2::new(angle.cos(), angle.sin());
         let twist = [centre.y, -centre.x, 1.0];
-        let (g, h) = worst_difference(&far::friction(&area, twist, p), &fan::friction(&area, twist, p));
+        let (g, h) =
+            worst_difference(&far::friction(&area, twist, p), &fan::friction(&area, twist, p));
         assert!(g < 5e-14 && h < 5e-14, "seam: {g:e} {h:e}");
     }
     let pure = friction(&area, [0.6, -0.8, 0.0], p);
@@ -185,7 +210,11 @@ fn hessian_is_the_derivative_of_the_gradient() {
             let (plus, minus) = (at(1.0), at(-1.0));
             for i in 0..3 {
                 let want = (plus[i] - minus[i]) / (2.0 * step);
-                assert!((got[i][j] - want).abs() < 2e-9, "{twist:?} [{i}][{j}]: {} {want}", got[i][j]);
+                assert!(
+                    (got[i][j] - want).abs() < 2e-9,
+                    "{twist:?} [{i}][{j}]: {} {want}",
+                    got[i][j]
+                );
             }
         }
     }
@@ -215,13 +244,33 @@ fn exact_mean_radii() {
         (polygon(&rectangle(1.0, 1.0), &[&rectangle(0.5, 0.5)]), 0.446_364_167_937_457_403),
         (polygon(&rectangle(1.0, 1.0), &[&rectangle(0.8, 0.8)]), 0.518_632_652_270_188_602),
     ];
-    for (n, want) in [(3usize, 0.460_057_666_050_157_725), (6, 0.607_986_405_500_360_756), (12, 0.651_575_216_783_683_405)] {
-        let ring: Vec<_> = (0..n).map(|i| (std::f64::consts::TAU * i as f64 / n as f64).sin_cos()).map(|(s, c)| (c, s)).collect();
+    for (n, want) in [
+        (3usize, 0.460_057_666_050_157_725),
+        (6, 0.607_986_405_500_360_756),
+        (12, 0.651_575_216_783_683_405),
+    ] {
+        let ring: Vec<_> = (0..n)
+            .map(|i| (std::f64::consts::TAU * i as f64 / n as f64).sin_cos())
+            .map(|(s, c)| (c, s))
+            .collect();
         cases.push((polygon(&ring, &[]), want));
     }
     for (arm, want) in [(1.0 / 3.0, 0.303_751_992_525_063_141), (0.5, 0.331_722_634_340_615_518)] {
         let (a, b) = (arm / 2.0, 0.5);
-        let cross = [(a, -b), (a, -a), (b, -a), (b, a), (a, a), (a, b), (-a, b), (-a, a), (-b, a), (-b, -a), (-a, -a), (-a, -b)];
+        let cross = [
+            (a, -b),
+            (a, -a),
+            (b, -a),
+            (b, a),
+            (a, a),
+            (a, b),
+            (-a, b),
+            (-a, a),
+            (-b, a),
+            (-b, -a),
+            (-a, -a),
+            (-a, -b),
+        ];
         cases.push((polygon(&cross, &[]), want));
     }
     for (area, want) in cases {
@@ -234,7 +283,10 @@ fn exact_mean_radii() {
 fn exact_wrenches_of_the_unit_square() {
     let area = polygon(&rectangle(1.0, 1.0), &[]);
     for ((x, y), want) in [
-        ((-0.5, -0.5), [-0.647_793_574_696_319_037, 0.647_793_574_696_319_037, 0.117_402_141_767_893_654]),
+        (
+            (-0.5, -0.5),
+            [-0.647_793_574_696_319_037, 0.647_793_574_696_319_037, 0.117_402_141_767_893_654],
+        ),
         ((-0.5, 0.0), [0.0, 0.790_228_819_434_550_872, 0.198_119_006_351_674_427]),
         ((-1.0, 0.0), [0.0, 0.953_435_465_727_766_812, 0.089_985_041_683_193_381_2]),
         ((-2.0, 0.0), [0.0, 0.989_235_815_005_028_667, 0.042_596_319_748_586_662_7]),

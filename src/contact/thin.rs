@@ -1,11 +1,14 @@
-//! Friction on a contact that is thin beside the slope of its pressure: a pad about to lift off along an edge.
+//! Friction on a contact that is thin beside the slope of its pressure: a pad about to lift off
+//! along an edge.
 //!
-//! Over the fan each edge's triangle reaches to the slip centre, where the pressure plane is far larger than on the
-//! contact, and what is left after the triangles cancel loses `1e-16 (reach/width)^2`. Here the integrals are taken over
-//! the strips between the edges and the zero-pressure line, along it (`u`) and up from it (`y`), where the pressure is its
-//! slope times `y`: over the area `int f = -oint (int_0^h f dy) du`. Seen from the slip centre a strip is thin, so that
-//! four Gauss points across it are enough, and along it as many as its length in distances asks for. Only beside the
-//! slip centre the fan is used. The loss left is `1e-16 reach/width`, which the pressure's own coefficients have too.
+//! Over the fan each edge's triangle reaches to the slip centre, where the pressure plane is far
+//! larger than on the contact, and what is left after the triangles cancel loses `1e-16
+//! (reach/width)^2`. Here the integrals are taken over the strips between the edges and the
+//! zero-pressure line, along it (`u`) and up from it (`y`), where the pressure is its slope times
+//! `y`: over the area `int f = -oint (int_0^h f dy) du`. Seen from the slip centre a strip is thin,
+//! so that four Gauss points across it are enough, and along it as many as its length in distances
+//! asks for. Only beside the slip centre the fan is used. The loss left is `1e-16 reach/width`,
+//! which the pressure's own coefficients have too.
 
 use glam::DVec2;
 
@@ -13,8 +16,9 @@ use super::far::{RULES, points};
 use super::lanes::{LANES, total, widest};
 use super::{Friction, Loops};
 
-/// Half the length, in widths, of the piece beside the slip centre that is left to the fan, whose loss on it, 4e-14, is
-/// not seen; from there on four points across the strip leave less than 1e-15.
+/// Half the length, in widths, of the piece beside the slip centre that is left to the fan, whose
+/// loss on it, 4e-14, is not seen; from there on four points across the strip leave less than
+/// 1e-15.
 const NEAR: f64 = 20.0;
 /// Half the length of the piece beside a slip centre off the strip, in distances from it.
 const ABREAST: f64 = 0.4;
@@ -30,7 +34,8 @@ struct Edge {
     h: [f64; 2],
 }
 
-/// The zero-pressure line: where `u` begins on it, its direction and that of rising pressure; and the slip on it.
+/// The zero-pressure line: where `u` begins on it, its direction and that of rising pressure; and
+/// the slip on it.
 #[derive(Clone, Copy)]
 struct Line {
     origin: DVec2,
@@ -43,7 +48,8 @@ struct Line {
     steep: f64,
 }
 
-/// See [`super::friction`]; the pressure has a slope, and `far` says whether the slip centre is out of reach.
+/// See [`super::friction`]; the pressure has a slope, and `far` says whether the slip centre is out
+/// of reach.
 pub(super) fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3], far: bool) -> Friction {
     let [u1, u2, omega] = twist;
     let slope = DVec2::new(p[1], p[2]);
@@ -58,13 +64,19 @@ pub(super) fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3], far: bool) ->
     let from = if far { area.middle() } else { DVec2::new(-u2 / omega, u1 / omega) };
     let off = height(from);
     let origin = from - off * up;
-    let velocity = if far { DVec2::new(u1 - omega * origin.y, u2 + omega * origin.x) } else { -omega * off * up.perp() };
+    let velocity = if far {
+        DVec2::new(u1 - omega * origin.y, u2 + omega * origin.x)
+    } else {
+        -omega * off * up.perp()
+    };
     let line = Line { origin, along, up, velocity, omega, steep };
-    let noise = ROUNDINGS * f64::EPSILON * (p[0].abs() / steep + area.radius() + area.middle().length());
+    let noise =
+        ROUNDINGS * f64::EPSILON * (p[0].abs() / steep + area.radius() + area.middle().length());
     let mut edges = Vec::with_capacity(area.len());
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for (a, b) in area.edges() {
-        let edge = Edge { u: [along.dot(a - origin), along.dot(b - origin)], h: [height(a), height(b)] };
+        let edge =
+            Edge { u: [along.dot(a - origin), along.dot(b - origin)], h: [height(a), height(b)] };
         if edge.h[0].abs().max(edge.h[1].abs()) > noise {
             (low, high) = (low.min(edge.u[0]).min(edge.u[1]), high.max(edge.u[0]).max(edge.u[1]));
             edges.push(edge);
@@ -83,13 +95,23 @@ pub(super) fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3], far: bool) ->
     if low < start && high > -start {
         if abreast {
             let (from, to) = (low.max(-start), high.min(start));
-            strips(&edges, line, [from, to], &RULES[points((1.0 + ABREAST * ABREAST).sqrt() / ABREAST)], &mut lanes);
+            strips(
+                &edges,
+                line,
+                [from, to],
+                &RULES[points((1.0 + ABREAST * ABREAST).sqrt() / ABREAST)],
+                &mut lanes,
+            );
         } else {
             let (mut kept, mut piece) = (Loops::default(), Loops::default());
             let origin = along.dot(origin);
             area.clip_into([start - origin, along.x, along.y], &mut kept);
             kept.clip_into([start + origin, -along.x, -along.y], &mut piece);
-            sum = if super::is_far(&piece, twist) { super::far::friction(&piece, twist, p) } else { super::fan::friction(&piece, twist, p) };
+            sum = if super::is_far(&piece, twist) {
+                super::far::friction(&piece, twist, p)
+            } else {
+                super::fan::friction(&piece, twist, p)
+            };
         }
     }
     let rule = &RULES[points((GROWTH + 1.0) / (GROWTH - 1.0))];
@@ -114,13 +136,20 @@ pub(super) fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3], far: bool) ->
 }
 
 widest! {
-    /// Adds the integrals over the strips under the edges between two places along the line, a Gauss point across in each
-    /// lane: `t`, `x_i t_j`, `x cross t` with the weights `1, x1, x2`, and the Hessian.
+    /// Adds the integrals over the strips under the edges between two places along the line, a
+    /// Gauss point across in each lane: `t`, `x_i t_j`, `x cross t` with the weights `1, x1, x2`,
+    /// and the Hessian.
     fn strips(edges: &[Edge], line: Line, between: [f64; 2], rule: &[(f64, f64)], lanes: &mut [[f64; LANES]; 15]) -> () = strips_of
 }
 
 #[inline(always)]
-fn strips_of(edges: &[Edge], line: Line, [from, to]: [f64; 2], rule: &[(f64, f64)], lanes: &mut [[f64; LANES]; 15]) {
+fn strips_of(
+    edges: &[Edge],
+    line: Line,
+    [from, to]: [f64; 2],
+    rule: &[(f64, f64)],
+    lanes: &mut [[f64; LANES]; 15],
+) {
     let across: [(f64, f64); LANES] = std::array::from_fn(|i| RULES[LANES][i]);
     let Line { origin, along, up, velocity, omega, steep } = line;
     for edge in edges {
@@ -133,7 +162,8 @@ fn strips_of(edges: &[Edge], line: Line, [from, to]: [f64; 2], rule: &[(f64, f64
             continue;
         }
         let at = |u: f64| edge.h[0] + (edge.h[1] - edge.h[0]) * ((u - a) / length);
-        let (ha, hb) = (if ua == a { edge.h[0] } else { at(ua) }, if ub == b { edge.h[1] } else { at(ub) });
+        let (ha, hb) =
+            (if ua == a { edge.h[0] } else { at(ua) }, if ub == b { edge.h[1] } else { at(ub) });
         for &(s, share) in rule {
             let (u, h) = (ua + s * (ub - ua), ha + s * (hb - ha));
             let weight = -share * (ub - ua) * h;
@@ -174,7 +204,10 @@ fn strips_of(edges: &[Edge], line: Line, [from, to]: [f64; 2], rule: &[(f64, f64
 fn assemble(lanes: &[[f64; LANES]; 15]) -> Friction {
     let n = lanes.each_ref().map(total);
     let [h11, h12, h22, h13, h23, h33] = [n[9], n[10], n[11], n[12], n[13], n[14]];
-    Friction { g: [[n[0], n[1], n[2]], [n[3], n[4], n[5]], [n[6], n[7], n[8]]], hessian: [[h11, h12, h13], [h12, h22, h23], [h13, h23, h33]] }
+    Friction {
+        g: [[n[0], n[1], n[2]], [n[3], n[4], n[5]], [n[6], n[7], n[8]]],
+        hessian: [[h11, h12, h13], [h12, h22, h23], [h13, h23, h33]],
+    }
 }
 
 #[cfg(test)]
@@ -182,14 +215,19 @@ mod tests {
     use super::*;
     use crate::model::Polygon;
 
-    /// A strip of unit length with the pressure of a unit force that falls to zero across it, turned and moved.
+    /// A strip of unit length with the pressure of a unit force that falls to zero across it,
+    /// turned and moved.
     fn strip(width: f64) -> (Loops, [f64; 3], impl Fn(f64, f64) -> DVec2) {
         let (turn, corner) = (DVec2::from_angle(0.7), DVec2::new(0.2, -0.1));
         let place = move |s: f64, h: f64| corner + turn.rotate(DVec2::new(s, h));
         let outer = vec![place(0.0, 0.0), place(1.0, 0.0), place(1.0, width), place(0.0, width)];
         let steep = 2.0 / (width * width);
         let slope = -steep * turn.perp();
-        (Loops::new(&[Polygon { outer, holes: vec![] }]), [steep * width - slope.dot(corner), slope.x, slope.y], place)
+        (
+            Loops::new(&[Polygon { outer, holes: vec![] }]),
+            [steep * width - slope.dot(corner), slope.x, slope.y],
+            place,
+        )
     }
 
     fn gradient(area: &Loops, c: DVec2, p: [f64; 3]) -> [f64; 3] {
@@ -202,7 +240,8 @@ mod tests {
             let (area, p, place) = strip(0.008);
             let c = place(s, h);
             let twist = [c.y, -c.x, 1.0];
-            let (cut, whole) = (friction(&area, twist, p, false), super::super::fan::friction(&area, twist, p));
+            let (cut, whole) =
+                (friction(&area, twist, p, false), super::super::fan::friction(&area, twist, p));
             for (a, b) in cut.gradient(p).into_iter().zip(whole.gradient(p)) {
                 assert!((a - b).abs() < 1e-11, "{s} {h}: {a} {b}");
             }
@@ -217,15 +256,22 @@ mod tests {
         // Force along and across an even line load of unit length, slip centre at (s, h) beside it.
         for (s, h) in [(0.3, 0.25), (0.5, 1e-3), (0.2, -0.1)] {
             let root = |x: f64| (x - s).hypot(h);
-            let (across, along) = (root(1.0) - root(0.0), h * (((1.0 - s) / h.abs()).asinh() - (-s / h.abs()).asinh()));
+            let (across, along) = (
+                root(1.0) - root(0.0),
+                h * (((1.0 - s) / h.abs()).asinh() - (-s / h.abs()).asinh()),
+            );
             for width in [1e-5, 1e-6, 1e-7] {
                 let (area, p, place) = strip(width);
                 let [x, y, _] = gradient(&area, place(s, h), p);
-                // Slip velocity is a quarter turn ahead of the direction from the centre: (h, x - s) over the distance.
+                // Slip velocity is a quarter turn ahead of the direction from the centre: (h, x -
+                // s) over the distance.
                 let got = DVec2::from_angle(-0.7).rotate(DVec2::new(x, y));
                 let error = (got - DVec2::new(along, across)).length();
                 // The strip's centre of pressure lies a third of its width off the line.
-                assert!(error < 3.0 * width * (1.0 + (0.1 / h).abs()), "({s}, {h}), width {width}: {got} {along} {across}");
+                assert!(
+                    error < 3.0 * width * (1.0 + (0.1 / h).abs()),
+                    "({s}, {h}), width {width}: {got} {along} {across}"
+                );
             }
         }
     }

@@ -11,41 +11,71 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
     let grips = view.grips();
     let count = grips.len() as u64;
     let part = &view.set.part;
-    let column = |value: &dyn Fn(&crate::results::RankedGrip) -> f64| grips.iter().map(value).collect::<Vec<f64>>();
+    let column = |value: &dyn Fn(&crate::results::RankedGrip) -> f64| {
+        grips.iter().map(value).collect::<Vec<f64>>()
+    };
     let mut file = FileBuilder::new();
 
     let mut object = file.create_group("object");
-    object.create_dataset("file").with_strings(&[part.file.as_str()]).map_err(std::io::Error::other)?.with_shape(&[]);
-    for (name, value) in [("scale", part.unit_m), ("mass", part.mass.mass), ("volume", part.mass.volume), ("density", part.mass.mass / part.mass.volume)] {
+    object
+        .create_dataset("file")
+        .with_strings(&[part.file.as_str()])
+        .map_err(std::io::Error::other)?
+        .with_shape(&[]);
+    for (name, value) in [
+        ("scale", part.unit_m),
+        ("mass", part.mass.mass),
+        ("volume", part.mass.volume),
+        ("density", part.mass.mass / part.mass.volume),
+    ] {
         object.create_dataset(name).with_f64_data(&[value]).with_shape(&[]);
     }
     object.create_dataset("com").with_f64_data(&part.mass.centre_of_mass.to_array());
     // Symmetric, so the order of rows and columns does not matter.
-    object.create_dataset("inertia").with_f64_data(&part.mass.inertia.to_cols_array()).with_shape(&[3, 3]);
+    object
+        .create_dataset("inertia")
+        .with_f64_data(&part.mass.inertia.to_cols_array())
+        .with_shape(&[3, 3]);
     file.add_group(object.finish());
 
     if let Some(gripper) = &view.gripper {
         let mut group = file.create_group("gripper");
-        group.create_dataset("type").with_strings(&[gripper.name.as_str()]).map_err(std::io::Error::other)?.with_shape(&[]);
+        group
+            .create_dataset("type")
+            .with_strings(&[gripper.name.as_str()])
+            .map_err(std::io::Error::other)?
+            .with_shape(&[]);
         group.create_dataset("configuration").with_f64_data(&column(&|grip| view.opened(grip)));
         file.add_group(group.finish());
     }
 
     let mut grasps = file.create_group("grasps");
-    let transforms: Vec<f64> = grips.iter().flat_map(|grip| super::matrix(&view.pose(grip)).into_iter().flatten()).collect();
-    grasps.create_dataset("transforms").with_f64_data(&transforms).with_shape(&[count, 4, 4]).set_attr("tool_frame", AttrValue::String(view.tool_frame()));
+    let transforms: Vec<f64> = grips
+        .iter()
+        .flat_map(|grip| super::matrix(&view.pose(grip)).into_iter().flatten())
+        .collect();
+    grasps
+        .create_dataset("transforms")
+        .with_f64_data(&transforms)
+        .with_shape(&[count, 4, 4])
+        .set_attr("tool_frame", AttrValue::String(view.tool_frame()));
     let mut qualities = grasps.create_group("qualities");
     let mut flex = qualities.create_group("flex");
     let held: Vec<i64> = grips.iter().map(|grip| i64::from(view.holds(grip))).collect();
-    flex.create_dataset("object_in_gripper").with_i64_data(&held).set_attr("source", AttrValue::String("computed: mu_s <= pad friction; not simulated".into()));
+    flex.create_dataset("object_in_gripper").with_i64_data(&held).set_attr(
+        "source",
+        AttrValue::String("computed: mu_s <= pad friction; not simulated".into()),
+    );
     qualities.add_group(flex.finish());
     let mut own = qualities.create_group("gripfast");
-    own.create_dataset("min_friction").with_f64_data(&column(&|grip| grip.worst.mu_s.unwrap_or(f64::NAN)));
+    own.create_dataset("min_friction")
+        .with_f64_data(&column(&|grip| grip.worst.mu_s.unwrap_or(f64::NAN)));
     own.create_dataset("score").with_f64_data(&column(&|grip| grip.score.unwrap_or(f64::INFINITY)));
     own.create_dataset("width").with_f64_data(&column(&|grip| grip.grip.width));
     own.create_dataset("contact_share").with_f64_data(&column(&|grip| grip.contact_share));
     own.create_dataset("alpha").with_f64_data(&column(&|grip| grip.alpha));
-    own.create_dataset("id").with_u64_data(&grips.iter().map(|grip| grip.grip.id).collect::<Vec<_>>());
+    own.create_dataset("id")
+        .with_u64_data(&grips.iter().map(|grip| grip.grip.id).collect::<Vec<_>>());
     qualities.add_group(own.finish());
     grasps.add_group(qualities.finish());
     file.add_group(grasps.finish());

@@ -1,6 +1,7 @@
 //! Binary glTF 2.0: the part with grippers in place.
 //!
-//! Metres, in the axes of the part frame (no turn to glTF's y-up: a pose read from the file is a pose on the part).
+//! Metres, in the axes of the part frame (no turn to glTF's y-up: a pose read from the file is a
+//! pose on the part).
 
 use std::io::Write;
 
@@ -34,9 +35,15 @@ struct Scene {
 }
 
 impl Scene {
-    /// Adds triangles and returns the number of the mesh. Positions are f32 as glTF has no others; offsets of large parts are not
-    /// taken off, so 1 m keeps 0.1 um.
-    fn mesh(&mut self, name: &str, vertices: &[DVec3], triangles: &[[u32; 3]], material: usize) -> usize {
+    /// Adds triangles and returns the number of the mesh. Positions are f32 as glTF has no others;
+    /// offsets of large parts are not taken off, so 1 m keeps 0.1 um.
+    fn mesh(
+        &mut self,
+        name: &str,
+        vertices: &[DVec3],
+        triangles: &[[u32; 3]],
+        material: usize,
+    ) -> usize {
         let start = self.bytes.len();
         let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for vertex in vertices {
@@ -71,7 +78,11 @@ struct Drawn {
     frame: Frame,
 }
 
-pub(super) fn write(view: &View<'_>, writer: &mut impl Write, part: Option<&Mesh>) -> std::io::Result<()> {
+pub(super) fn write(
+    view: &View<'_>,
+    writer: &mut impl Write,
+    part: Option<&Mesh>,
+) -> std::io::Result<()> {
     let mut scene = Scene::default();
     let mut roots = Vec::new();
     if let Some(part) = part.filter(|part| !part.triangles.is_empty()) {
@@ -82,7 +93,8 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write, part: Option<&Mesh
         None => (Vec::new(), Vec::new(), None),
         Some(gripper) => {
             let (vertices, triangles) = prism(&gripper.pad);
-            let pad = (!triangles.is_empty()).then(|| scene.mesh("pad", &vertices, &triangles, PAD));
+            let pad =
+                (!triangles.is_empty()).then(|| scene.mesh("pad", &vertices, &triangles, PAD));
             (draw(&mut scene, &gripper.fingers), draw(&mut scene, &gripper.palm), pad)
         }
     };
@@ -98,7 +110,9 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write, part: Option<&Mesh
         let mut jaws = place(&mut scene, &palm, "");
         for (name, side) in [("jaw_i", 1.0), ("jaw_ii", -1.0)] {
             let mut children = place(&mut scene, &fingers, &format!("{name}/"));
-            children.extend(pad.map(|pad| scene.node(json!({"name": format!("{id}/{name}/pad"), "mesh": pad}))));
+            children.extend(
+                pad.map(|pad| scene.node(json!({"name": format!("{id}/{name}/pad"), "mesh": pad}))),
+            );
             // Jaw II is jaw I turned by half a turn about the approach axis x1.
             let rotation = if side > 0.0 { [0.0, 0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0, 0.0] };
             let mut jaw = json!({"name": format!("{id}/{name}"), "translation": [0.0, 0.0, side * view.gap(grip) / 2.0], "rotation": rotation});
@@ -133,7 +147,12 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write, part: Option<&Mesh
     });
     // glTF forbids empty lists.
     let length = scene.bytes.len();
-    for (name, list) in [("nodes", scene.nodes), ("meshes", scene.meshes), ("accessors", scene.accessors), ("bufferViews", scene.views)] {
+    for (name, list) in [
+        ("nodes", scene.nodes),
+        ("meshes", scene.meshes),
+        ("accessors", scene.accessors),
+        ("bufferViews", scene.views),
+    ] {
         if !list.is_empty() {
             document[name] = Value::Array(list);
         }
@@ -147,14 +166,23 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write, part: Option<&Mesh
     container(writer, &document, scene.bytes)
 }
 
-/// The file: a header of 12 bytes, the JSON chunk padded by spaces, the binary chunk padded by zeros (glTF 2.0, section 4.4).
-fn container(writer: &mut impl Write, document: &Value, mut binary: Vec<u8>) -> std::io::Result<()> {
+/// The file: a header of 12 bytes, the JSON chunk padded by spaces, the binary chunk padded by
+/// zeros (glTF 2.0, section 4.4).
+fn container(
+    writer: &mut impl Write,
+    document: &Value,
+    mut binary: Vec<u8>,
+) -> std::io::Result<()> {
     let mut text = serde_json::to_vec(document)?;
     text.resize(text.len().next_multiple_of(4), b' ');
     binary.resize(binary.len().next_multiple_of(4), 0);
     let chunk = if binary.is_empty() { 0 } else { 8 + binary.len() };
     let word = |length: usize| {
-        u32::try_from(length).map(u32::to_le_bytes).map_err(|_| std::io::Error::other("the scene passes glTF's limit of 4 GiB; export fewer grips with --top"))
+        u32::try_from(length).map(u32::to_le_bytes).map_err(|_| {
+            std::io::Error::other(
+                "the scene passes glTF's limit of 4 GiB; export fewer grips with --top",
+            )
+        })
     };
     writer.write_all(b"glTF\x02\x00\x00\x00")?;
     writer.write_all(&word(12 + 8 + text.len() + chunk)?)?;
@@ -183,7 +211,10 @@ fn draw(scene: &mut Scene, bodies: &[Body]) -> Vec<Drawn> {
             // A flat hull has no surface to draw.
             (!triangles.is_empty()).then(|| Drawn {
                 name: body.name.clone(),
-                meshes: [scene.mesh(&body.name, &vertices, &triangles, BEST), scene.mesh(&body.name, &vertices, &triangles, OTHER)],
+                meshes: [
+                    scene.mesh(&body.name, &vertices, &triangles, BEST),
+                    scene.mesh(&body.name, &vertices, &triangles, OTHER),
+                ],
                 frame: body.grip_from_body,
             })
         })
@@ -193,16 +224,39 @@ fn draw(scene: &mut Scene, bodies: &[Body]) -> Vec<Drawn> {
 fn surface(shape: &Shape) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     match shape {
         Shape::Box { half } => {
-            let vertices = (0..8).map(|corner| half * DVec3::new(sign(corner & 1), sign(corner >> 1 & 1), sign(corner >> 2 & 1))).collect();
+            let vertices = (0..8)
+                .map(|corner| {
+                    half * DVec3::new(
+                        sign(corner & 1),
+                        sign(corner >> 1 & 1),
+                        sign(corner >> 2 & 1),
+                    )
+                })
+                .collect();
             // Each face as two triangles, counter-clockwise from outside; corner bits are x, y, z.
-            let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+            let faces = [
+                [0, 2, 3, 1],
+                [4, 5, 7, 6],
+                [0, 1, 5, 4],
+                [2, 6, 7, 3],
+                [0, 4, 6, 2],
+                [1, 3, 7, 5],
+            ];
             (vertices, faces.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
         }
         Shape::Cylinder { radius, half_height } => {
-            let ring: Ring = (0..SIDES).map(|side| glam::DVec2::from_angle(std::f64::consts::TAU * f64::from(side) / f64::from(SIDES)) * *radius).collect();
+            let ring: Ring = (0..SIDES)
+                .map(|side| {
+                    glam::DVec2::from_angle(
+                        std::f64::consts::TAU * f64::from(side) / f64::from(SIDES),
+                    ) * *radius
+                })
+                .collect();
             extrude(&ring, -half_height, *half_height)
         }
-        Shape::Hull { points } => parry3d_f64::transformation::try_convex_hull(points).unwrap_or_default(),
+        Shape::Hull { points } => {
+            parry3d_f64::transformation::try_convex_hull(points).unwrap_or_default()
+        }
     }
 }
 
@@ -221,7 +275,11 @@ fn extrude(ring: &Ring, low: f64, high: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     if count < 3 {
         return (Vec::new(), Vec::new());
     }
-    let vertices = ring.iter().map(|point| point.extend(low)).chain(ring.iter().map(|point| point.extend(high))).collect();
+    let vertices = ring
+        .iter()
+        .map(|point| point.extend(low))
+        .chain(ring.iter().map(|point| point.extend(high)))
+        .collect();
     let mut triangles = Vec::new();
     for side in 0..count {
         let next = (side + 1) % count;
@@ -237,9 +295,14 @@ fn extrude(ring: &Ring, low: f64, high: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
 mod tests {
     use super::*;
 
-    /// Volume by the divergence theorem: positive only when every triangle is counter-clockwise from outside.
+    /// Volume by the divergence theorem: positive only when every triangle is counter-clockwise
+    /// from outside.
     fn volume((vertices, triangles): &(Vec<DVec3>, Vec<[u32; 3]>)) -> f64 {
-        triangles.iter().map(|corners| corners.map(|corner| vertices[corner as usize])).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+        triangles
+            .iter()
+            .map(|corners| corners.map(|corner| vertices[corner as usize]))
+            .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+            .sum()
     }
 
     #[test]
@@ -248,8 +311,17 @@ mod tests {
         assert!((volume(&surface(&Shape::Box { half })) - 48.0).abs() < 1e-12);
         let cylinder = volume(&surface(&Shape::Cylinder { radius: 2.0, half_height: 1.5 }));
         assert!((cylinder / (std::f64::consts::PI * 12.0) - 1.0).abs() < 0.01);
-        let points = (0..8).map(|corner| half * DVec3::new(sign(corner & 1), sign(corner >> 1 & 1), sign(corner >> 2 & 1))).collect();
+        let points = (0..8)
+            .map(|corner| {
+                half * DVec3::new(sign(corner & 1), sign(corner >> 1 & 1), sign(corner >> 2 & 1))
+            })
+            .collect();
         assert!((volume(&surface(&Shape::Hull { points })) - 48.0).abs() < 1e-12);
-        assert!((volume(&prism(&crate::gripper::rectangle(glam::DVec2::new(2.0, 3.0)))) - 6.0 * PAD_THICKNESS).abs() < 1e-12);
+        assert!(
+            (volume(&prism(&crate::gripper::rectangle(glam::DVec2::new(2.0, 3.0))))
+                - 6.0 * PAD_THICKNESS)
+                .abs()
+                < 1e-12
+        );
     }
 }

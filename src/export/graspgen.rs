@@ -1,4 +1,5 @@
-//! GraspGen's grasp dataset JSON (its `GRASP_DATASET_FORMAT` page), with width and friction beside the poses.
+//! GraspGen's grasp dataset JSON (its `GRASP_DATASET_FORMAT` page), with width and friction beside
+//! the poses.
 
 use std::io::Write;
 

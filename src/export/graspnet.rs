@@ -1,7 +1,9 @@
-//! GraspNet's rows in a NumPy archive: score, width, height, depth, rotation (9), translation (3), object id.
+//! GraspNet's rows in a NumPy archive: score, width, height, depth, rotation (9), translation (3),
+//! object id.
 //!
-//! The score is the smallest friction coefficient that holds, as in GraspNet's labels: the smaller, the better. (GraspNet's
-//! API turns labels into `1.1 - friction` when it loads them; the array `api_scores` holds that.)
+//! The score is the smallest friction coefficient that holds, as in GraspNet's labels: the smaller,
+//! the better. (GraspNet's API turns labels into `1.1 - friction` when it loads them; the array
+//! `api_scores` holds that.)
 
 use std::io::{Cursor, Seek, Write};
 
@@ -19,7 +21,8 @@ const NOT_HELD: f64 = -1.0;
 pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result<()> {
     let pad = view.gripper.as_ref().map(|gripper| gripper.pad.as_slice()).unwrap_or_default();
     let bounds = crate::geometry::Bounds2::of(pad);
-    let (height, depth) = if bounds.is_empty() { (0.0, 0.0) } else { (bounds.size().y, bounds.max.x) };
+    let (height, depth) =
+        if bounds.is_empty() { (0.0, 0.0) } else { (bounds.size().y, bounds.max.x) };
     let grips = view.grips();
     let mut rows = Vec::with_capacity(grips.len() * COLUMNS);
     let mut scores = Vec::with_capacity(grips.len());
@@ -33,18 +36,38 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
         rows.extend(pose.origin.to_array());
         rows.push(NO_OBJECT);
     }
-    let api_scores: Vec<f64> = scores.iter().map(|score| if *score == NOT_HELD { 0.0 } else { 1.1 - score }).collect();
+    let api_scores: Vec<f64> =
+        scores.iter().map(|score| if *score == NOT_HELD { 0.0 } else { 1.1 - score }).collect();
     let ids: Vec<u64> = grips.iter().map(|grip| grip.grip.id).collect();
 
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
-    array(&mut archive, "grasps", "<f8", &[grips.len(), COLUMNS], rows.iter().map(|value| value.to_le_bytes()))?;
-    array(&mut archive, "scores", "<f8", &[grips.len()], scores.iter().map(|value| value.to_le_bytes()))?;
-    array(&mut archive, "api_scores", "<f8", &[grips.len()], api_scores.iter().map(|value| value.to_le_bytes()))?;
+    array(
+        &mut archive,
+        "grasps",
+        "<f8",
+        &[grips.len(), COLUMNS],
+        rows.iter().map(|value| value.to_le_bytes()),
+    )?;
+    array(
+        &mut archive,
+        "scores",
+        "<f8",
+        &[grips.len()],
+        scores.iter().map(|value| value.to_le_bytes()),
+    )?;
+    array(
+        &mut archive,
+        "api_scores",
+        "<f8",
+        &[grips.len()],
+        api_scores.iter().map(|value| value.to_le_bytes()),
+    )?;
     array(&mut archive, "ids", "<u8", &[grips.len()], ids.iter().map(|value| value.to_le_bytes()))?;
     writer.write_all(archive.finish().map_err(std::io::Error::other)?.get_ref())
 }
 
-/// One member of the archive in NumPy's format 1.0: magic, version, header length, a Python dictionary padded to 64 bytes, the data.
+/// One member of the archive in NumPy's format 1.0: magic, version, header length, a Python
+/// dictionary padded to 64 bytes, the data.
 fn array<W: Write + Seek>(
     archive: &mut zip::ZipWriter<W>,
     name: &str,
@@ -52,7 +75,9 @@ fn array<W: Write + Seek>(
     shape: &[usize],
     data: impl Iterator<Item = [u8; 8]>,
 ) -> std::io::Result<()> {
-    let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored).large_file(true);
+    let options = SimpleFileOptions::default()
+        .compression_method(zip::CompressionMethod::Stored)
+        .large_file(true);
     archive.start_file(format!("{name}.npy"), options).map_err(std::io::Error::other)?;
     let shape = shape.iter().map(|length| format!("{length},")).collect::<String>();
     let mut header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
@@ -60,7 +85,8 @@ fn array<W: Write + Seek>(
     header.push_str(&" ".repeat((64 - (FIXED + header.len() + 1) % 64) % 64));
     header.push('\n');
     archive.write_all(b"\x93NUMPY\x01\x00")?;
-    archive.write_all(&u16::try_from(header.len()).map_err(std::io::Error::other)?.to_le_bytes())?;
+    archive
+        .write_all(&u16::try_from(header.len()).map_err(std::io::Error::other)?.to_le_bytes())?;
     archive.write_all(header.as_bytes())?;
     for value in data {
         archive.write_all(&value)?;

@@ -1,6 +1,7 @@
 //! Result files for other programs. Each format is described field by field in `docs/formats.md`.
 //!
-//! Every pose is that of a tool frame in the part frame: axes by [`Convention`], origin by [`Origin`], metres, right-handed.
+//! Every pose is that of a tool frame in the part frame: axes by [`Convention`], origin by
+//! [`Origin`], metres, right-handed.
 
 mod acronym;
 mod glb;
@@ -82,16 +83,34 @@ impl Format {
     /// # Errors
     /// When none does, or the ending is used by several formats.
     pub fn from_path(path: &Path) -> Result<Self> {
-        let name = path.file_name().map(|name| name.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+        let name = path
+            .file_name()
+            .map(|name| name.to_string_lossy().to_ascii_lowercase())
+            .unwrap_or_default();
         let place = path.display().to_string();
-        if [".yaml", ".yml"].iter().any(|ending| name.ends_with(ending)) && !Self::ALL.iter().any(|known| known.2.iter().any(|ending| name.ends_with(ending))) {
-            return Err(Error::input(place, "YAML is used by isaac_grasp and by moveit", "add --format isaac_grasp or --format moveit"));
+        if [".yaml", ".yml"].iter().any(|ending| name.ends_with(ending))
+            && !Self::ALL.iter().any(|known| known.2.iter().any(|ending| name.ends_with(ending)))
+        {
+            return Err(Error::input(
+                place,
+                "YAML is used by isaac_grasp and by moveit",
+                "add --format isaac_grasp or --format moveit",
+            ));
         }
-        let endings = Self::ALL.iter().flat_map(|known| known.2.iter().map(move |ending| (known.0, *ending)));
-        endings.filter(|(_, ending)| name.ends_with(ending)).max_by_key(|(_, ending)| ending.len()).map(|known| known.0).ok_or_else(|| {
-            let names = Self::ALL.map(|known| known.1).join(", ");
-            Error::input(place, "the file's ending names no format", format!("add --format, one of: {names}"))
-        })
+        let endings =
+            Self::ALL.iter().flat_map(|known| known.2.iter().map(move |ending| (known.0, *ending)));
+        endings
+            .filter(|(_, ending)| name.ends_with(ending))
+            .max_by_key(|(_, ending)| ending.len())
+            .map(|known| known.0)
+            .ok_or_else(|| {
+                let names = Self::ALL.map(|known| known.1).join(", ");
+                Error::input(
+                    place,
+                    "the file's ending names no format",
+                    format!("add --format, one of: {names}"),
+                )
+            })
     }
 
     /// Tool axes that readers of this format expect.
@@ -154,12 +173,17 @@ impl<'a> View<'a> {
     fn new(set: &'a GripSet, format: Format, options: &'a Options) -> Result<Self> {
         let convention = options.convention.unwrap_or_else(|| format.convention());
         let gripper = serde_json::from_value::<Gripper>(set.gripper.clone());
-        let grip_from_tool = tool::grip_from_tool(convention, options.origin, gripper.as_ref().ok())?;
+        let grip_from_tool =
+            tool::grip_from_tool(convention, options.origin, gripper.as_ref().ok())?;
         // What the format cannot do without.
         if matches!(format, Format::GraspNet | Format::Glb)
             && let Err(error) = &gripper
         {
-            return Err(Error::input("gripper in the result file", format!("cannot be read: {error}"), "write the result anew with `gripfast plan`"));
+            return Err(Error::input(
+                "gripper in the result file",
+                format!("cannot be read: {error}"),
+                "write the result anew with `gripfast plan`",
+            ));
         }
         Ok(Self { set, gripper: gripper.ok(), options, grip_from_tool, convention })
     }
@@ -179,25 +203,37 @@ impl<'a> View<'a> {
         self.gripper.as_ref().map_or(grip.grip.width, |gripper| gripper.jaw_gap(&grip.grip))
     }
 
-    /// Distance of the pads before closing [m]: as asked for, as planned, or as far as the stroke allows.
+    /// Distance of the pads before closing [m]: as asked for, as planned, or as far as the stroke
+    /// allows.
     fn opened(&self, grip: &RankedGrip) -> f64 {
         let gap = self.gap(grip);
         match (self.options.opening, &self.gripper) {
             (Some(opened), _) if grip.grip.inside => opened.min(gap),
             (Some(opened), _) => opened.max(gap),
-            (None, Some(gripper)) => gripper.opened_gap(&grip.grip, self.setting("opening_m").unwrap_or(f64::INFINITY)),
+            (None, Some(gripper)) => {
+                gripper.opened_gap(&grip.grip, self.setting("opening_m").unwrap_or(f64::INFINITY))
+            }
             (None, None) => gap,
         }
     }
 
     /// A number among the settings of the run.
     fn setting(&self, name: &str) -> Option<f64> {
-        self.set.provenance.settings.get(name).and_then(serde_json::Value::as_f64).filter(|value| value.is_finite())
+        self.set
+            .provenance
+            .settings
+            .get(name)
+            .and_then(serde_json::Value::as_f64)
+            .filter(|value| value.is_finite())
     }
 
-    /// Whether the pads' friction holds the worst load; without a known friction, whether any would.
+    /// Whether the pads' friction holds the worst load; without a known friction, whether any
+    /// would.
     fn holds(&self, grip: &RankedGrip) -> bool {
-        let friction = self.options.pad_friction.or_else(|| self.gripper.as_ref().and_then(|gripper| gripper.pad_friction));
+        let friction = self
+            .options
+            .pad_friction
+            .or_else(|| self.gripper.as_ref().and_then(|gripper| gripper.pad_friction));
         grip.worst.mu_s.is_some_and(|mu_s| friction.is_none_or(|friction| mu_s <= friction))
     }
 
@@ -207,7 +243,8 @@ impl<'a> View<'a> {
     }
 }
 
-/// A quality in (0, 1] that falls with `mu_s`: 1 when no friction is needed, 1/2 at `mu_s = 1`, 0 when no friction holds.
+/// A quality in (0, 1] that falls with `mu_s`: 1 when no friction is needed, 1/2 at `mu_s = 1`, 0
+/// when no friction holds.
 fn quality(grip: &RankedGrip) -> f64 {
     grip.worst.mu_s.map_or(0.0, |mu_s| 1.0 / (1.0 + mu_s))
 }
@@ -216,15 +253,27 @@ fn quality(grip: &RankedGrip) -> f64 {
 fn matrix(frame: &Frame) -> [[f64; 4]; 4] {
     let r = frame.rotation.transpose();
     let t = frame.origin;
-    [[r.x_axis.x, r.x_axis.y, r.x_axis.z, t.x], [r.y_axis.x, r.y_axis.y, r.y_axis.z, t.y], [r.z_axis.x, r.z_axis.y, r.z_axis.z, t.z], [0.0, 0.0, 0.0, 1.0]]
+    [
+        [r.x_axis.x, r.x_axis.y, r.x_axis.z, t.x],
+        [r.y_axis.x, r.y_axis.y, r.y_axis.z, t.y],
+        [r.z_axis.x, r.z_axis.y, r.z_axis.z, t.z],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
 }
 
-/// Writes `set` to `path`, whole or not at all. `part` is the part's mesh, which only [`Format::Glb`] draws.
+/// Writes `set` to `path`, whole or not at all. `part` is the part's mesh, which only
+/// [`Format::Glb`] draws.
 ///
 /// # Errors
-/// When the format is not built in, needs something that the set lacks (a gripper that can be read, its flange), or the file cannot
-/// be written.
-pub fn write(set: &GripSet, format: Format, path: &Path, options: &Options, part: Option<&Mesh>) -> Result<()> {
+/// When the format is not built in, needs something that the set lacks (a gripper that can be read,
+/// its flange), or the file cannot be written.
+pub fn write(
+    set: &GripSet,
+    format: Format,
+    path: &Path,
+    options: &Options,
+    part: Option<&Mesh>,
+) -> Result<()> {
     check(format)?;
     let view = View::new(set, format, options)?;
     crate::file::write(path, |writer| write_view(&view, format, writer, part))
@@ -234,10 +283,17 @@ pub fn write(set: &GripSet, format: Format, path: &Path, options: &Options, part
 ///
 /// # Errors
 /// As [`write`].
-pub fn write_to(set: &GripSet, format: Format, writer: &mut (impl Write + Send), options: &Options, part: Option<&Mesh>) -> Result<()> {
+pub fn write_to(
+    set: &GripSet,
+    format: Format,
+    writer: &mut (impl Write + Send),
+    options: &Options,
+    part: Option<&Mesh>,
+) -> Result<()> {
     check(format)?;
     let view = View::new(set, format, options)?;
-    write_view(&view, format, writer, part).map_err(|error| Error::io(Path::new("standard output"), "write", error))
+    write_view(&view, format, writer, part)
+        .map_err(|error| Error::io(Path::new("standard output"), "write", error))
 }
 
 /// Refuses a format that this build lacks, before anything is computed or written.
@@ -260,11 +316,20 @@ pub fn check(format: Format) -> Result<()> {
     }
 }
 
-fn write_view(view: &View<'_>, format: Format, writer: &mut (impl Write + Send), part: Option<&Mesh>) -> std::io::Result<()> {
+fn write_view(
+    view: &View<'_>,
+    format: Format,
+    writer: &mut (impl Write + Send),
+    part: Option<&Mesh>,
+) -> std::io::Result<()> {
     match format {
         Format::Json | Format::JsonLines => {
             let set = GripSet { grips: view.grips().to_vec(), ..view.set.clone() };
-            if format == Format::Json { set.write_json(writer) } else { set.write_json_lines(writer) }
+            if format == Format::Json {
+                set.write_json(writer)
+            } else {
+                set.write_json_lines(writer)
+            }
         }
         Format::Csv => table::write_csv(&table::from_view(view), writer),
         Format::Parquet => parquet::write(view, writer),

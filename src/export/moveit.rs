@@ -15,18 +15,30 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
     let frame = string(&view.options.part_frame);
     let force = view.setting("force_n").unwrap_or(0.0);
     let header = format!("{{stamp: {{sec: 0, nanosec: 0}}, frame_id: {frame}}}");
-    let names = view.options.joints.iter().map(|joint| string(&joint.name)).collect::<Vec<_>>().join(", ");
+    let names =
+        view.options.joints.iter().map(|joint| string(&joint.name)).collect::<Vec<_>>().join(", ");
     let posture = |width: f64, effort: Option<f64>| {
-        let positions = view.options.joints.iter().map(|joint| number(joint.position(width))).collect::<Vec<_>>().join(", ");
-        let efforts = effort.map(|effort| vec![number(effort); view.options.joints.len()].join(", ")).unwrap_or_default();
+        let positions = view
+            .options
+            .joints
+            .iter()
+            .map(|joint| number(joint.position(width)))
+            .collect::<Vec<_>>()
+            .join(", ");
+        let efforts = effort
+            .map(|effort| vec![number(effort); view.options.joints.len()].join(", "))
+            .unwrap_or_default();
         format!(
             "    header: {header}\n    joint_names: [{names}]\n    points:\n    - {{positions: [{positions}], velocities: [], accelerations: [], effort: [{efforts}], time_from_start: {{sec: 0, nanosec: 0}}}}"
         )
     };
     let translation = |direction: DVec3| {
         let [x, y, z] = direction.to_array().map(number);
-        let (desired, least) = (number(view.options.approach), number(view.options.approach * LEAST_SHARE));
-        format!("    direction: {{header: {header}, vector: {{x: {x}, y: {y}, z: {z}}}}}\n    desired_distance: {desired}\n    min_distance: {least}")
+        let (desired, least) =
+            (number(view.options.approach), number(view.options.approach * LEAST_SHARE));
+        format!(
+            "    direction: {{header: {header}, vector: {{x: {x}, y: {y}, z: {z}}}}}\n    desired_distance: {desired}\n    min_distance: {least}"
+        )
     };
     writeln!(writer, "# moveit_msgs/Grasp, best first. Poses in metres in the frame of the part.")?;
     writeln!(writer, "# Tool frame: {}", view.tool_frame())?;
@@ -41,8 +53,15 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
         let approach = grip.grip.part_from_grip.rotation.x_axis;
         writeln!(writer, "- id: {}", string(&grip.grip.id.to_string()))?;
         writeln!(writer, "  pre_grasp_posture:\n{}", posture(view.opened(grip), None))?;
-        writeln!(writer, "  grasp_posture:\n{}", posture(view.gap(grip), (force > 0.0).then_some(force)))?;
-        writeln!(writer, "  grasp_pose:\n    header: {header}\n    pose:\n      position: {{x: {x}, y: {y}, z: {z}}}")?;
+        writeln!(
+            writer,
+            "  grasp_posture:\n{}",
+            posture(view.gap(grip), (force > 0.0).then_some(force))
+        )?;
+        writeln!(
+            writer,
+            "  grasp_pose:\n    header: {header}\n    pose:\n      position: {{x: {x}, y: {y}, z: {z}}}"
+        )?;
         writeln!(writer, "      orientation: {{x: {qx}, y: {qy}, z: {qz}, w: {qw}}}")?;
         writeln!(writer, "  grasp_quality: {}", number(quality(grip)))?;
         writeln!(writer, "  pre_grasp_approach:\n{}", translation(approach))?;

@@ -1,4 +1,5 @@
-//! The table as Apache Parquet (Zstandard), with the tool frame and the provenance among the file's key-value pairs.
+//! The table as Apache Parquet (Zstandard), with the tool frame and the provenance among the file's
+//! key-value pairs.
 
 use std::io::Write;
 
@@ -22,15 +23,19 @@ pub(super) fn write(view: &View<'_>, writer: &mut (impl Write + Send)) -> std::i
     let mut arrays: Vec<ArrayRef> = Vec::new();
     for column in table.columns {
         let (kind, nullable, array): (_, _, ArrayRef) = match column.values {
-            Values::Integer(values) => (DataType::UInt64, false, Arc::new(UInt64Array::from(values))),
-            Values::Number(values) => (DataType::Float64, true, Arc::new(Float64Array::from(values))),
+            Values::Integer(values) => {
+                (DataType::UInt64, false, Arc::new(UInt64Array::from(values)))
+            }
+            Values::Number(values) => {
+                (DataType::Float64, true, Arc::new(Float64Array::from(values)))
+            }
             Values::Text(values) => (DataType::Utf8, false, Arc::new(StringArray::from(values))),
         };
         fields.push(Field::new(column.name, kind, nullable));
         arrays.push(array);
     }
-    // In the schema's metadata, where readers by way of Arrow see it; the writer repeats it as a key-value pair of the file.
-    // One key: the order of several would change from run to run.
+    // In the schema's metadata, where readers by way of Arrow see it; the writer repeats it as a
+    // key-value pair of the file. One key: the order of several would change from run to run.
     let notes = serde_json::json!({
         "tool_frame": view.tool_frame(),
         "part": view.set.part,
@@ -40,8 +45,11 @@ pub(super) fn write(view: &View<'_>, writer: &mut (impl Write + Send)) -> std::i
     let notes = HashMap::from([("gripfast".to_owned(), notes.to_string())]);
     let schema = Arc::new(Schema::new_with_metadata(fields, notes));
     let batch = RecordBatch::try_new(Arc::clone(&schema), arrays).map_err(std::io::Error::other)?;
-    let properties = WriterProperties::builder().set_compression(Compression::ZSTD(ZstdLevel::default())).build();
-    let mut parquet = ArrowWriter::try_new(writer, schema, Some(properties)).map_err(std::io::Error::other)?;
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .build();
+    let mut parquet =
+        ArrowWriter::try_new(writer, schema, Some(properties)).map_err(std::io::Error::other)?;
     parquet.write(&batch).map_err(std::io::Error::other)?;
     parquet.close().map_err(std::io::Error::other)?;
     Ok(())

@@ -49,16 +49,29 @@ pub fn table(set: &GripSet, options: &Options) -> Result<Table> {
 
 pub(super) fn from_view(view: &View<'_>) -> Table {
     let grips = view.grips();
-    let integer = |name, value: &dyn Fn(&RankedGrip) -> u64| Column { name, values: Values::Integer(grips.iter().map(value).collect()) };
-    let text = |name, value: &dyn Fn(&RankedGrip) -> String| Column { name, values: Values::Text(grips.iter().map(value).collect()) };
+    let integer = |name, value: &dyn Fn(&RankedGrip) -> u64| Column {
+        name,
+        values: Values::Integer(grips.iter().map(value).collect()),
+    };
+    let text = |name, value: &dyn Fn(&RankedGrip) -> String| Column {
+        name,
+        values: Values::Text(grips.iter().map(value).collect()),
+    };
     let number = |name, value: &dyn Fn(&RankedGrip) -> Option<f64>| Column {
         name,
-        values: Values::Number(grips.iter().map(|grip| value(grip).filter(|value| value.is_finite())).collect()),
+        values: Values::Number(
+            grips.iter().map(|grip| value(grip).filter(|value| value.is_finite())).collect(),
+        ),
     };
     let vector = |names: [&'static str; 3], value: &dyn Fn(&RankedGrip) -> DVec3| {
-        names.into_iter().enumerate().map(move |(axis, name)| number(name, &|grip| Some(value(grip)[axis]))).collect::<Vec<_>>()
+        names
+            .into_iter()
+            .enumerate()
+            .map(move |(axis, name)| number(name, &|grip| Some(value(grip)[axis])))
+            .collect::<Vec<_>>()
     };
-    let quaternion = |grip: &RankedGrip| positive(DQuat::from_mat3(&view.pose(grip).rotation)).to_array();
+    let quaternion =
+        |grip: &RankedGrip| positive(DQuat::from_mat3(&view.pose(grip).rotation)).to_array();
 
     let mut columns = vec![
         integer("rank", &|grip| grip.rank),
@@ -67,16 +80,31 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
         number("mu_s", &|grip| grip.worst.mu_s),
         text("status", &|grip| word(&grip.worst.status)),
         integer("load", &|grip| u64::from(grip.worst.load)),
-        text("load_name", &|grip| view.set.loads.get(grip.worst.load as usize).map(|load| load.name.clone()).unwrap_or_default()),
+        text("load_name", &|grip| {
+            view.set
+                .loads
+                .get(grip.worst.load as usize)
+                .map(|load| load.name.clone())
+                .unwrap_or_default()
+        }),
         number("width_m", &|grip| Some(grip.grip.width)),
         text("side", &|grip| if grip.grip.inside { "inside".into() } else { "outside".into() }),
         number("jaw_gap_m", &|grip| Some(view.gap(grip))),
         number("opened_gap_m", &|grip| Some(view.opened(grip))),
     ];
     columns.extend(vector(["x_m", "y_m", "z_m"], &|grip| view.pose(grip).origin));
-    columns.extend(["qx", "qy", "qz", "qw"].into_iter().enumerate().map(|(index, name)| number(name, &|grip| Some(quaternion(grip)[index]))));
-    columns.extend(vector(["approach_x", "approach_y", "approach_z"], &|grip| grip.grip.part_from_grip.rotation.x_axis));
-    columns.extend(vector(["closing_x", "closing_y", "closing_z"], &|grip| grip.grip.part_from_grip.rotation.z_axis));
+    columns.extend(
+        ["qx", "qy", "qz", "qw"]
+            .into_iter()
+            .enumerate()
+            .map(|(index, name)| number(name, &|grip| Some(quaternion(grip)[index]))),
+    );
+    columns.extend(vector(["approach_x", "approach_y", "approach_z"], &|grip| {
+        grip.grip.part_from_grip.rotation.x_axis
+    }));
+    columns.extend(vector(["closing_x", "closing_y", "closing_z"], &|grip| {
+        grip.grip.part_from_grip.rotation.z_axis
+    }));
     columns.extend([
         text("tool_frame", &|_| view.tool_frame()),
         integer("face_i", &|grip| u64::from(grip.grip.face_i)),
@@ -100,8 +128,11 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
         number("slip_c1_m", &|grip| slip_centre(grip).map(|c| c[0])),
         number("slip_c2_m", &|grip| slip_centre(grip).map(|c| c[1])),
     ]);
-    columns.extend(vector(["force_1_n", "force_2_n", "force_3_n"], &|grip| grip.worst.wrench.force));
-    columns.extend(vector(["moment_1_nm", "moment_2_nm", "moment_3_nm"], &|grip| grip.worst.wrench.moment));
+    columns
+        .extend(vector(["force_1_n", "force_2_n", "force_3_n"], &|grip| grip.worst.wrench.force));
+    columns.extend(vector(["moment_1_nm", "moment_2_nm", "moment_3_nm"], &|grip| {
+        grip.worst.wrench.moment
+    }));
     columns.extend([
         number("mu_lower", &|grip| grip.worst.bounds.map(|bounds| bounds.lower)),
         number("mu_upper", &|grip| grip.worst.bounds.map(|bounds| bounds.upper)),
@@ -112,12 +143,16 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
         columns.extend([
             number("noise_mu_s_95", &|grip| grip.pose_noise.and_then(|noise| noise.mu_s_95)),
             number("noise_mu_s_worst", &|grip| grip.pose_noise.and_then(|noise| noise.mu_s_worst)),
-            number("noise_lost_share", &|grip| grip.pose_noise.map(|noise| f64::from(noise.lost) / f64::from(noise.samples))),
+            number("noise_lost_share", &|grip| {
+                grip.pose_noise.map(|noise| f64::from(noise.lost) / f64::from(noise.samples))
+            }),
         ]);
     }
     if grips.iter().any(|grip| grip.earlier.is_some()) {
         columns.extend([
-            number("earlier_evaluation", &|grip| grip.earlier.as_ref().map(|earlier| earlier.evaluation)),
+            number("earlier_evaluation", &|grip| {
+                grip.earlier.as_ref().map(|earlier| earlier.evaluation)
+            }),
             number("earlier_place", &|grip| grip.earlier.as_ref().map(|earlier| earlier.place)),
             number("earlier_mu_s", &|grip| grip.earlier.as_ref().map(|earlier| earlier.mu_s)),
         ]);
@@ -125,7 +160,8 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
     Table { columns, rows: grips.len() }
 }
 
-/// The quaternion with a scalar part that is not negative: one of the two that mean the same rotation.
+/// The quaternion with a scalar part that is not negative: one of the two that mean the same
+/// rotation.
 pub(super) fn positive(quaternion: DQuat) -> DQuat {
     let quaternion = quaternion.normalize();
     if quaternion.w < 0.0 { -quaternion } else { quaternion }
@@ -140,7 +176,10 @@ fn slip_centre(grip: &RankedGrip) -> Option<[f64; 2]> {
 
 /// A unit variant as the result file spells it.
 fn word(value: &impl serde::Serialize) -> String {
-    serde_json::to_value(value).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+    serde_json::to_value(value)
+        .ok()
+        .and_then(|value| value.as_str().map(str::to_owned))
+        .unwrap_or_default()
 }
 
 pub(super) fn write_csv(table: &Table, writer: &mut impl Write) -> std::io::Result<()> {
@@ -150,7 +189,9 @@ pub(super) fn write_csv(table: &Table, writer: &mut impl Write) -> std::io::Resu
         csv.write_record(table.columns.iter().map(|column| match &column.values {
             Values::Integer(values) => values[row].to_string(),
             // The shortest text that reads back as the same number.
-            Values::Number(values) => values[row].map(|value| format!("{value:?}")).unwrap_or_default(),
+            Values::Number(values) => {
+                values[row].map(|value| format!("{value:?}")).unwrap_or_default()
+            }
             Values::Text(values) => values[row].clone(),
         }))?;
     }

@@ -1,4 +1,5 @@
-//! The tool frame of a file: which axes it has, where its origin lies, and the joints that hold the opening.
+//! The tool frame of a file: which axes it has, where its origin lies, and the joints that hold the
+//! opening.
 
 use std::fmt;
 
@@ -69,18 +70,30 @@ impl Stated {
 
 impl Convention {
     /// Every convention with its name, but for the frames that a gripper file states.
-    pub const ALL: [(Self, &'static str); 5] =
-        [(Self::Standard, "standard"), (Self::GraspGen, "graspgen"), (Self::GraspNet, "graspnet"), (Self::DexNet, "dexnet"), (Self::MoveIt, "moveit")];
+    pub const ALL: [(Self, &'static str); 5] = [
+        (Self::Standard, "standard"),
+        (Self::GraspGen, "graspgen"),
+        (Self::GraspNet, "graspnet"),
+        (Self::DexNet, "dexnet"),
+        (Self::MoveIt, "moveit"),
+    ];
 
     /// The convention of this name.
     ///
     /// # Errors
     /// When there is none; the message lists them.
     pub fn parse(place: &str, name: &str) -> Result<Self> {
-        let known = Self::ALL.iter().find(|known| known.1.eq_ignore_ascii_case(name)).map(|known| known.0);
+        let known =
+            Self::ALL.iter().find(|known| known.1.eq_ignore_ascii_case(name)).map(|known| known.0);
         known.or(Stated::parse(name).map(Self::Stated)).ok_or_else(|| {
-            let names = Self::ALL.map(|(convention, name)| format!("{name} ({})", convention.axes())).join(", ");
-            Error::input(place, format!("'{name}' is not a convention"), format!("use one of: {names}, flange, tool (as the gripper file states them)"))
+            let names = Self::ALL
+                .map(|(convention, name)| format!("{name} ({})", convention.axes()))
+                .join(", ");
+            Error::input(
+                place,
+                format!("'{name}' is not a convention"),
+                format!("use one of: {names}, flange, tool (as the gripper file states them)"),
+            )
         })
     }
 
@@ -102,9 +115,13 @@ impl Convention {
     pub fn rotation(self, gripper: Option<&Gripper>) -> Result<DMat3> {
         let (approach, closing) = (DVec3::X, DVec3::Z);
         Ok(match self {
-            Self::Standard | Self::MoveIt => DMat3::from_cols(closing.cross(approach), closing, approach),
+            Self::Standard | Self::MoveIt => {
+                DMat3::from_cols(closing.cross(approach), closing, approach)
+            }
             Self::GraspGen => DMat3::from_cols(closing, approach.cross(closing), approach),
-            Self::GraspNet | Self::DexNet => DMat3::from_cols(approach, closing, approach.cross(closing)),
+            Self::GraspNet | Self::DexNet => {
+                DMat3::from_cols(approach, closing, approach.cross(closing))
+            }
             Self::Stated(stated) => stated.frame("--convention", gripper)?.rotation,
         })
     }
@@ -132,9 +149,11 @@ impl Origin {
             _ => match (Stated::parse(text), Quantity::Length.parse(place, text)) {
                 (Some(stated), _) => Ok(Self::Stated(stated)),
                 (None, Ok(distance)) => Ok(Self::Behind(distance)),
-                (None, Err(_)) => {
-                    Err(Error::input(place, format!("'{text}' is not an origin"), "use pads, flange, tool, or a distance behind the pads, e.g. 103.4mm"))
-                }
+                (None, Err(_)) => Err(Error::input(
+                    place,
+                    format!("'{text}' is not an origin"),
+                    "use pads, flange, tool, or a distance behind the pads, e.g. 103.4mm",
+                )),
             },
         }
     }
@@ -175,14 +194,23 @@ impl Joint {
     /// # Errors
     /// When the name is empty, or scale or offset is not a finite number.
     pub fn parse(place: &str, text: &str) -> Result<Self> {
-        let wrong = |problem: String| Error::input(place, problem, "write NAME:SCALE:OFFSET, e.g. panda_finger_joint1:0.5 or finger_joint:-9.41:0.8");
+        let wrong = |problem: String| {
+            Error::input(
+                place,
+                problem,
+                "write NAME:SCALE:OFFSET, e.g. panda_finger_joint1:0.5 or finger_joint:-9.41:0.8",
+            )
+        };
         let mut pieces = text.split(':');
         let name = pieces.next().unwrap_or_default().trim().to_owned();
         let mut number = |default: f64| match pieces.next() {
             None => Ok(default),
-            Some(piece) => {
-                piece.trim().parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| wrong(format!("'{text}': '{piece}' is not a number")))
-            }
+            Some(piece) => piece
+                .trim()
+                .parse::<f64>()
+                .ok()
+                .filter(|value| value.is_finite())
+                .ok_or_else(|| wrong(format!("'{text}': '{piece}' is not a number"))),
         };
         let (scale, offset) = (number(1.0)?, number(0.0)?);
         if name.is_empty() || pieces.next().is_some() {
@@ -201,7 +229,11 @@ impl Joint {
 ///
 /// # Errors
 /// When the flange or the tool frame is asked for and the gripper states none.
-pub fn grip_from_tool(convention: Convention, origin: Origin, gripper: Option<&Gripper>) -> Result<Frame> {
+pub fn grip_from_tool(
+    convention: Convention,
+    origin: Origin,
+    gripper: Option<&Gripper>,
+) -> Result<Frame> {
     let origin = match origin {
         Origin::Pads => DVec3::ZERO,
         Origin::Behind(distance) => DVec3::X * -distance,
@@ -229,22 +261,38 @@ mod tests {
             assert_eq!((axis(words[0]), axis(words[3])), (DVec3::X, DVec3::Z), "{name}");
             assert_eq!(Convention::parse("--convention", name).unwrap(), convention);
         }
-        assert!(Convention::parse("--convention", "other").unwrap_err().to_string().contains("graspgen (z approach, x closing)"));
+        assert!(
+            Convention::parse("--convention", "other")
+                .unwrap_err()
+                .to_string()
+                .contains("graspgen (z approach, x closing)")
+        );
     }
 
     #[test]
     fn frames_of_the_gripper_file() {
-        let text = crate::gripper::catalogue::text("generic").unwrap() + "\n[tool]\norigin = [\"5mm\", \"0mm\", \"0mm\"]\nz = [1, 0, 0]\ny = [0, 1, 1]\n";
+        let text = crate::gripper::catalogue::text("generic").unwrap()
+            + "\n[tool]\norigin = [\"5mm\", \"0mm\", \"0mm\"]\nz = [1, 0, 0]\ny = [0, 1, 1]\n";
         let gripper = crate::gripper::parse(&text, "test").unwrap();
-        let [convention, origin] = [Convention::parse("--convention", "tool").unwrap(), Convention::parse("--convention", "flange").unwrap()];
-        let tool = grip_from_tool(convention, Origin::parse("--origin", "tool").unwrap(), Some(&gripper)).unwrap();
+        let [convention, origin] = [
+            Convention::parse("--convention", "tool").unwrap(),
+            Convention::parse("--convention", "flange").unwrap(),
+        ];
+        let tool =
+            grip_from_tool(convention, Origin::parse("--origin", "tool").unwrap(), Some(&gripper))
+                .unwrap();
         assert_eq!(tool, gripper.grip_from_tool.unwrap());
         assert!((tool.rotation.y_axis - DVec3::new(0.0, 1.0, 1.0).normalize()).length() < 1e-15);
-        let flange = grip_from_tool(origin, Origin::parse("--origin", "flange").unwrap(), Some(&gripper)).unwrap();
+        let flange =
+            grip_from_tool(origin, Origin::parse("--origin", "flange").unwrap(), Some(&gripper))
+                .unwrap();
         assert_eq!(flange, gripper.grip_from_flange.unwrap());
         let franka = crate::gripper::find("franka-hand").unwrap();
-        for (convention, origin) in [(convention, Origin::Pads), (Convention::Standard, Origin::Stated(Stated::Tool))] {
-            let message = grip_from_tool(convention, origin, Some(&franka)).unwrap_err().to_string();
+        for (convention, origin) in
+            [(convention, Origin::Pads), (Convention::Standard, Origin::Stated(Stated::Tool))]
+        {
+            let message =
+                grip_from_tool(convention, origin, Some(&franka)).unwrap_err().to_string();
             assert!(message.contains("states no tool") && message.contains("[tool]"), "{message}");
         }
     }
@@ -255,7 +303,10 @@ mod tests {
         assert!(Origin::parse("--origin", "103.4").is_err());
         let joint = Joint::parse("--joint", "finger_joint:-9.41:0.8").unwrap();
         assert!((joint.position(0.085) - 0.00015).abs() < 1e-12);
-        assert_eq!(Joint::parse("--joint", "a:0.5").unwrap(), Joint { name: "a".into(), scale: 0.5, offset: 0.0 });
+        assert_eq!(
+            Joint::parse("--joint", "a:0.5").unwrap(),
+            Joint { name: "a".into(), scale: 0.5, offset: 0.0 }
+        );
         for bad in ["", ":1", "a:x", "a:1:2:3", "a:nan"] {
             assert!(Joint::parse("--joint", bad).is_err(), "{bad}");
         }

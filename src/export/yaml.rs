@@ -1,4 +1,5 @@
-//! The scalars of the YAML writers: numbers and strings that YAML 1.1 and 1.2 readers take for the same.
+//! The scalars of the YAML writers: numbers and strings that YAML 1.1 and 1.2 readers take for the
+//! same.
 
 /// A float that is never read as an integer or as text: with a point, without an exponent.
 pub(super) fn number(value: f64) -> String {
@@ -19,7 +20,10 @@ mod tests {
 
     #[test]
     fn scalars_are_what_they_look_like() {
-        assert_eq!([1.0, -0.0, 1e-7, -2.5, 1e21].map(number), ["1.0", "0.0", "0.0000001", "-2.5", "1000000000000000000000.0"]);
+        assert_eq!(
+            [1.0, -0.0, 1e-7, -2.5, 1e21].map(number),
+            ["1.0", "0.0", "0.0000001", "-2.5", "1000000000000000000000.0"]
+        );
         assert_eq!(string("a: \"b\"\n#"), r#""a: \"b\"\n#""#);
     }
 }

@@ -1,15 +1,15 @@
 //! Clipping rings by half-planes and convex polygons (Sutherland and Hodgman 1974).
 //!
-//! A concave ring that falls apart comes back as one ring whose pieces are joined by pairs of opposite edges along the
-//! clip line. Such a ring is exact for every integral over the region; where separate, proper polygons are wanted use
-//! [`crate::geometry::overlay`].
+//! A concave ring that falls apart comes back as one ring whose pieces are joined by pairs of
+//! opposite edges along the clip line. Such a ring is exact for every integral over the region;
+//! where separate, proper polygons are wanted use [`crate::geometry::overlay`].
 
 use glam::{DVec2, DVec3};
 
 use crate::model::Ring;
 
-/// The points with `normal . x + offset >= 0`: also the form in which a pressure plane is not negative.
-/// The normal need not be a unit vector.
+/// The points with `normal . x + offset >= 0`: also the form in which a pressure plane is not
+/// negative. The normal need not be a unit vector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HalfPlane {
     /// Points into the half-plane.
@@ -31,7 +31,8 @@ impl HalfPlane {
     }
 }
 
-/// The part of a plane ring in space with `sign * point[axis] <= limit`; `sign` is 1 or -1. New corners lie on the limit.
+/// The part of a plane ring in space with `sign * point[axis] <= limit`; `sign` is 1 or -1. New
+/// corners lie on the limit.
 pub fn clip_ring_axis(ring: &[DVec3], axis: usize, sign: f64, limit: f64) -> Vec<DVec3> {
     let value = |point: DVec3| limit - sign * point[axis];
     let mut clipped = Vec::with_capacity(ring.len() + 1);
@@ -56,8 +57,9 @@ pub fn clip_ring_half_plane(ring: &[DVec2], half: &HalfPlane) -> Ring {
     clipped
 }
 
-/// [`clip_ring_half_plane`] into a buffer, which is cleared first. Every crossing is computed from the inner end, so
-/// that an edge shared by two rings gives both the same point whichever way it runs.
+/// [`clip_ring_half_plane`] into a buffer, which is cleared first. Every crossing is computed from
+/// the inner end, so that an edge shared by two rings gives both the same point whichever way it
+/// runs.
 pub fn clip_ring_half_plane_into(ring: &[DVec2], half: &HalfPlane, clipped: &mut Ring) {
     clipped.clear();
     let Some(&last) = ring.last() else { return };
@@ -65,7 +67,8 @@ pub fn clip_ring_half_plane_into(ring: &[DVec2], half: &HalfPlane, clipped: &mut
     for &b in ring {
         let value_b = half.value(b);
         if (value_a >= 0.0) != (value_b >= 0.0) {
-            let (inner, outer, value_inner, value_outer) = if value_a >= 0.0 { (a, b, value_a, value_b) } else { (b, a, value_b, value_a) };
+            let (inner, outer, value_inner, value_outer) =
+                if value_a >= 0.0 { (a, b, value_a, value_b) } else { (b, a, value_b, value_a) };
             clipped.push(inner + (outer - inner) * (value_inner / (value_inner - value_outer)));
         }
         if value_b >= 0.0 {
@@ -78,12 +81,18 @@ pub fn clip_ring_half_plane_into(ring: &[DVec2], half: &HalfPlane, clipped: &mut
     }
 }
 
-/// Signed rings (outer counter-clockwise, holes clockwise) clipped by a half-plane; empty rings are left out.
+/// Signed rings (outer counter-clockwise, holes clockwise) clipped by a half-plane; empty rings are
+/// left out.
 pub fn clip_rings_half_plane(rings: &[Ring], half: &HalfPlane) -> Vec<Ring> {
-    rings.iter().map(|ring| clip_ring_half_plane(ring, half)).filter(|ring| !ring.is_empty()).collect()
+    rings
+        .iter()
+        .map(|ring| clip_ring_half_plane(ring, half))
+        .filter(|ring| !ring.is_empty())
+        .collect()
 }
 
-/// The part of `ring` inside the convex counter-clockwise polygon `convex`, in the ring's own sense.
+/// The part of `ring` inside the convex counter-clockwise polygon `convex`, in the ring's own
+/// sense.
 pub fn clip_ring_convex(ring: &[DVec2], convex: &[DVec2]) -> Ring {
     let (mut current, mut next) = (ring.to_vec(), Vec::with_capacity(ring.len() + convex.len()));
     for (&a, &b) in convex.iter().zip(convex.iter().cycle().skip(1)) {
@@ -105,8 +114,13 @@ mod tests {
         let half = HalfPlane { normal: DVec2::new(-3.0, 0.0), offset: 0.0 };
         let clipped = clip_ring_half_plane(&square, &half);
         assert_eq!(ring_area(&clipped), 2.0);
-        assert!(clip_ring_half_plane(&square, &HalfPlane { normal: DVec2::X, offset: -1.5 }).is_empty());
-        assert_eq!(clip_ring_half_plane(&square, &HalfPlane { normal: DVec2::X, offset: 1.0 }), square);
+        assert!(
+            clip_ring_half_plane(&square, &HalfPlane { normal: DVec2::X, offset: -1.5 }).is_empty()
+        );
+        assert_eq!(
+            clip_ring_half_plane(&square, &HalfPlane { normal: DVec2::X, offset: 1.0 }),
+            square
+        );
         assert!(clip_ring_half_plane(&[], &half).is_empty());
     }
 
@@ -114,15 +128,34 @@ mod tests {
     fn a_clockwise_ring_stays_clockwise() {
         let mut hole = rectangle(DVec2::splat(2.0));
         hole.reverse();
-        assert_eq!(ring_area(&clip_ring_half_plane(&hole, &HalfPlane { normal: DVec2::Y, offset: 0.5 })), -3.0);
+        assert_eq!(
+            ring_area(&clip_ring_half_plane(&hole, &HalfPlane { normal: DVec2::Y, offset: 0.5 })),
+            -3.0
+        );
     }
 
     #[test]
     fn a_comb_falls_apart_with_the_right_area() {
         // three teeth of width 1 and height 2 on a bar of height 1
-        let points = [(0., 0.), (5., 0.), (5., 3.), (4., 3.), (4., 1.), (3., 1.), (3., 3.), (2., 3.), (2., 1.), (1., 1.), (1., 3.), (0., 3.)];
+        let points = [
+            (0., 0.),
+            (5., 0.),
+            (5., 3.),
+            (4., 3.),
+            (4., 1.),
+            (3., 1.),
+            (3., 3.),
+            (2., 3.),
+            (2., 1.),
+            (1., 1.),
+            (1., 3.),
+            (0., 3.),
+        ];
         let comb: Ring = points.iter().map(|&(x, y)| DVec2::new(x, y)).collect();
-        let window: Ring = [(-1., 2.), (9., 2.), (9., 9.), (-1., 9.)].iter().map(|&(x, y)| DVec2::new(x, y)).collect();
+        let window: Ring = [(-1., 2.), (9., 2.), (9., 9.), (-1., 9.)]
+            .iter()
+            .map(|&(x, y)| DVec2::new(x, y))
+            .collect();
         assert_eq!(ring_area(&clip_ring_convex(&comb, &window)), 3.0);
     }
 }

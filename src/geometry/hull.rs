@@ -11,8 +11,8 @@ pub(crate) fn orient(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     orient2d(coordinate(a), coordinate(b), coordinate(c))
 }
 
-/// Convex hull, counter-clockwise, without collinear points (Andrew's monotone chain with exact predicates).
-/// Fewer than three points come back when all points are collinear.
+/// Convex hull, counter-clockwise, without collinear points (Andrew's monotone chain with exact
+/// predicates). Fewer than three points come back when all points are collinear.
 pub fn convex_hull(points: &[DVec2]) -> Ring {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
@@ -24,7 +24,9 @@ pub fn convex_hull(points: &[DVec2]) -> Ring {
     for pass in 0..2 {
         let floor = hull.len() + 1;
         let extend = |hull: &mut Ring, point: DVec2| {
-            while hull.len() > floor && orient(hull[hull.len() - 2], hull[hull.len() - 1], point) <= 0.0 {
+            while hull.len() > floor
+                && orient(hull[hull.len() - 2], hull[hull.len() - 1], point) <= 0.0
+            {
                 hull.pop();
             }
             hull.push(point);
@@ -70,7 +72,8 @@ mod tests {
 
     #[test]
     fn hull_of_a_grid_is_its_square() {
-        let points: Vec<DVec2> = (0..25).map(|index| DVec2::new(f64::from(index % 5), f64::from(index / 5))).collect();
+        let points: Vec<DVec2> =
+            (0..25).map(|index| DVec2::new(f64::from(index % 5), f64::from(index / 5))).collect();
         let hull = convex_hull(&points);
         assert_eq!(hull.len(), 4);
         assert_eq!(ring_area(&hull), 16.0);
@@ -93,7 +96,8 @@ mod tests {
         clockwise.reverse();
         assert!(!is_convex(&clockwise));
         // a pentagram turns left everywhere but winds twice
-        let star: Vec<DVec2> = (0..5).map(|k| DVec2::from_angle(f64::from(k) * 0.8 * std::f64::consts::PI)).collect();
+        let star: Vec<DVec2> =
+            (0..5).map(|k| DVec2::from_angle(f64::from(k) * 0.8 * std::f64::consts::PI)).collect();
         assert!(!is_convex(&star));
     }
 }

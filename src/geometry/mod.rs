@@ -1,15 +1,23 @@
-//! Plane geometry: polygons with holes, their moments, clipping, convex hulls and support functions.
+//! Plane geometry: polygons with holes, their moments, clipping, convex hulls and support
+//! functions.
 //!
-//! Conventions: metres; outer rings counter-clockwise, holes clockwise once normalised; a ring's last point joins its
-//! first and is not repeated. A flat list of rings (outer and holes alike, each in its own sense) is enough wherever
-//! only integrals are wanted, since integrals over rings add up with the sign of their sense.
+//! Conventions: metres; outer rings counter-clockwise, holes clockwise once normalised; a ring's
+//! last point joins its first and is not repeated. A flat list of rings (outer and holes alike,
+//! each in its own sense) is enough wherever only integrals are wanted, since integrals over rings
+//! add up with the sign of their sense.
 
 pub mod clip;
 pub mod hull;
 pub mod overlay;
 pub mod polygon;
 
-pub use clip::{HalfPlane, clip_ring_axis, clip_ring_convex, clip_ring_half_plane, clip_ring_half_plane_into, clip_rings_half_plane};
+pub use clip::{
+    HalfPlane, clip_ring_axis, clip_ring_convex, clip_ring_half_plane, clip_ring_half_plane_into,
+    clip_rings_half_plane,
+};
 pub use hull::{convex_hull, is_convex, support};
 pub use overlay::{even_odd, intersect, intersect_convex, union};
-pub use polygon::{Bounds2, Moments, area, bounds, contains, moments, normalise, patch_area, patch_moments, ring_area, transform};
+pub use polygon::{
+    Bounds2, Moments, area, bounds, contains, moments, normalise, patch_area, patch_moments,
+    ring_area, transform,
+};

@@ -1,4 +1,5 @@
-//! Measures of rings, polygons and patches: area, moments, bounds, sense, point location, rigid maps.
+//! Measures of rings, polygons and patches: area, moments, bounds, sense, point location, rigid
+//! maps.
 
 use glam::{DAffine2, DMat2, DVec2};
 
@@ -30,7 +31,10 @@ impl Bounds2 {
 
     /// The smallest rectangle around `points`.
     pub fn of<'a>(points: impl IntoIterator<Item = &'a DVec2>) -> Self {
-        points.into_iter().fold(Self::EMPTY, |sum, &point| Self { min: sum.min.min(point), max: sum.max.max(point) })
+        points.into_iter().fold(Self::EMPTY, |sum, &point| Self {
+            min: sum.min.min(point),
+            max: sum.max.max(point),
+        })
     }
 
     /// The smallest rectangle around both.
@@ -66,8 +70,8 @@ impl Bounds2 {
     }
 }
 
-/// Area of a ring [m^2], positive when counter-clockwise. Computed about the ring's first point, so that a small ring
-/// far from the origin loses no digits.
+/// Area of a ring [m^2], positive when counter-clockwise. Computed about the ring's first point, so
+/// that a small ring far from the origin loses no digits.
 pub fn ring_area(ring: &[DVec2]) -> f64 {
     let Some(&base) = ring.first() else { return 0.0 };
     ring.windows(2).map(|edge| (edge[0] - base).perp_dot(edge[1] - base)).sum::<f64>() / 2.0
@@ -130,8 +134,8 @@ fn outer(a: DVec2, b: DVec2) -> DMat2 {
     DMat2::from_cols(a * b.x, a * b.y)
 }
 
-/// Turns the outer ring counter-clockwise and the holes clockwise, and drops repeated and last-equals-first points and
-/// rings of fewer than three points.
+/// Turns the outer ring counter-clockwise and the holes clockwise, and drops repeated and
+/// last-equals-first points and rings of fewer than three points.
 pub fn normalise(polygon: &mut Polygon) {
     clean(&mut polygon.outer);
     if ring_area(&polygon.outer) < 0.0 {
@@ -153,7 +157,8 @@ fn clean(ring: &mut Ring) {
     }
 }
 
-/// The polygon under a rigid map (a reflection reverses the rings, so that the result is normalised again).
+/// The polygon under a rigid map (a reflection reverses the rings, so that the result is normalised
+/// again).
 #[must_use]
 pub fn transform(polygon: &Polygon, map: &DAffine2) -> Polygon {
     let reflected = map.matrix2.determinant() < 0.0;
@@ -167,8 +172,9 @@ pub fn transform(polygon: &Polygon, map: &DAffine2) -> Polygon {
     Polygon { outer: ring(&polygon.outer), holes: polygon.holes.iter().map(ring).collect() }
 }
 
-/// Whether `point` lies inside the polygon (even-odd over all its rings; exact predicates, so the answer never depends
-/// on rounding). Points on the boundary may go either way, but neighbouring polygons never both claim or both miss one.
+/// Whether `point` lies inside the polygon (even-odd over all its rings; exact predicates, so the
+/// answer never depends on rounding). Points on the boundary may go either way, but neighbouring
+/// polygons never both claim or both miss one.
 pub fn contains(polygon: &Polygon, point: DVec2) -> bool {
     rings(polygon).fold(false, |inside, ring| inside ^ ring_contains(ring, point))
 }
@@ -182,7 +188,8 @@ pub fn ring_contains(ring: &[DVec2], point: DVec2) -> bool {
     inside
 }
 
-/// Whether the edge passes the height of `point` (its lower end included, its upper end not) at the right of it.
+/// Whether the edge passes the height of `point` (its lower end included, its upper end not) at the
+/// right of it.
 pub(crate) fn crosses_right(a: DVec2, b: DVec2, point: DVec2) -> bool {
     if (a.y > point.y) == (b.y > point.y) {
         return false;
@@ -204,7 +211,10 @@ mod tests {
     use crate::gripper::rectangle;
 
     fn square_with_hole() -> Polygon {
-        let mut polygon = Polygon { outer: rectangle(DVec2::splat(2.0)), holes: vec![rectangle(DVec2::splat(1.0))] };
+        let mut polygon = Polygon {
+            outer: rectangle(DVec2::splat(2.0)),
+            holes: vec![rectangle(DVec2::splat(1.0))],
+        };
         normalise(&mut polygon);
         polygon
     }
@@ -215,13 +225,23 @@ mod tests {
         let moments = moments(&polygon);
         assert!((moments.area - 3.0).abs() < 1e-15 && moments.centroid.length() < 1e-15);
         // (2^4 - 1^4)/12 about each axis
-        assert!((moments.second - DMat2::from_diagonal(DVec2::splat(15.0 / 12.0))).abs_diff_eq(DMat2::ZERO, 1e-14));
-        assert!(contains(&polygon, DVec2::new(0.75, 0.0)) && !contains(&polygon, DVec2::ZERO) && !contains(&polygon, DVec2::new(3.0, 0.1)));
+        assert!(
+            (moments.second - DMat2::from_diagonal(DVec2::splat(15.0 / 12.0)))
+                .abs_diff_eq(DMat2::ZERO, 1e-14)
+        );
+        assert!(
+            contains(&polygon, DVec2::new(0.75, 0.0))
+                && !contains(&polygon, DVec2::ZERO)
+                && !contains(&polygon, DVec2::new(3.0, 0.1))
+        );
     }
 
     #[test]
     fn keeps_its_digits_far_from_the_origin() {
-        let far = transform(&square_with_hole(), &DAffine2::from_angle_translation(0.3, DVec2::new(1e6, -2e6)));
+        let far = transform(
+            &square_with_hole(),
+            &DAffine2::from_angle_translation(0.3, DVec2::new(1e6, -2e6)),
+        );
         let moments = moments(&far);
         assert!((moments.area - 3.0).abs() < 1e-9, "{moments:?}");
         assert!((moments.second.determinant() - 1.5625).abs() < 1e-8, "{moments:?}");

@@ -31,8 +31,8 @@ pub fn text(name_or_path: &str) -> Result<String> {
     }
 }
 
-/// The gripper of a shipped name (case, dashes, blanks and underscores do not matter; a part of the name is enough when
-/// only one matches) or of a gripper file.
+/// The gripper of a shipped name (case, dashes, blanks and underscores do not matter; a part of the
+/// name is enough when only one matches) or of a gripper file.
 ///
 /// # Errors
 /// When the name is unknown (the message names the closest one) or the file is unreadable or wrong.
@@ -63,29 +63,43 @@ fn shipped(name: &str) -> Option<&'static (&'static str, &'static str)> {
     if wanted.is_empty() {
         return None;
     }
-    let entries = || CATALOGUE.iter().map(|entry| (key(entry.0), key(&display_name(entry.1)), entry));
+    let entries =
+        || CATALOGUE.iter().map(|entry| (key(entry.0), key(&display_name(entry.1)), entry));
     if let Some(found) = entries().find(|(short, long, _)| *short == wanted || *long == wanted) {
         return Some(found.2);
     }
-    let mut partial = entries().filter(|(short, long, _)| short.contains(&wanted) || long.contains(&wanted));
+    let mut partial =
+        entries().filter(|(short, long, _)| short.contains(&wanted) || long.contains(&wanted));
     let first = partial.next()?;
     partial.next().is_none().then_some(first.2)
 }
 
 /// The `name` line of a shipped file (their form is fixed by a test).
 fn display_name(text: &str) -> String {
-    text.lines().find_map(|line| line.strip_prefix("name = ")).unwrap_or_default().trim_matches('"').to_string()
+    text.lines()
+        .find_map(|line| line.strip_prefix("name = "))
+        .unwrap_or_default()
+        .trim_matches('"')
+        .to_string()
 }
 
 fn key(name: &str) -> String {
-    name.chars().filter(char::is_ascii_alphanumeric).map(|letter| letter.to_ascii_lowercase()).collect()
+    name.chars()
+        .filter(char::is_ascii_alphanumeric)
+        .map(|letter| letter.to_ascii_lowercase())
+        .collect()
 }
 
 fn unknown(name: &str) -> Error {
     let wanted = key(name);
     let close = CATALOGUE
         .iter()
-        .flat_map(|(short, text)| [(edits(&wanted, &key(short)), short), (edits(&wanted, &key(&display_name(text))), short)])
+        .flat_map(|(short, text)| {
+            [
+                (edits(&wanted, &key(short)), short),
+                (edits(&wanted, &key(&display_name(text))), short),
+            ]
+        })
         .min()
         .filter(|(distance, short)| *distance <= 1 + short.len() / 3)
         .map_or(String::new(), |(_, short)| format!("did you mean '{short}'? "));
@@ -124,7 +138,17 @@ mod tests {
 
     #[test]
     fn names_are_forgiving_and_wrong_ones_get_a_hint() {
-        for name in ["robotiq-2f85", "Robotiq 2F-85", "ROBOTIQ_2F_85", "2f85", "franka", "Hand-E", "rg2", "wsg50", "generic"] {
+        for name in [
+            "robotiq-2f85",
+            "Robotiq 2F-85",
+            "ROBOTIQ_2F_85",
+            "2f85",
+            "franka",
+            "Hand-E",
+            "rg2",
+            "wsg50",
+            "generic",
+        ] {
             assert!(find(name).is_ok(), "{name}");
         }
         let message = find("robotic-2f85").unwrap_err().to_string();
@@ -154,7 +178,10 @@ mod tests {
             assert!(gripper.is_symmetric(), "{short}");
             // Only what no source states may be warned of in a shipped file.
             for warning in crate::gripper::check(&gripper) {
-                assert!(warning.contains("not stated") || warning.contains("unverified"), "{short}: {warning}");
+                assert!(
+                    warning.contains("not stated") || warning.contains("unverified"),
+                    "{short}: {warning}"
+                );
             }
         }
     }

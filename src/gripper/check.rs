@@ -19,7 +19,11 @@ pub fn check(gripper: &Gripper) -> Vec<String> {
     for body in &gripper.fingers {
         let low = body.bounds()[0].z;
         if low < -1e-9 {
-            warnings.push(format!("finger body '{}' pokes {} through the pad plane: it would cut into every part", body.name, mm(-low)));
+            warnings.push(format!(
+                "finger body '{}' pokes {} through the pad plane: it would cut into every part",
+                body.name,
+                mm(-low)
+            ));
         }
     }
     if !gripper.fingers.is_empty() {
@@ -39,14 +43,24 @@ pub fn check(gripper: &Gripper) -> Vec<String> {
         }
     }
     if gripper.pad_friction.is_none() {
-        warnings.push("pad.friction is not stated: no safety factor and no needed force can be given".into());
+        warnings.push(
+            "pad.friction is not stated: no safety factor and no needed force can be given".into(),
+        );
     }
     if gripper.grip_from_flange.is_none() {
         warnings.push("flange is not stated: poses are given for the tool frame only".into());
     }
-    let unverified: Vec<&str> = gripper.sources.iter().filter(|(_, source)| !source.verified).map(|(key, _)| key.as_str()).collect();
+    let unverified: Vec<&str> = gripper
+        .sources
+        .iter()
+        .filter(|(_, source)| !source.verified)
+        .map(|(key, _)| key.as_str())
+        .collect();
     if !unverified.is_empty() {
-        warnings.push(format!("unverified values (measure them on your gripper): {}", unverified.join(", ")));
+        warnings.push(format!(
+            "unverified values (measure them on your gripper): {}",
+            unverified.join(", ")
+        ));
     }
     warnings
 }
@@ -63,17 +77,23 @@ fn uncovered_share(gripper: &Gripper) -> f64 {
         let outline = outline(body, DVec3::X, DVec3::Y);
         Polygon { outer: outline, holes: Vec::new() }
     };
-    let cover = gripper.fingers.iter().filter(|body| body.bounds()[0].z < 1e-3).fold(Vec::new(), |cover, body| overlay::union(&cover, &[behind(body)]));
+    let cover = gripper
+        .fingers
+        .iter()
+        .filter(|body| body.bounds()[0].z < 1e-3)
+        .fold(Vec::new(), |cover, body| overlay::union(&cover, &[behind(body)]));
     let pad = ring_area(&gripper.pad);
     1.0 - patch_area(&overlay::intersect_convex(&gripper.pad, &cover)) / pad
 }
 
-/// Outline of a body seen along `across x up`, as a convex ring in those two coordinates (round shapes by 256 points).
+/// Outline of a body seen along `across x up`, as a convex ring in those two coordinates (round
+/// shapes by 256 points).
 pub(super) fn outline(body: &Body, across: DVec3, up: DVec3) -> Ring {
     let points: Vec<DVec2> = (0..256)
         .map(|index| {
             // Half a step off the axes, so that a box gives its corners whatever the signs of zero.
-            let direction = DVec2::from_angle((f64::from(index) + 0.5) * std::f64::consts::TAU / 256.0);
+            let direction =
+                DVec2::from_angle((f64::from(index) + 0.5) * std::f64::consts::TAU / 256.0);
             let point = body.support_point(across * direction.x + up * direction.y);
             DVec2::new(point.dot(across), point.dot(up))
         })
@@ -113,7 +133,13 @@ mod tests {
         gripper.pad_friction = None;
         gripper.grip_from_flange = None;
         let all = check(&gripper).join("\n");
-        for part in ["50.0 % of it", "pokes 1.00 mm", "'palm' reaches 20.00 mm", "friction is not stated", "flange is not stated"] {
+        for part in [
+            "50.0 % of it",
+            "pokes 1.00 mm",
+            "'palm' reaches 20.00 mm",
+            "friction is not stated",
+            "flange is not stated",
+        ] {
             assert!(all.contains(part), "{part} in {all}");
         }
     }

@@ -1,4 +1,5 @@
-//! A dimensioned drawing of a gripper: front view (x3 to the right) and side view (x2 to the right), approach downwards.
+//! A dimensioned drawing of a gripper: front view (x3 to the right) and side view (x2 to the
+//! right), approach downwards.
 
 use std::fmt::Write;
 
@@ -21,17 +22,24 @@ pub fn svg(gripper: &Gripper) -> String {
         .chain(gripper.finger(false, open).into_iter().map(|body| ("finger", body)))
         .collect();
     // Screen y runs down, and so does the approach axis: the screen shows (across, x1) as they are.
-    let view = |across: DVec3| -> Vec<(&str, Ring)> { bodies.iter().map(|(class, body)| (*class, outline(body, across, DVec3::X))).collect() };
+    let view = |across: DVec3| -> Vec<(&str, Ring)> {
+        bodies.iter().map(|(class, body)| (*class, outline(body, across, DVec3::X))).collect()
+    };
     let (front, side) = (view(DVec3::Z), view(DVec3::Y));
     let pad = Bounds2::of(&gripper.pad);
     let bounds = |rings: &[(&str, Ring)], pad_half: f64| {
-        let pads = Bounds2 { min: DVec2::new(-pad_half, pad.min.x), max: DVec2::new(pad_half, pad.max.x) };
+        let pads =
+            Bounds2 { min: DVec2::new(-pad_half, pad.min.x), max: DVec2::new(pad_half, pad.max.x) };
         rings.iter().fold(pads, |sum, (_, ring)| sum.union(Bounds2::of(ring)))
     };
-    let (front_bounds, side_bounds) = (bounds(&front, open / 2.0), bounds(&side, pad.max.y.max(-pad.min.y)));
+    let (front_bounds, side_bounds) =
+        (bounds(&front, open / 2.0), bounds(&side, pad.max.y.max(-pad.min.y)));
     let height = front_bounds.size().y.max(1e-6);
     let scale = (HEIGHT / height).min(560.0 / front_bounds.size().x);
-    let place = |bounds: Bounds2, left: f64| Place { scale, shift: DVec2::new(left - bounds.min.x * scale, MARGIN - front_bounds.min.y * scale) };
+    let place = |bounds: Bounds2, left: f64| Place {
+        scale,
+        shift: DVec2::new(left - bounds.min.x * scale, MARGIN - front_bounds.min.y * scale),
+    };
     let front_place = place(front_bounds, MARGIN);
     let side_left = 2.2 * MARGIN + front_bounds.size().x * scale;
     let side_place = place(side_bounds, side_left);
@@ -57,14 +65,24 @@ pub fn svg(gripper: &Gripper) -> String {
     let thick = gripper.pad_thickness.unwrap_or(0.0).max(2.0 / scale);
     for sign in [1.0, -1.0] {
         let (a, b) = (sign * open / 2.0, sign * (open / 2.0 + thick));
-        let ring = [(a, pad.min.x), (b, pad.min.x), (b, pad.max.x), (a, pad.max.x)].map(|(x, y)| DVec2::new(x, y));
+        let ring = [(a, pad.min.x), (b, pad.min.x), (b, pad.max.x), (a, pad.max.x)]
+            .map(|(x, y)| DVec2::new(x, y));
         drawing.polygon("pad", &ring, &front_place);
     }
     let pad_ring: Ring = gripper.pad.iter().map(|point| DVec2::new(point.y, point.x)).collect();
     drawing.polygon("pad", &pad_ring, &side_place);
     for (place, bounds) in [(&front_place, front_bounds), (&side_place, side_bounds)] {
-        let (a, b) = (place.point(DVec2::new(0.0, bounds.min.y)), place.point(DVec2::new(0.0, bounds.max.y)));
-        let _ = writeln!(drawing.text, "<path class=\"axis\" d=\"M{:.1} {:.1}V{:.1}\"/>", a.x, a.y - 12.0, b.y + 12.0);
+        let (a, b) = (
+            place.point(DVec2::new(0.0, bounds.min.y)),
+            place.point(DVec2::new(0.0, bounds.max.y)),
+        );
+        let _ = writeln!(
+            drawing.text,
+            "<path class=\"axis\" d=\"M{:.1} {:.1}V{:.1}\"/>",
+            a.x,
+            a.y - 12.0,
+            b.y + 12.0
+        );
     }
     let bottom = front_bounds.max.y;
     drawing.horizontal(&front_place, -open / 2.0, open / 2.0, bottom, 24.0, "stroke");
@@ -72,9 +90,23 @@ pub fn svg(gripper: &Gripper) -> String {
     drawing.horizontal(&side_place, pad.min.y, pad.max.y, bottom, 24.0, "pad");
     drawing.horizontal(&side_place, side_bounds.min.x, side_bounds.max.x, bottom, 52.0, "depth");
     drawing.vertical(&side_place, pad.min.x, pad.max.x, side_bounds.max.x, 18.0, "pad");
-    drawing.vertical(&front_place, front_bounds.min.y, front_bounds.max.y, front_bounds.min.x, -46.0, "");
+    drawing.vertical(
+        &front_place,
+        front_bounds.min.y,
+        front_bounds.max.y,
+        front_bounds.min.x,
+        -46.0,
+        "",
+    );
     if let Some(throat) = super::check::throat(gripper).filter(|throat| *throat > 0.0) {
-        drawing.vertical(&front_place, pad.min.x - throat, pad.min.x, front_bounds.max.x, 14.0, "throat");
+        drawing.vertical(
+            &front_place,
+            pad.min.x - throat,
+            pad.min.x,
+            front_bounds.max.x,
+            14.0,
+            "throat",
+        );
         drawing.vertical(&front_place, front_bounds.min.y, 0.0, front_bounds.min.x, -22.0, "");
     }
     drawing.text.push_str("</svg>\n");
@@ -98,7 +130,11 @@ struct Drawing {
 
 impl Drawing {
     fn polygon(&mut self, class: &str, ring: &[DVec2], place: &Place) {
-        let points: Vec<String> = ring.iter().map(|&point| place.point(point)).map(|point| format!("{:.2},{:.2}", point.x, point.y)).collect();
+        let points: Vec<String> = ring
+            .iter()
+            .map(|&point| place.point(point))
+            .map(|point| format!("{:.2},{:.2}", point.x, point.y))
+            .collect();
         let _ = writeln!(self.text, "<polygon class=\"{class}\" points=\"{}\"/>", points.join(" "));
     }
 
@@ -128,7 +164,10 @@ impl Drawing {
         let middle = (a.y + b.y) / 2.0;
         // Left of the gripper there is room for upright text only.
         let place = if gap < 0.0 {
-            format!("transform=\"translate({:.1} {middle:.1}) rotate(-90)\" text-anchor=\"middle\"", line - 4.0)
+            format!(
+                "transform=\"translate({:.1} {middle:.1}) rotate(-90)\" text-anchor=\"middle\"",
+                line - 4.0
+            )
         } else {
             format!("x=\"{:.1}\" y=\"{middle:.1}\"", line + 4.0)
         };

@@ -110,16 +110,23 @@ struct Axes {
 pub fn read(path: &Path) -> Result<Gripper> {
     let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read", source))?;
     let place = path.display().to_string();
-    let text = String::from_utf8(bytes)
-        .map_err(|_| Error::input(&place, "not a text file", "give a gripper file in TOML; `gripfast gripper list` shows shipped ones"))?;
+    let text = String::from_utf8(bytes).map_err(|_| {
+        Error::input(
+            &place,
+            "not a text file",
+            "give a gripper file in TOML; `gripfast gripper list` shows shipped ones",
+        )
+    })?;
     parse_in(&text, &place, path.parent())
 }
 
-/// Parses the text of a gripper file; `place` names it in messages. Such a text cannot name mesh files.
+/// Parses the text of a gripper file; `place` names it in messages. Such a text cannot name mesh
+/// files.
 ///
 /// # Errors
-/// When it is not TOML, a field is unknown, missing or without unit, or a value makes no gripper: stroke or force range
-/// not rising, pad not convex or without area, body without volume, mesh that cannot be read, two bodies of one name, source of an unknown field.
+/// When it is not TOML, a field is unknown, missing or without unit, or a value makes no gripper:
+/// stroke or force range not rising, pad not convex or without area, body without volume, mesh that
+/// cannot be read, two bodies of one name, source of an unknown field.
 pub fn parse(text: &str, place: &str) -> Result<Gripper> {
     parse_in(text, place, None)
 }
@@ -127,8 +134,14 @@ pub fn parse(text: &str, place: &str) -> Result<Gripper> {
 /// [`parse`] with mesh files in `folder`.
 fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
     let file: File = toml::from_str(text).map_err(|error| {
-        let line = error.span().map_or(String::new(), |span| format!(":{}", text[..span.start.min(text.len())].matches('\n').count() + 1));
-        Error::input(format!("{place}{line}"), error.message().to_string(), "compare with a shipped file: `gripfast gripper show generic`")
+        let line = error.span().map_or(String::new(), |span| {
+            format!(":{}", text[..span.start.min(text.len())].matches('\n').count() + 1)
+        });
+        Error::input(
+            format!("{place}{line}"),
+            error.message().to_string(),
+            "compare with a shipped file: `gripfast gripper show generic`",
+        )
     })?;
     let reader = Reader { place, folder };
     if file.name.trim().is_empty() {
@@ -137,30 +150,59 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
     let stroke = reader.range("stroke", Quantity::Length, &file.stroke)?;
     let force = reader.range("force", Quantity::Force, &file.force)?;
     let pad = reader.pad(&file.pad)?;
-    let optional = |field: &str, quantity, text: &Option<String>| text.as_deref().map(|text| reader.positive(field, quantity, text)).transpose();
+    let optional = |field: &str, quantity, text: &Option<String>| {
+        text.as_deref().map(|text| reader.positive(field, quantity, text)).transpose()
+    };
     let pad_thickness = optional("pad.thickness", Quantity::Length, &file.pad.thickness)?;
     let pad_modulus = optional("pad.modulus", Quantity::Pressure, &file.pad.modulus)?;
     let outer_pad = optional("pad.outer_face", Quantity::Length, &file.pad.outer_face)?;
     if let Some(friction) = file.pad.friction.filter(|friction| !(0.0..=10.0).contains(friction)) {
-        return Err(reader.bad("pad.friction", format!("is {friction}"), "give a coefficient between 0 and 10, without unit"));
+        return Err(reader.bad(
+            "pad.friction",
+            format!("is {friction}"),
+            "give a coefficient between 0 and 10, without unit",
+        ));
     }
     let fingers = reader.bodies("finger", &file.finger)?;
     let palm = reader.bodies("palm", &file.palm)?;
-    let axes = |field: &str, axes: &Option<Axes>| axes.as_ref().map(|axes| reader.frame(field, axes)).transpose();
+    let axes = |field: &str, axes: &Option<Axes>| {
+        axes.as_ref().map(|axes| reader.frame(field, axes)).transpose()
+    };
     let grip_from_flange = axes("flange", &file.flange)?;
     let grip_from_tool = axes("tool", &file.tool)?;
-    let mut known: Vec<String> =
-        ["stroke", "force", "pad.size", "pad.thickness", "pad.modulus", "pad.outer_face", "pad.friction", "flange", "tool"].map(String::from).to_vec();
+    let mut known: Vec<String> = [
+        "stroke",
+        "force",
+        "pad.size",
+        "pad.thickness",
+        "pad.modulus",
+        "pad.outer_face",
+        "pad.friction",
+        "flange",
+        "tool",
+    ]
+    .map(String::from)
+    .to_vec();
     known.extend(fingers.iter().map(|body| format!("finger.{}", body.name)));
     known.extend(palm.iter().map(|body| format!("palm.{}", body.name)));
     let mut sources = BTreeMap::new();
-    for (table, entries, verified) in [("source", &file.source, true), ("unverified", &file.unverified, false)] {
+    for (table, entries, verified) in
+        [("source", &file.source, true), ("unverified", &file.unverified, false)]
+    {
         for (key, text) in entries {
             if !known.contains(key) {
-                return Err(reader.bad(&format!("{table}.{key}"), "names no dimension of this file", &format!("use one of: {}", known.join(", "))));
+                return Err(reader.bad(
+                    &format!("{table}.{key}"),
+                    "names no dimension of this file",
+                    &format!("use one of: {}", known.join(", ")),
+                ));
             }
             if sources.insert(key.clone(), Source { text: text.clone(), verified }).is_some() {
-                return Err(reader.bad(&format!("unverified.{key}"), "stands under [source] as well", "keep one of the two"));
+                return Err(reader.bad(
+                    &format!("unverified.{key}"),
+                    "stands under [source] as well",
+                    "keep one of the two",
+                ));
             }
         }
     }
@@ -197,13 +239,22 @@ impl Reader<'_> {
 
     fn positive(&self, field: &str, quantity: Quantity, text: &str) -> Result<f64> {
         let value = self.value(field, quantity, text)?;
-        if value > 0.0 { Ok(value) } else { Err(self.bad(field, format!("is {text}"), "give a value above zero")) }
+        if value > 0.0 {
+            Ok(value)
+        } else {
+            Err(self.bad(field, format!("is {text}"), "give a value above zero"))
+        }
     }
 
     fn range(&self, field: &str, quantity: Quantity, texts: &[String; 2]) -> Result<[f64; 2]> {
-        let range = [self.value(field, quantity, &texts[0])?, self.value(field, quantity, &texts[1])?];
+        let range =
+            [self.value(field, quantity, &texts[0])?, self.value(field, quantity, &texts[1])?];
         if range[0] < 0.0 || range[1] <= range[0] {
-            return Err(self.bad(field, format!("runs from {} to {}", texts[0], texts[1]), "give the smallest value (zero or more), then the largest"));
+            return Err(self.bad(
+                field,
+                format!("runs from {} to {}", texts[0], texts[1]),
+                "give the smallest value (zero or more), then the largest",
+            ));
         }
         Ok(range)
     }
@@ -227,11 +278,18 @@ impl Reader<'_> {
                 Ok(rectangle(size))
             }
             (None, Some(points)) => {
-                let ring = points.iter().map(|point| self.vector("pad.polygon", point).map(DVec2::from_array)).collect::<Result<Vec<_>>>()?;
+                let ring = points
+                    .iter()
+                    .map(|point| self.vector("pad.polygon", point).map(DVec2::from_array))
+                    .collect::<Result<Vec<_>>>()?;
                 let mut shape = crate::model::Polygon { outer: ring, holes: Vec::new() };
                 polygon::normalise(&mut shape);
                 if !is_convex(&shape.outer) || ring_area(&shape.outer) <= 0.0 {
-                    return Err(self.bad("pad.polygon", "is not a convex polygon with area", remedy));
+                    return Err(self.bad(
+                        "pad.polygon",
+                        "is not a convex polygon with area",
+                        remedy,
+                    ));
                 }
                 Ok(convex_hull(&shape.outer))
             }
@@ -245,11 +303,19 @@ impl Reader<'_> {
         for solid in solids {
             let body = self.body(&format!("{table}.{}", solid.name), solid)?;
             if body.name.trim().is_empty() || bodies.iter().any(|other| other.name == body.name) {
-                return Err(self.bad(table, format!("name '{}' is empty or used twice", body.name), "give each body its own name"));
+                return Err(self.bad(
+                    table,
+                    format!("name '{}' is empty or used twice", body.name),
+                    "give each body its own name",
+                ));
             }
             match &solid.mesh {
                 // All pieces have the name of their body.
-                Some(mesh) => bodies.extend(self.mesh(&format!("{table}.{}", solid.name), mesh)?.into_iter().map(|shape| Body { shape, ..body.clone() })),
+                Some(mesh) => bodies.extend(
+                    self.mesh(&format!("{table}.{}", solid.name), mesh)?
+                        .into_iter()
+                        .map(|shape| Body { shape, ..body.clone() }),
+                ),
                 None => bodies.push(body),
             }
         }
@@ -259,11 +325,16 @@ impl Reader<'_> {
     fn body(&self, field: &str, solid: &Solid) -> Result<Body> {
         let at = solid.at.as_ref().map_or(Ok([0.0; 3]), |at| self.vector(field, at))?;
         let mut rotation = match &solid.rotate {
-            Some(turn) => DMat3::from_axis_angle(turn.axis.vector(), self.value(field, Quantity::Angle, &turn.angle)?),
+            Some(turn) => DMat3::from_axis_angle(
+                turn.axis.vector(),
+                self.value(field, Quantity::Angle, &turn.angle)?,
+            ),
             None => DMat3::IDENTITY,
         };
         let shape = match (&solid.r#box, &solid.cylinder, &solid.hull, &solid.mesh) {
-            (Some(sizes), None, None, None) => Shape::Box { half: DVec3::from_array(self.vector(field, sizes)?) / 2.0 },
+            (Some(sizes), None, None, None) => {
+                Shape::Box { half: DVec3::from_array(self.vector(field, sizes)?) / 2.0 }
+            }
             (None, Some(cylinder), None, None) => {
                 rotation *= match cylinder.axis {
                     Axis::X1 => DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X),
@@ -271,31 +342,64 @@ impl Reader<'_> {
                     Axis::X3 => DMat3::IDENTITY,
                 };
                 let half_height = self.positive(field, Quantity::Length, &cylinder.length)? / 2.0;
-                Shape::Cylinder { radius: self.positive(field, Quantity::Length, &cylinder.radius)?, half_height }
+                Shape::Cylinder {
+                    radius: self.positive(field, Quantity::Length, &cylinder.radius)?,
+                    half_height,
+                }
             }
-            (None, None, Some(points), None) => {
-                Shape::Hull { points: points.iter().map(|point| self.vector(field, point).map(DVec3::from_array)).collect::<Result<_>>()? }
-            }
+            (None, None, Some(points), None) => Shape::Hull {
+                points: points
+                    .iter()
+                    .map(|point| self.vector(field, point).map(DVec3::from_array))
+                    .collect::<Result<_>>()?,
+            },
             // [`Reader::bodies`] puts the mesh's pieces in its place.
             (None, None, None, Some(_)) => Shape::Box { half: DVec3::ONE },
-            _ => return Err(self.bad(field, "needs exactly one of box, cylinder, hull, mesh", "e.g. box = [\"40mm\", \"20mm\", \"8mm\"] along x1, x2, x3")),
+            _ => {
+                return Err(self.bad(
+                    field,
+                    "needs exactly one of box, cylinder, hull, mesh",
+                    "e.g. box = [\"40mm\", \"20mm\", \"8mm\"] along x1, x2, x3",
+                ));
+            }
         };
         if !has_volume(&shape) {
-            return Err(self.bad(field, "has no volume", "give sizes above zero, or four points that are not in one plane"));
+            return Err(self.bad(
+                field,
+                "has no volume",
+                "give sizes above zero, or four points that are not in one plane",
+            ));
         }
-        Ok(Body { name: solid.name.clone(), shape, grip_from_body: Frame { rotation, origin: DVec3::from_array(at) } })
+        Ok(Body {
+            name: solid.name.clone(),
+            shape,
+            grip_from_body: Frame { rotation, origin: DVec3::from_array(at) },
+        })
     }
 
     /// Convex pieces that together contain a mesh.
     fn mesh(&self, field: &str, mesh: &MeshFile) -> Result<Vec<Shape>> {
         let Some(folder) = self.folder else {
-            return Err(self.bad(field, "names a mesh file, but this gripper is not read from a file", "save it to a file beside the mesh"));
+            return Err(self.bad(
+                field,
+                "names a mesh file, but this gripper is not read from a file",
+                "save it to a file beside the mesh",
+            ));
         };
-        let unit =
-            mesh.unit.as_deref().map(str::parse).transpose().map_err(|error| self.bad(field, format!("unit: {error}"), "use mm, cm, m, um, in or ft"))?;
-        let shapes: Vec<Shape> = mesh::hulls(&folder.join(&mesh.file), unit)?.into_iter().map(|points| Shape::Hull { points }).filter(has_volume).collect();
+        let unit = mesh.unit.as_deref().map(str::parse).transpose().map_err(|error| {
+            self.bad(field, format!("unit: {error}"), "use mm, cm, m, um, in or ft")
+        })?;
+        let shapes: Vec<Shape> = mesh::hulls(&folder.join(&mesh.file), unit)?
+            .into_iter()
+            .map(|points| Shape::Hull { points })
+            .filter(has_volume)
+            .collect();
         if shapes.is_empty() {
-            return Err(self.bad(field, format!("{} encloses no volume", mesh.file.display()), "give the mesh of a solid"));
+            return Err(self.bad(
+                field,
+                format!("{} encloses no volume", mesh.file.display()),
+                "give the mesh of a solid",
+            ));
         }
         Ok(shapes)
     }
@@ -305,7 +409,11 @@ impl Reader<'_> {
         let z = axes.z.map_or(DVec3::X, DVec3::from_array);
         let y = axes.y.map_or(DVec3::Z, DVec3::from_array);
         let (Some(z), Some(x)) = (z.try_normalize(), y.cross(z).try_normalize()) else {
-            return Err(self.bad(field, "axes y and z are parallel or zero", "leave them out for z = approach (x1), y = closing (x3)"));
+            return Err(self.bad(
+                field,
+                "axes y and z are parallel or zero",
+                "leave them out for z = approach (x1), y = closing (x3)",
+            ));
         };
         Ok(Frame { rotation: DMat3::from_cols(x, z.cross(x), z), origin })
     }
@@ -319,8 +427,17 @@ fn has_volume(shape: &Shape) -> bool {
             let Some((&base, others)) = points.split_first() else { return false };
             let size = others.iter().map(|point| point.distance(base)).fold(0.0, f64::max);
             // Largest tetrahedron on the base point, its farthest point, and any two others.
-            let Some(&far) = others.iter().max_by(|a, b| a.distance(base).total_cmp(&b.distance(base))) else { return false };
-            let volume = |a: &DVec3| others.iter().map(|b| (far - base).cross(*a - base).dot(*b - base).abs()).fold(0.0, f64::max);
+            let Some(&far) =
+                others.iter().max_by(|a, b| a.distance(base).total_cmp(&b.distance(base)))
+            else {
+                return false;
+            };
+            let volume = |a: &DVec3| {
+                others
+                    .iter()
+                    .map(|b| (far - base).cross(*a - base).dot(*b - base).abs())
+                    .fold(0.0, f64::max)
+            };
             others.iter().map(volume).fold(0.0, f64::max) > 1e-9 * size.powi(3)
         }
     }

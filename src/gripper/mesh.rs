@@ -1,7 +1,8 @@
-//! Gripper bodies from a mesh file: every connected piece cut into slices, each slice taken as its convex hull.
+//! Gripper bodies from a mesh file: every connected piece cut into slices, each slice taken as its
+//! convex hull.
 //!
-//! The hulls together contain the mesh, so a test against them never lets a collision pass; slices keep a bent or
-//! hollowed finger from filling its own bays.
+//! The hulls together contain the mesh, so a test against them never lets a collision pass; slices
+//! keep a bent or hollowed finger from filling its own bays.
 
 use std::path::Path;
 
@@ -12,7 +13,8 @@ use crate::error::Result;
 use crate::geometry::clip_ring_axis;
 use crate::part::{Part, ReadOptions, Unit};
 
-/// Slices of a piece along its longest side, before those are joined whose common hull fills no more space.
+/// Slices of a piece along its longest side, before those are joined whose common hull fills no
+/// more space.
 const SLICES: usize = 16;
 /// Space that joining two slices may add, as a share of the joined hull.
 const FILLED: f64 = 2e-3;
@@ -23,8 +25,14 @@ const FILLED: f64 = 2e-3;
 /// As [`Part::read`].
 pub(super) fn hulls(path: &Path, unit: Option<Unit>) -> Result<Vec<Vec<DVec3>>> {
     let part = Part::read(path, &ReadOptions { unit })?;
-    let triangles: Vec<[DVec3; 3]> = (0..part.mesh.triangles.len() as u32).map(|index| part.mesh.corners(index)).collect();
-    Ok(pieces(&part).into_iter().flat_map(|piece| slices(&piece.into_iter().map(|index| triangles[index]).collect::<Vec<_>>())).collect())
+    let triangles: Vec<[DVec3; 3]> =
+        (0..part.mesh.triangles.len() as u32).map(|index| part.mesh.corners(index)).collect();
+    Ok(pieces(&part)
+        .into_iter()
+        .flat_map(|piece| {
+            slices(&piece.into_iter().map(|index| triangles[index]).collect::<Vec<_>>())
+        })
+        .collect())
 }
 
 /// Triangles of each connected piece, in the order of their first triangle.
@@ -58,13 +66,20 @@ fn pieces(part: &Part) -> Vec<Vec<usize>> {
 /// Convex hulls of slices of one piece.
 fn slices(triangles: &[[DVec3; 3]]) -> Vec<Vec<DVec3>> {
     let corners = || triangles.iter().flatten().copied();
-    let (low, high) = corners().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), corner| (low.min(corner), high.max(corner)));
+    let (low, high) = corners()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), corner| {
+            (low.min(corner), high.max(corner))
+        });
     let axis = (high - low).max_position();
     let at = |share: usize| low[axis] + (high[axis] - low[axis]) * share as f64 / SLICES as f64;
     let mut found: Vec<(Vec<DVec3>, f64)> = Vec::new();
     for slice in 0..SLICES {
-        // The cut through a closed surface lies within the hull of its outline, which the clipped triangles leave.
-        let points: Vec<DVec3> = triangles.iter().flat_map(|&triangle| clip(triangle, axis, at(slice), at(slice + 1))).collect();
+        // The cut through a closed surface lies within the hull of its outline, which the clipped
+        // triangles leave.
+        let points: Vec<DVec3> = triangles
+            .iter()
+            .flat_map(|&triangle| clip(triangle, axis, at(slice), at(slice + 1)))
+            .collect();
         let next = hull(points);
         if let Some((before, volume)) = found.last_mut() {
             let joined = hull(before.iter().chain(&next.0).copied().collect());
@@ -75,7 +90,11 @@ fn slices(triangles: &[[DVec3; 3]]) -> Vec<Vec<DVec3>> {
         }
         found.push(next);
     }
-    found.into_iter().filter(|(points, volume)| points.len() >= 4 && *volume > 0.0).map(|(points, _)| points).collect()
+    found
+        .into_iter()
+        .filter(|(points, volume)| points.len() >= 4 && *volume > 0.0)
+        .map(|(points, _)| points)
+        .collect()
 }
 
 /// Corners of the convex hull and its volume; all points, without volume, where they have none.
@@ -104,7 +123,8 @@ mod tests {
 
     /// An L of two legs 10 mm thick, 40 mm long, 8 mm deep, as a closed prism.
     fn angle_bracket() -> Vec<[DVec3; 3]> {
-        let outline = [(0.0, 0.0), (40.0, 0.0), (40.0, 10.0), (10.0, 10.0), (10.0, 40.0), (0.0, 40.0)];
+        let outline =
+            [(0.0, 0.0), (40.0, 0.0), (40.0, 10.0), (10.0, 10.0), (10.0, 40.0), (0.0, 40.0)];
         let point = |k: usize, z: f64| DVec3::new(outline[k].0, outline[k].1, z);
         let mut triangles = Vec::new();
         for [a, b, c] in [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]] {
@@ -127,14 +147,23 @@ mod tests {
         let total: f64 = bodies.iter().map(|points| hull(points.clone()).1).sum();
         let exact = 8.0 * (400.0 + 300.0);
         assert!(total >= exact * (1.0 - 1e-9) && total < 1.12 * exact, "{total} {exact}");
-        // Every point of the surface lies in one of them: no plane of any direction separates it from all.
+        // Every point of the surface lies in one of them: no plane of any direction separates it
+        // from all.
         let covered = |point: DVec3| {
             bodies.iter().any(|points| {
                 (0..400).all(|k| {
                     let z = 1.0 - 2.0 * (f64::from(k) + 0.5) / 400.0;
                     let turn = f64::from(k) * 2.399_963_229_728_653;
-                    let direction = DVec3::new((1.0 - z * z).sqrt() * turn.cos(), (1.0 - z * z).sqrt() * turn.sin(), z);
-                    points.iter().map(|corner| corner.dot(direction)).fold(f64::NEG_INFINITY, f64::max) >= point.dot(direction) - 1e-9
+                    let direction = DVec3::new(
+                        (1.0 - z * z).sqrt() * turn.cos(),
+                        (1.0 - z * z).sqrt() * turn.sin(),
+                        z,
+                    );
+                    points
+                        .iter()
+                        .map(|corner| corner.dot(direction))
+                        .fold(f64::NEG_INFINITY, f64::max)
+                        >= point.dot(direction) - 1e-9
                 })
             })
         };

@@ -28,19 +28,32 @@ pub(super) fn source(place: &str, text: &str) -> Result<LoadSource> {
         }
         ("gravity-cone", Some(rest)) => {
             let Some((axis, angle)) = rest.split_once(':') else {
-                return Err(Error::input(place, format!("'{text}' has no angle"), "write gravity-cone:DIR:ANGLE, e.g. gravity-cone:-z:20deg"));
+                return Err(Error::input(
+                    place,
+                    format!("'{text}' has no angle"),
+                    "write gravity-cone:DIR:ANGLE, e.g. gravity-cone:-z:20deg",
+                ));
             };
             let half_angle = Quantity::Angle.parse(place, angle)?;
             // A little above pi, for `3.1416rad`.
             if !(0.0..=std::f64::consts::PI + 1e-4).contains(&half_angle) {
-                return Err(Error::input(place, format!("'{text}': the cone's half angle is {angle}"), "give 0deg to 180deg"));
+                return Err(Error::input(
+                    place,
+                    format!("'{text}': the cone's half angle is {angle}"),
+                    "give 0deg to 180deg",
+                ));
             }
             Ok(LoadSource::GravityCone { axis: direction(place, axis)?, half_angle })
         }
         ("ball", Some(rest)) => ball(place, text, rest),
         _ => {
             let path = PathBuf::from(text);
-            match path.extension().and_then(|suffix| suffix.to_str()).map(str::to_ascii_lowercase).as_deref() {
+            match path
+                .extension()
+                .and_then(|suffix| suffix.to_str())
+                .map(str::to_ascii_lowercase)
+                .as_deref()
+            {
                 Some("csv" | "json") => Ok(LoadSource::File(path)),
                 _ => Err(Error::input(place, format!("'{text}' is not a kind of load"), FORMS)),
             }
@@ -49,8 +62,11 @@ pub(super) fn source(place: &str, text: &str) -> Result<LoadSource> {
 }
 
 fn ball(place: &str, text: &str, rest: &str) -> Result<LoadSource> {
-    let (forces, moments) = rest.split_once("+moments").map_or((rest, None), |(forces, moments)| (forces, Some(moments)));
-    let (number, force) = forces.split_once(':').map_or((forces, None), |(number, force)| (number, Some(force)));
+    let (forces, moments) = rest
+        .split_once("+moments")
+        .map_or((rest, None), |(forces, moments)| (forces, Some(moments)));
+    let (number, force) =
+        forces.split_once(':').map_or((forces, None), |(number, force)| (number, Some(force)));
     let directions = count(place, text, number)?;
     let force = force.map_or(Ok(UNIT_FORCE), |force| Quantity::Force.parse(place, force))?;
     let moment = match moments {
@@ -58,11 +74,21 @@ fn ball(place: &str, text: &str, rest: &str) -> Result<LoadSource> {
         Some("") => Some(UNIT_MOMENT),
         Some(moments) => match moments.strip_prefix(':') {
             Some(moment) => Some(Quantity::Moment.parse(place, moment)?),
-            None => return Err(Error::input(place, format!("'{text}': cannot read '{moments}' after +moments"), FORMS)),
+            None => {
+                return Err(Error::input(
+                    place,
+                    format!("'{text}': cannot read '{moments}' after +moments"),
+                    FORMS,
+                ));
+            }
         },
     };
     if force <= 0.0 || moment.is_some_and(|moment| moment <= 0.0) {
-        return Err(Error::input(place, format!("'{text}': the ball's forces and moments must be positive"), "give their size, e.g. ball:500:10N"));
+        return Err(Error::input(
+            place,
+            format!("'{text}': the ball's forces and moments must be positive"),
+            "give their size, e.g. ball:500:10N",
+        ));
     }
     Ok(LoadSource::Ball { directions, force, moment })
 }
@@ -70,7 +96,11 @@ fn ball(place: &str, text: &str, rest: &str) -> Result<LoadSource> {
 fn count(place: &str, text: &str, number: &str) -> Result<usize> {
     match number.parse::<usize>() {
         Ok(count @ 1..=MAX_CASES) => Ok(count),
-        _ => Err(Error::input(place, format!("'{text}': '{number}' is not a number of directions"), format!("give 1 to {MAX_CASES}, e.g. ball:500"))),
+        _ => Err(Error::input(
+            place,
+            format!("'{text}': '{number}' is not a number of directions"),
+            format!("give 1 to {MAX_CASES}, e.g. ball:500"),
+        )),
     }
 }
 
@@ -89,9 +119,19 @@ fn direction(place: &str, text: &str) -> Result<DVec3> {
             _ => {}
         }
     }
-    let numbers: Vec<f64> = text.split('/').map_while(|number| number.trim().parse().ok()).filter(|number: &f64| number.is_finite()).collect();
+    let numbers: Vec<f64> = text
+        .split('/')
+        .map_while(|number| number.trim().parse().ok())
+        .filter(|number: &f64| number.is_finite())
+        .collect();
     match numbers[..] {
-        [x, y, z] if text.split('/').count() == 3 && (x, y, z) != (0.0, 0.0, 0.0) => Ok(DVec3::new(x, y, z)),
-        _ => Err(Error::input(place, format!("'{text}' is not a direction"), "give +x, -x, +y, -y, +z, -z or three numbers joined by slashes, e.g. 0/0.5/-1")),
+        [x, y, z] if text.split('/').count() == 3 && (x, y, z) != (0.0, 0.0, 0.0) => {
+            Ok(DVec3::new(x, y, z))
+        }
+        _ => Err(Error::input(
+            place,
+            format!("'{text}' is not a direction"),
+            "give +x, -x, +y, -y, +z, -z or three numbers joined by slashes, e.g. 0/0.5/-1",
+        )),
     }
 }

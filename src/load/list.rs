@@ -30,7 +30,11 @@ impl Stated {
             Axes::Part => (self.force, self.moment, self.point),
             Axes::World => {
                 let part_from_world = world_from_part.rotation.transpose();
-                (part_from_world * self.force, part_from_world * self.moment, self.point.map(|point| world_from_part.point_inverse(point)))
+                (
+                    part_from_world * self.force,
+                    part_from_world * self.moment,
+                    self.point.map(|point| world_from_part.point_inverse(point)),
+                )
             }
         };
         let arm = point.map_or(DVec3::ZERO, |point| point - mass.centre_of_mass);
@@ -38,20 +42,32 @@ impl Stated {
     }
 }
 
-/// Reads a table with `fx,fy,fz` and/or `mx,my,mz`, optional `px,py,pz` (where the force acts and about which the moment is
-/// meant; the centre of mass without), `frame` (`part`, the default, or `world`) and `name`.
-pub(super) fn from_table(table: &Table, mass: &MassProperties, world_from_part: &Frame) -> Result<Vec<LoadCase>> {
-    let (force, moment, point) = (table.has_vector(FORCE)?, table.has_vector(MOMENT)?, table.has_vector(POINT)?);
-    let read = |there: bool, row: usize, columns: [&str; 3]| if there { table.vector(row, columns) } else { Ok(DVec3::ZERO) };
+/// Reads a table with `fx,fy,fz` and/or `mx,my,mz`, optional `px,py,pz` (where the force acts and
+/// about which the moment is meant; the centre of mass without), `frame` (`part`, the default, or
+/// `world`) and `name`.
+pub(super) fn from_table(
+    table: &Table,
+    mass: &MassProperties,
+    world_from_part: &Frame,
+) -> Result<Vec<LoadCase>> {
+    let (force, moment, point) =
+        (table.has_vector(FORCE)?, table.has_vector(MOMENT)?, table.has_vector(POINT)?);
+    let read = |there: bool, row: usize, columns: [&str; 3]| {
+        if there { table.vector(row, columns) } else { Ok(DVec3::ZERO) }
+    };
     (0..table.len())
         .map(|row| {
             let stated = Stated {
                 force: read(force, row, FORCE)?,
                 moment: read(moment, row, MOMENT)?,
                 point: if point { Some(table.vector(row, POINT)?) } else { None },
-                axes: table.text(row, "frame").map_or(Ok(Axes::Part), |text| Axes::parse(&table.place(row), text))?,
+                axes: table
+                    .text(row, "frame")
+                    .map_or(Ok(Axes::Part), |text| Axes::parse(&table.place(row), text))?,
             };
-            let name = table.text(row, "name").map_or_else(|| format!("{} row {}", table.file_name(), row + 1), str::to_owned);
+            let name = table
+                .text(row, "name")
+                .map_or_else(|| format!("{} row {}", table.file_name(), row + 1), str::to_owned);
             finite(&table.place(row), name, stated.resolve(mass, world_from_part))
         })
         .collect()
@@ -91,16 +107,25 @@ struct JsonLoad {
     frame: Option<String>,
 }
 
-/// Reads `{"units": {..}, "loads": [{"name", "force", "moment", "point", "frame"}, ..]}`; units default to N, Nm and m.
-pub(super) fn from_json(place: &str, text: &str, mass: &MassProperties, world_from_part: &Frame) -> Result<Vec<LoadCase>> {
-    let list: JsonList = serde_json::from_str(text.trim_start_matches('\u{feff}')).map_err(|error| {
-        Error::input(
-            format!("{place}:{}", error.line()),
-            format!("not a list of loads: {error}"),
-            r#"write {"loads": [{"name": "..", "force": [x,y,z], "moment": [x,y,z]}, ..]}"#,
-        )
-    })?;
-    let factor = |quantity: Quantity, field: &str, unit: &str| quantity.parse(&format!("{place}, units.{field}"), &format!("1{unit}"));
+/// Reads `{"units": {..}, "loads": [{"name", "force", "moment", "point", "frame"}, ..]}`; units
+/// default to N, Nm and m.
+pub(super) fn from_json(
+    place: &str,
+    text: &str,
+    mass: &MassProperties,
+    world_from_part: &Frame,
+) -> Result<Vec<LoadCase>> {
+    let list: JsonList =
+        serde_json::from_str(text.trim_start_matches('\u{feff}')).map_err(|error| {
+            Error::input(
+                format!("{place}:{}", error.line()),
+                format!("not a list of loads: {error}"),
+                r#"write {"loads": [{"name": "..", "force": [x,y,z], "moment": [x,y,z]}, ..]}"#,
+            )
+        })?;
+    let factor = |quantity: Quantity, field: &str, unit: &str| {
+        quantity.parse(&format!("{place}, units.{field}"), &format!("1{unit}"))
+    };
     let force = factor(Quantity::Force, "force", &list.units.force)?;
     let moment = factor(Quantity::Moment, "moment", &list.units.moment)?;
     let length = factor(Quantity::Length, "length", &list.units.length)?;
@@ -128,7 +153,10 @@ pub(super) fn finite(place: &str, name: String, wrench: Wrench) -> Result<LoadCa
     }
     Err(Error::input(
         place,
-        format!("the load about the centre of mass is not finite: force {}, moment {}", wrench.force, wrench.moment),
+        format!(
+            "the load about the centre of mass is not finite: force {}, moment {}",
+            wrench.force, wrench.moment
+        ),
         "check the size of the numbers",
     ))
 }

@@ -1,8 +1,10 @@
-//! Load cases: what pulls at the part while it is held, as wrenches in the part frame about the centre of mass.
+//! Load cases: what pulls at the part while it is held, as wrenches in the part frame about the
+//! centre of mass.
 //!
-//! A [`LoadSet`] is what the user asked for (the flag `--loads` and its companions); [`LoadSet::cases`] turns it into
-//! [`LoadCase`]s through the part's mass properties, and [`wrench_in_grip`] carries one into a grip frame.
-//! Wrenches act ON the body: gravity along `-z` on 1 kg is the force `(0, 0, -9.80665)` N.
+//! A [`LoadSet`] is what the user asked for (the flag `--loads` and its companions);
+//! [`LoadSet::cases`] turns it into [`LoadCase`]s through the part's mass properties, and
+//! [`wrench_in_grip`] carries one into a grip frame. Wrenches act ON the body: gravity along `-z`
+//! on 1 kg is the force `(0, 0, -9.80665)` N.
 
 mod flag;
 mod list;
@@ -23,8 +25,9 @@ use crate::units::STANDARD_GRAVITY;
 /// Largest number of load cases of one run; load indices are 32-bit and memory is finite.
 pub const MAX_CASES: usize = 10_000_000;
 
-/// Directions of acceleration that [`LoadSet::acceleration`] tries by default: the vertices of an icosahedron divided
-/// three-fold. The worst direction lies within 14 degrees of one of them, so the inertial force that counts is at least 97 % of the worst.
+/// Directions of acceleration that [`LoadSet::acceleration`] tries by default: the vertices of an
+/// icosahedron divided three-fold. The worst direction lies within 14 degrees of one of them, so
+/// the inertial force that counts is at least 97 % of the worst.
 pub const ACCELERATION_DIRECTIONS: usize = 92;
 
 /// Everything that shall be held, as asked for.
@@ -34,7 +37,8 @@ pub struct LoadSet {
     pub sources: Vec<LoadSource>,
     /// Acceleration in any direction on top of every gravity case.
     pub acceleration: Option<Acceleration>,
-    /// Part frame in the world, for wrenches given in world axes and as the first pose of a trajectory that states none.
+    /// Part frame in the world, for wrenches given in world axes and as the first pose of a
+    /// trajectory that states none.
     pub world_from_part: Frame,
     /// Gravity in the world during a trajectory [m/s^2].
     pub world_gravity: DVec3,
@@ -56,7 +60,8 @@ pub enum LoadSource {
         /// Half its opening, 0 to pi [rad].
         half_angle: f64,
     },
-    /// The paper's ball: forces normal to the facets of a sphere about the centre of mass, directed at it.
+    /// The paper's ball: forces normal to the facets of a sphere about the centre of mass, directed
+    /// at it.
     Ball {
         /// Number of directions.
         directions: usize,
@@ -69,7 +74,8 @@ pub enum LoadSource {
     File(PathBuf),
 }
 
-/// An acceleration of the part's centre of mass of known size and unknown direction, without rotation.
+/// An acceleration of the part's centre of mass of known size and unknown direction, without
+/// rotation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Acceleration {
     /// Its size [m/s^2].
@@ -86,23 +92,34 @@ impl Default for LoadSet {
 }
 
 impl LoadSet {
-    /// A set of these sources without acceleration, world axes along the part's, gravity along world `-z`.
+    /// A set of these sources without acceleration, world axes along the part's, gravity along
+    /// world `-z`.
     pub fn new(sources: Vec<LoadSource>) -> Self {
-        Self { sources, acceleration: None, world_from_part: Frame::IDENTITY, world_gravity: DVec3::new(0.0, 0.0, -STANDARD_GRAVITY) }
+        Self {
+            sources,
+            acceleration: None,
+            world_from_part: Frame::IDENTITY,
+            world_gravity: DVec3::new(0.0, 0.0, -STANDARD_GRAVITY),
+        }
     }
 
-    /// Parses the value of `--loads`: sources joined by commas, each one of `gravity` (six axes), `gravity:DIR`, `gravity:N`,
-    /// `gravity-cone:DIR:ANGLE`, `ball:N`, `ball:N:FORCE`, `ball:N+moments`, `ball:N:FORCE+moments:MOMENT` or a file ending in
-    /// `.csv` or `.json`. `DIR` is `+x`, `-z`, ... or three numbers joined by slashes. `place` is the flag for messages.
+    /// Parses the value of `--loads`: sources joined by commas, each one of `gravity` (six axes),
+    /// `gravity:DIR`, `gravity:N`, `gravity-cone:DIR:ANGLE`, `ball:N`, `ball:N:FORCE`,
+    /// `ball:N+moments`, `ball:N:FORCE+moments:MOMENT` or a file ending in `.csv` or `.json`. `DIR`
+    /// is `+x`, `-z`, ... or three numbers joined by slashes. `place` is the flag for messages.
     ///
     /// # Errors
     /// When a source is none of these; the message lists them.
     pub fn parse(place: &str, text: &str) -> Result<Self> {
-        let sources: Vec<_> = text.split(',').map(|source| flag::source(place, source.trim())).collect::<Result<_>>()?;
+        let sources: Vec<_> = text
+            .split(',')
+            .map(|source| flag::source(place, source.trim()))
+            .collect::<Result<_>>()?;
         Ok(Self::new(sources))
     }
 
-    /// The same set with an acceleration of `magnitude` [m/s^2] in [`ACCELERATION_DIRECTIONS`] directions on top of gravity.
+    /// The same set with an acceleration of `magnitude` [m/s^2] in [`ACCELERATION_DIRECTIONS`]
+    /// directions on top of gravity.
     #[must_use]
     pub fn with_acceleration(mut self, magnitude: f64) -> Self {
         self.acceleration = Some(Acceleration { magnitude, directions: ACCELERATION_DIRECTIONS });
@@ -112,8 +129,9 @@ impl LoadSet {
     /// The load cases of a part with these mass properties, sources in order. Files are read here.
     ///
     /// # Errors
-    /// When a source needs a mass and the part has none that is positive and finite, a file cannot be read or is not what it
-    /// should be (naming file and line), `acceleration` is set without a gravity source, or the cases are none or more than [`MAX_CASES`].
+    /// When a source needs a mass and the part has none that is positive and finite, a file cannot
+    /// be read or is not what it should be (naming file and line), `acceleration` is set without a
+    /// gravity source, or the cases are none or more than [`MAX_CASES`].
     pub fn cases(&self, mass: &MassProperties) -> Result<Vec<LoadCase>> {
         let mut cases = Vec::new();
         let mut accelerated = false;
@@ -155,21 +173,40 @@ impl LoadSet {
             ));
         }
         if cases.is_empty() {
-            return Err(Error::input("--loads", "no load case", "ask for at least one, e.g. `gravity`"));
+            return Err(Error::input(
+                "--loads",
+                "no load case",
+                "ask for at least one, e.g. `gravity`",
+            ));
         }
         Ok(cases)
     }
 
     /// The weight in each direction and, where asked for, with the inertial forces on top.
-    fn gravity(&self, directions: &[DVec3], mass: &MassProperties, room: usize, cases: &mut Vec<LoadCase>) -> Result<()> {
+    fn gravity(
+        &self,
+        directions: &[DVec3],
+        mass: &MassProperties,
+        room: usize,
+        cases: &mut Vec<LoadCase>,
+    ) -> Result<()> {
         let mass = checked_mass(mass)?;
         let Some(acceleration) = self.acceleration else {
-            cases.extend(directions.iter().map(|direction| force_case(format!("gravity {}", name(*direction)), *direction * (mass * STANDARD_GRAVITY))));
+            cases.extend(directions.iter().map(|direction| {
+                force_case(
+                    format!("gravity {}", name(*direction)),
+                    *direction * (mass * STANDARD_GRAVITY),
+                )
+            }));
             return Ok(());
         };
         check_count("--accel", acceleration.directions)?;
         if !(acceleration.magnitude.is_finite() && acceleration.magnitude >= 0.0) {
-            return Err(Error::input("--accel", format!("{} m/s2 is not an acceleration", acceleration.magnitude), "give a finite size, e.g. 2g"));
+            return Err(Error::input(
+                "--accel",
+                format!("{} m/s2 is not an acceleration", acceleration.magnitude),
+                "give a finite size, e.g. 2g",
+            ));
         }
         let total = directions.len().saturating_mul(acceleration.directions + 1);
         if total > room {
@@ -178,7 +215,8 @@ impl LoadSet {
         let spread = sphere::directions(acceleration.directions);
         for direction in directions {
             let weight = *direction * (mass * STANDARD_GRAVITY);
-            // Against gravity first: there the inertial force adds to the whole weight, which no other direction does.
+            // Against gravity first: there the inertial force adds to the whole weight, which no
+            // other direction does.
             for along in std::iter::once(-*direction).chain(spread.iter().copied()) {
                 let name = format!("gravity {}, accelerated {}", name(*direction), name(along));
                 cases.push(force_case(name, weight - along * (mass * acceleration.magnitude)));
@@ -202,7 +240,10 @@ impl LoadSet {
             } else {
                 return Err(Error::input(
                     table.header_place(),
-                    format!("the header '{}' is neither a list of wrenches nor a trajectory", table.header()),
+                    format!(
+                        "the header '{}' is neither a list of wrenches nor a trajectory",
+                        table.header()
+                    ),
                     "a list has columns fx,fy,fz,mx,my,mz; a trajectory has t and one of ax,ay,az / vx,vy,vz / x,y,z / qx,qy,qz,qw / wx,wy,wz",
                 ));
             }
@@ -212,25 +253,42 @@ impl LoadSet {
     }
 }
 
-/// Carries a wrench in the part frame about the centre of mass into the grip frame about its origin.
+/// Carries a wrench in the part frame about the centre of mass into the grip frame about its
+/// origin.
 pub fn wrench_in_grip(wrench: &Wrench, centre_of_mass: DVec3, part_from_grip: &Frame) -> Wrench {
     let grip_from_part: DMat3 = part_from_grip.rotation.transpose();
     let arm = centre_of_mass - part_from_grip.origin;
-    Wrench { force: grip_from_part * wrench.force, moment: grip_from_part * (wrench.moment + arm.cross(wrench.force)) }
+    Wrench {
+        force: grip_from_part * wrench.force,
+        moment: grip_from_part * (wrench.moment + arm.cross(wrench.force)),
+    }
 }
 
-/// The wrench of a body in motion: `m (g - a)` and `-(I alpha + omega x I omega)`, every vector in the part frame.
+/// The wrench of a body in motion: `m (g - a)` and `-(I alpha + omega x I omega)`, every vector in
+/// the part frame.
 ///
-/// `acceleration` is that of the centre of mass; the moment is about it. Newton's and Euler's equations, as d'Alembert's forces.
-pub fn inertial_wrench(mass: &MassProperties, gravity: DVec3, acceleration: DVec3, omega: DVec3, alpha: DVec3) -> Wrench {
-    Wrench { force: mass.mass * (gravity - acceleration), moment: -(mass.inertia * alpha + omega.cross(mass.inertia * omega)) }
+/// `acceleration` is that of the centre of mass; the moment is about it. Newton's and Euler's
+/// equations, as d'Alembert's forces.
+pub fn inertial_wrench(
+    mass: &MassProperties,
+    gravity: DVec3,
+    acceleration: DVec3,
+    omega: DVec3,
+    alpha: DVec3,
+) -> Wrench {
+    Wrench {
+        force: mass.mass * (gravity - acceleration),
+        moment: -(mass.inertia * alpha + omega.cross(mass.inertia * omega)),
+    }
 }
 
 /// The paper's ball about the centre of mass.
 fn ball(count: usize, force: f64, moment: Option<f64>, cases: &mut Vec<LoadCase>) {
     let directions = sphere::directions(count);
     // The outward normal of the facet is `direction`; the force is directed at the object.
-    cases.extend(directions.iter().map(|direction| force_case(format!("ball force {}", name(-*direction)), -*direction * force)));
+    cases.extend(directions.iter().map(|direction| {
+        force_case(format!("ball force {}", name(-*direction)), -*direction * force)
+    }));
     if let Some(moment) = moment {
         cases.extend(directions.iter().map(|direction| LoadCase {
             name: format!("ball moment {}", name(-*direction)),
@@ -262,7 +320,11 @@ fn unit(direction: DVec3) -> Result<DVec3> {
     // Scaled by the largest component first: 1e-200 and 1e200 are directions too.
     let largest = direction.abs().max_element();
     if !(largest.is_finite() && largest > 0.0) {
-        return Err(Error::input("--loads", format!("{direction} is not a direction"), "give three finite numbers, not all zero"));
+        return Err(Error::input(
+            "--loads",
+            format!("{direction} is not a direction"),
+            "give three finite numbers, not all zero",
+        ));
     }
     Ok((direction / largest).normalize())
 }
@@ -271,11 +333,19 @@ fn checked_mass(mass: &MassProperties) -> Result<f64> {
     if mass.mass.is_finite() && mass.mass > 0.0 {
         return Ok(mass.mass);
     }
-    Err(Error::input("--loads", format!("the part's mass is {} kg, and gravity and inertia need one", mass.mass), "state --mass or --density"))
+    Err(Error::input(
+        "--loads",
+        format!("the part's mass is {} kg, and gravity and inertia need one", mass.mass),
+        "state --mass or --density",
+    ))
 }
 
 fn check_count(place: &str, count: usize) -> Result<()> {
-    if (1..=MAX_CASES).contains(&count) { Ok(()) } else { Err(Error::input(place, format!("{count} directions"), format!("give 1 to {MAX_CASES}"))) }
+    if (1..=MAX_CASES).contains(&count) {
+        Ok(())
+    } else {
+        Err(Error::input(place, format!("{count} directions"), format!("give 1 to {MAX_CASES}")))
+    }
 }
 
 fn too_many(count: usize) -> Error {

@@ -14,9 +14,10 @@ pub fn axes() -> [DVec3; 6] {
 
 /// `count` near-uniform unit vectors.
 ///
-/// Where `count` is 20 f^2 (20, 80, 180, 320, 500, ...) they are the facet normals of an icosahedron divided f-fold and blown
-/// up to the sphere, where it is 10 f^2 + 2 (12, 42, 92, 162, ...) its vertices, 6 the axes; both sets hold `-v` with every `v`.
-/// Any other number gives a Fibonacci spiral.
+/// Where `count` is 20 f^2 (20, 80, 180, 320, 500, ...) they are the facet normals of an
+/// icosahedron divided f-fold and blown up to the sphere, where it is 10 f^2 + 2 (12, 42, 92, 162,
+/// ...) its vertices, 6 the axes; both sets hold `-v` with every `v`. Any other number gives a
+/// Fibonacci spiral.
 pub fn directions(count: usize) -> Vec<DVec3> {
     let frequency = |count: usize, facets: usize| {
         let square = count / facets;
@@ -27,7 +28,10 @@ pub fn directions(count: usize) -> Vec<DVec3> {
         return axes().to_vec();
     }
     if let Some(f) = frequency(count, 20) {
-        return geodesic_facets(f).into_iter().map(|[a, b, c]| (b - a).cross(c - a).normalize()).collect();
+        return geodesic_facets(f)
+            .into_iter()
+            .map(|[a, b, c]| (b - a).cross(c - a).normalize())
+            .collect();
     }
     if let Some(f) = count.checked_sub(2).and_then(|count| frequency(count, 10)) {
         return geodesic_vertices(f);
@@ -35,8 +39,9 @@ pub fn directions(count: usize) -> Vec<DVec3> {
     fibonacci(count)
 }
 
-/// Directions within `half_angle` of the unit vector `axis`: the axis and rings about it, the last on the rim,
-/// neighbours at most [`CONE_STEP`] apart. A zero (or negative, or nan) angle gives the axis alone.
+/// Directions within `half_angle` of the unit vector `axis`: the axis and rings about it, the last
+/// on the rim, neighbours at most [`CONE_STEP`] apart. A zero (or negative, or nan) angle gives the
+/// axis alone.
 pub fn cone(axis: DVec3, half_angle: f64) -> Vec<DVec3> {
     let half_angle = half_angle.min(PI);
     let mut found = vec![axis];
@@ -114,7 +119,8 @@ fn icosahedron() -> ([DVec3; 12], [[usize; 3]; 20]) {
     (corners.map(|corner| DVec3::from_array(corner).normalize()), facets)
 }
 
-/// The point of facet `(a, b, c)` at integer barycentric coordinates `(f - i - j, i, j)`, on the sphere.
+/// The point of facet `(a, b, c)` at integer barycentric coordinates `(f - i - j, i, j)`, on the
+/// sphere.
 fn on_sphere([a, b, c]: [DVec3; 3], f: usize, i: usize, j: usize) -> DVec3 {
     (a * (f - i - j) as f64 + b * i as f64 + c * j as f64).normalize()
 }
@@ -138,7 +144,8 @@ fn geodesic_facets(f: usize) -> Vec<[DVec3; 3]> {
     found
 }
 
-/// The 10 f^2 + 2 vertices of the icosahedron divided f-fold: corners, then points inside edges, then inside facets.
+/// The 10 f^2 + 2 vertices of the icosahedron divided f-fold: corners, then points inside edges,
+/// then inside facets.
 fn geodesic_vertices(f: usize) -> Vec<DVec3> {
     let (corners, facets) = icosahedron();
     let mut found = corners.to_vec();
@@ -146,7 +153,9 @@ fn geodesic_vertices(f: usize) -> Vec<DVec3> {
         for (from, to) in [(a, b), (b, c), (c, a)] {
             // Each edge belongs to two facets, which run along it in opposite senses.
             if from < to {
-                found.extend((1..f).map(|i| (corners[from] * (f - i) as f64 + corners[to] * i as f64).normalize()));
+                found.extend((1..f).map(|i| {
+                    (corners[from] * (f - i) as f64 + corners[to] * i as f64).normalize()
+                }));
             }
         }
     }
@@ -188,11 +197,22 @@ mod tests {
     fn no_direction_is_far_from_a_member() {
         for count in [92, 100, 500] {
             let found = directions(count);
-            let worst = fibonacci(20_000).iter().map(|probe| found.iter().map(|member| member.dot(*probe)).fold(-1.0, f64::max)).fold(1.0, f64::min);
-            assert!(worst.acos() < 1.3 * (4.0 * PI / count as f64).sqrt(), "{count}: {}", worst.acos());
+            let worst = fibonacci(20_000)
+                .iter()
+                .map(|probe| found.iter().map(|member| member.dot(*probe)).fold(-1.0, f64::max))
+                .fold(1.0, f64::min);
+            assert!(
+                worst.acos() < 1.3 * (4.0 * PI / count as f64).sqrt(),
+                "{count}: {}",
+                worst.acos()
+            );
             if count == crate::load::ACCELERATION_DIRECTIONS {
                 // The number that ACCELERATION_DIRECTIONS documents.
-                assert!(worst > 0.97 && worst.acos().to_degrees() < 14.0, "{}", worst.acos().to_degrees());
+                assert!(
+                    worst > 0.97 && worst.acos().to_degrees() < 14.0,
+                    "{}",
+                    worst.acos().to_degrees()
+                );
             }
         }
     }
@@ -201,13 +221,20 @@ mod tests {
     fn geodesic_sets_hold_the_opposite_of_every_member() {
         for count in [12, 20, 42, 80, 92, 500] {
             let found = directions(count);
-            assert!(found.iter().all(|a| found.iter().any(|b| (*a + *b).length() < 1e-14)), "{count}");
+            assert!(
+                found.iter().all(|a| found.iter().any(|b| (*a + *b).length() < 1e-14)),
+                "{count}"
+            );
         }
     }
 
     #[test]
     fn facet_normals_point_outwards() {
-        assert!(geodesic_facets(3).iter().all(|[a, b, c]| (*b - *a).cross(*c - *a).dot(*a + *b + *c) > 0.0));
+        assert!(
+            geodesic_facets(3)
+                .iter()
+                .all(|[a, b, c]| (*b - *a).cross(*c - *a).dot(*a + *b + *c) > 0.0)
+        );
     }
 
     #[test]
@@ -217,7 +244,10 @@ mod tests {
             let half_angle = degrees.to_radians();
             let found = cone(axis, half_angle);
             assert_eq!(found[0], axis);
-            let widest = found.iter().map(|direction| axis.dot(*direction).clamp(-1.0, 1.0).acos()).fold(0.0, f64::max);
+            let widest = found
+                .iter()
+                .map(|direction| axis.dot(*direction).clamp(-1.0, 1.0).acos())
+                .fold(0.0, f64::max);
             assert!((widest - half_angle).abs() < 1e-7, "{degrees}: {widest}");
         }
         assert_eq!(cone(DVec3::Z, 0.0).len(), 1);

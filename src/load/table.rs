@@ -1,4 +1,5 @@
-//! A CSV file of numbers whose header names each column and its unit: `fx[N]`, `t [ms]`, `wz (deg/s)`; a bare name is SI.
+//! A CSV file of numbers whose header names each column and its unit: `fx[N]`, `t [ms]`, `wz
+//! (deg/s)`; a bare name is SI.
 
 use glam::DVec3;
 
@@ -11,8 +12,10 @@ pub(super) type Units = &'static [(&'static str, f64)];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 const TIME: Units = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
 const VELOCITY: Units = &[("m/s", 1.0), ("mm/s", 1e-3)];
-const ANGULAR_VELOCITY: Units = &[("rad/s", 1.0), ("deg/s", DEGREE), ("rpm", std::f64::consts::TAU / 60.0)];
-const ANGULAR_ACCELERATION: Units = &[("rad/s2", 1.0), ("rad/s^2", 1.0), ("deg/s2", DEGREE), ("deg/s^2", DEGREE)];
+const ANGULAR_VELOCITY: Units =
+    &[("rad/s", 1.0), ("deg/s", DEGREE), ("rpm", std::f64::consts::TAU / 60.0)];
+const ANGULAR_ACCELERATION: Units =
+    &[("rad/s2", 1.0), ("rad/s^2", 1.0), ("deg/s2", DEGREE), ("deg/s^2", DEGREE)];
 
 /// Every numeric column that a list or a trajectory may have, with its units.
 fn units(column: &str) -> Option<Units> {
@@ -44,13 +47,20 @@ impl Table {
     /// Reads `text`; `place` is the file for messages. Lines that start with `#` are comments.
     ///
     /// # Errors
-    /// When a line is not CSV or has another number of cells than the header, a column is unknown, comes twice or has an
-    /// unknown unit, or there is no row.
+    /// When a line is not CSV or has another number of cells than the header, a column is unknown,
+    /// comes twice or has an unknown unit, or there is no row.
     pub(super) fn parse(place: &str, text: &str) -> Result<Self> {
-        let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.trim_start_matches('\u{feff}').as_bytes());
+        let mut reader = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .from_reader(text.trim_start_matches('\u{feff}').as_bytes());
         let broken = |error: csv::Error| {
             let line = error.position().map_or(1, csv::Position::line);
-            Error::input(format!("{place}:{line}"), error.to_string(), "every line needs as many cells as the header, separated by commas")
+            Error::input(
+                format!("{place}:{line}"),
+                error.to_string(),
+                "every line needs as many cells as the header, separated by commas",
+            )
         };
         let header = reader.headers().map_err(broken)?.clone();
         let line = header.position().map_or(1, csv::Position::line);
@@ -58,19 +68,35 @@ impl Table {
         for cell in &header {
             let column = column(&format!("{place}:{line}"), cell)?;
             if columns.iter().any(|known| known.0 == column.0) {
-                return Err(Error::input(format!("{place}:{line}"), format!("column '{}' comes twice", column.0), "keep one of them"));
+                return Err(Error::input(
+                    format!("{place}:{line}"),
+                    format!("column '{}' comes twice", column.0),
+                    "keep one of them",
+                ));
             }
             columns.push(column);
         }
         let rows: Vec<_> = reader
             .records()
-            .map(|record| record.map(|record| (record.position().map_or(0, csv::Position::line), record)))
+            .map(|record| {
+                record.map(|record| (record.position().map_or(0, csv::Position::line), record))
+            })
             .collect::<std::result::Result<_, _>>()
             .map_err(broken)?;
         if rows.is_empty() {
-            return Err(Error::input(place, "no rows", "a header line and at least one line of numbers are needed"));
+            return Err(Error::input(
+                place,
+                "no rows",
+                "a header line and at least one line of numbers are needed",
+            ));
         }
-        Ok(Self { place: place.to_owned(), header: header.iter().collect::<Vec<_>>().join(","), header_line: line, columns, rows })
+        Ok(Self {
+            place: place.to_owned(),
+            header: header.iter().collect::<Vec<_>>().join(","),
+            header_line: line,
+            columns,
+            rows,
+        })
     }
 
     /// The header line, for messages.
@@ -114,7 +140,11 @@ impl Table {
     /// When the column is missing, or the cell is not a finite number.
     pub(super) fn number(&self, row: usize, column: &str) -> Result<f64> {
         let Some(index) = self.find(column) else {
-            return Err(Error::input(self.header_place(), format!("no column '{column}'"), format!("the header is '{}'", self.header)));
+            return Err(Error::input(
+                self.header_place(),
+                format!("no column '{column}'"),
+                format!("the header is '{}'", self.header),
+            ));
         };
         let cell = self.rows[row].1.get(index).unwrap_or_default();
         match cell.parse::<f64>().map(|value| value * self.columns[index].1) {
@@ -135,13 +165,21 @@ impl Table {
         match columns.iter().filter(|column| self.has(column)).count() {
             0 => Ok(false),
             3 => Ok(true),
-            _ => Err(Error::input(self.header_place(), format!("the header '{}' has part of {}", self.header, columns.join(",")), "give all three or none")),
+            _ => Err(Error::input(
+                self.header_place(),
+                format!("the header '{}' has part of {}", self.header, columns.join(",")),
+                "give all three or none",
+            )),
         }
     }
 
     /// Three numbers in SI; see [`Self::number`].
     pub(super) fn vector(&self, row: usize, columns: [&str; 3]) -> Result<DVec3> {
-        Ok(DVec3::new(self.number(row, columns[0])?, self.number(row, columns[1])?, self.number(row, columns[2])?))
+        Ok(DVec3::new(
+            self.number(row, columns[0])?,
+            self.number(row, columns[1])?,
+            self.number(row, columns[2])?,
+        ))
     }
 
     fn find(&self, column: &str) -> Option<usize> {
@@ -153,7 +191,9 @@ impl Table {
 fn column(place: &str, cell: &str) -> Result<(String, f64)> {
     let open = cell.find(['[', '(']);
     let (name, unit) = match open {
-        Some(open) => (cell[..open].trim(), Some(cell[open + 1..].trim_end_matches([']', ')']).trim())),
+        Some(open) => {
+            (cell[..open].trim(), Some(cell[open + 1..].trim_end_matches([']', ')']).trim()))
+        }
         None => (cell, None),
     };
     let name = match name.to_ascii_lowercase().as_str() {
@@ -176,7 +216,11 @@ fn column(place: &str, cell: &str) -> Result<(String, f64)> {
             Some(known) => Ok((name, known.1)),
             None => {
                 let list = units.iter().map(|unit| unit.0).collect::<Vec<_>>().join(", ");
-                let remedy = if list.is_empty() { "this column has no unit".to_owned() } else { format!("use one of: {list}") };
+                let remedy = if list.is_empty() {
+                    "this column has no unit".to_owned()
+                } else {
+                    format!("use one of: {list}")
+                };
                 Err(Error::input(place, format!("column '{cell}': unknown unit '{unit}'"), remedy))
             }
         },

@@ -1,8 +1,9 @@
 //! Trajectories: the motion of the part over time, turned into inertial wrenches.
 //!
-//! Rows hold a time and any of: the position `x,y,z` of the part frame's origin and the orientation `qx,qy,qz,qw` of the part
-//! frame in the world, the origin's velocity `vx,vy,vz` or acceleration `ax,ay,az`, the angular velocity `wx,wy,wz` or acceleration
-//! `alx,aly,alz`. The most direct column is used and the rest differentiated: acceleration before velocity before position.
+//! Rows hold a time and any of: the position `x,y,z` of the part frame's origin and the orientation
+//! `qx,qy,qz,qw` of the part frame in the world, the origin's velocity `vx,vy,vz` or acceleration
+//! `ax,ay,az`, the angular velocity `wx,wy,wz` or acceleration `alx,aly,alz`. The most direct
+//! column is used and the rest differentiated: acceleration before velocity before position.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -16,7 +17,8 @@ use crate::results::LoadCase;
 
 /// Rows that a derivative is taken from; fewer at hand, fewer used.
 const WINDOW: usize = 5;
-/// Largest turn between two rows of poses [rad]: five rows then stay below half a turn, where the rotation vector is unique.
+/// Largest turn between two rows of poses [rad]: five rows then stay below half a turn, where the
+/// rotation vector is unique.
 const LARGEST_TURN: f64 = std::f64::consts::FRAC_PI_4;
 
 const POSITION: [&str; 3] = ["x", "y", "z"];
@@ -28,8 +30,14 @@ const ANGULAR_ACCELERATION: [&str; 3] = ["alx", "aly", "alz"];
 
 /// One load case per row: weight and inertial wrench in the part frame about the centre of mass.
 ///
-/// `world_from_part` gives the first orientation when the file has no quaternions; the angular velocity then carries it on.
-pub(super) fn from_table(table: &Table, mass: &MassProperties, world_from_part: &Frame, world_gravity: DVec3) -> Result<Vec<LoadCase>> {
+/// `world_from_part` gives the first orientation when the file has no quaternions; the angular
+/// velocity then carries it on.
+pub(super) fn from_table(
+    table: &Table,
+    mass: &MassProperties,
+    world_from_part: &Frame,
+    world_gravity: DVec3,
+) -> Result<Vec<LoadCase>> {
     checked_mass(mass)?;
     let times = times(table)?;
     let axes = axes(table)?;
@@ -45,9 +53,17 @@ pub(super) fn from_table(table: &Table, mass: &MassProperties, world_from_part: 
     let stated_omega = column(ANGULAR_VELOCITY)?;
     let stated_alpha = column(ANGULAR_ACCELERATION)?;
     let quaternions = quaternions(table)?;
-    if position.is_none() && velocity.is_none() && acceleration.is_none() && stated_omega.is_none() && quaternions.is_none() {
+    if position.is_none()
+        && velocity.is_none()
+        && acceleration.is_none()
+        && stated_omega.is_none()
+        && quaternions.is_none()
+    {
         let (problem, remedy) = if stated_alpha.is_some() {
-            ("an angular acceleration without an angular velocity", "add wx,wy,wz or qx,qy,qz,qw: the gyroscopic moment needs them")
+            (
+                "an angular acceleration without an angular velocity",
+                "add wx,wy,wz or qx,qy,qz,qw: the gyroscopic moment needs them",
+            )
         } else {
             ("no motion", "add one of ax,ay,az / vx,vy,vz / x,y,z / qx,qy,qz,qw / wx,wy,wz")
         };
@@ -62,13 +78,19 @@ pub(super) fn from_table(table: &Table, mass: &MassProperties, world_from_part: 
     }
 
     let rotations: Vec<DMat3> = match &quaternions {
-        Some(quaternions) => quaternions.iter().map(|quaternion| DMat3::from_quat(*quaternion)).collect(),
+        Some(quaternions) => {
+            quaternions.iter().map(|quaternion| DMat3::from_quat(*quaternion)).collect()
+        }
         None => integrate(world_from_part.rotation, &times, stated_omega.as_deref(), axes),
     };
     let to_world = |vectors: Vec<DVec3>| -> Vec<DVec3> {
         match axes {
             Axes::World => vectors,
-            Axes::Part => vectors.iter().zip(&rotations).map(|(vector, rotation)| *rotation * *vector).collect(),
+            Axes::Part => vectors
+                .iter()
+                .zip(&rotations)
+                .map(|(vector, rotation)| *rotation * *vector)
+                .collect(),
         }
     };
 
@@ -97,17 +119,26 @@ pub(super) fn from_table(table: &Table, mass: &MassProperties, world_from_part: 
     (0..times.len())
         .map(|row| {
             let arm = rotations[row] * mass.centre_of_mass;
-            let centre_acceleration = origin_acceleration[row] + alpha[row].cross(arm) + omega[row].cross(omega[row].cross(arm));
+            let centre_acceleration = origin_acceleration[row]
+                + alpha[row].cross(arm)
+                + omega[row].cross(omega[row].cross(arm));
             let part_from_world = rotations[row].transpose();
             let turn = |vector: DVec3| part_from_world * vector;
-            let wrench = inertial_wrench(mass, turn(world_gravity), turn(centre_acceleration), turn(omega[row]), turn(alpha[row]));
+            let wrench = inertial_wrench(
+                mass,
+                turn(world_gravity),
+                turn(centre_acceleration),
+                turn(omega[row]),
+                turn(alpha[row]),
+            );
             finite(&table.place(row), format!("{} t={:.6}s", table.file_name(), times[row]), wrench)
         })
         .collect()
 }
 
 fn times(table: &Table) -> Result<Vec<f64>> {
-    let times: Vec<f64> = (0..table.len()).map(|row| table.number(row, "t")).collect::<Result<_>>()?;
+    let times: Vec<f64> =
+        (0..table.len()).map(|row| table.number(row, "t")).collect::<Result<_>>()?;
     for row in 1..times.len() {
         if times[row] <= times[row - 1] {
             return Err(Error::input(
@@ -126,7 +157,11 @@ fn axes(table: &Table) -> Result<Axes> {
         let Some(text) = table.text(row, "frame") else { continue };
         let axes = Axes::parse(&table.place(row), text)?;
         if *found.get_or_insert(axes) != axes {
-            return Err(Error::input(table.place(row), "the frame changes within the trajectory", "give all rows in the same axes"));
+            return Err(Error::input(
+                table.place(row),
+                "the frame changes within the trajectory",
+                "give all rows in the same axes",
+            ));
         }
     }
     Ok(found.unwrap_or(Axes::World))
@@ -136,7 +171,13 @@ fn quaternions(table: &Table) -> Result<Option<Vec<DQuat>>> {
     match QUATERNION.iter().filter(|column| table.has(column)).count() {
         0 => return Ok(None),
         4 => {}
-        _ => return Err(Error::input(table.header_place(), "part of qx,qy,qz,qw is missing", "give all four or none")),
+        _ => {
+            return Err(Error::input(
+                table.header_place(),
+                "part of qx,qy,qz,qw is missing",
+                "give all four or none",
+            ));
+        }
     }
     let read = |row: usize| {
         let [x, y, z, w] = [0, 1, 2, 3].map(|index| table.number(row, QUATERNION[index]));
@@ -154,13 +195,16 @@ fn quaternions(table: &Table) -> Result<Option<Vec<DQuat>>> {
     (0..table.len()).map(read).collect::<Result<_>>().map(Some)
 }
 
-/// Orientations carried on by the angular velocity; the mean of two rows turns from one to the next (second order in the step).
+/// Orientations carried on by the angular velocity; the mean of two rows turns from one to the next
+/// (second order in the step).
 fn integrate(first: DMat3, times: &[f64], omega: Option<&[DVec3]>, axes: Axes) -> Vec<DMat3> {
     let Some(omega) = omega else { return vec![first; times.len()] };
     let mut rotation = DQuat::from_mat3(&first);
     let mut found = vec![first];
     for row in 1..times.len() {
-        let turn = DQuat::from_scaled_axis((omega[row - 1] + omega[row]) * (0.5 * (times[row] - times[row - 1])));
+        let turn = DQuat::from_scaled_axis(
+            (omega[row - 1] + omega[row]) * (0.5 * (times[row] - times[row - 1])),
+        );
         rotation = match axes {
             Axes::World => turn * rotation,
             Axes::Part => rotation * turn,
@@ -171,7 +215,8 @@ fn integrate(first: DMat3, times: &[f64], omega: Option<&[DVec3]>, axes: Axes) -
     found
 }
 
-/// The rows that the derivative at `row` is taken from: itself and its neighbours, one-sided at the ends.
+/// The rows that the derivative at `row` is taken from: itself and its neighbours, one-sided at the
+/// ends.
 fn window(row: usize, rows: usize) -> std::ops::Range<usize> {
     let size = WINDOW.min(rows);
     let first = row.saturating_sub(size / 2).min(rows - size);
@@ -179,9 +224,18 @@ fn window(row: usize, rows: usize) -> std::ops::Range<usize> {
 }
 
 /// First or second derivative of a sampled vector.
-fn differentiate(table: &Table, times: &[f64], values: &[DVec3], order: usize) -> Result<Vec<DVec3>> {
+fn differentiate(
+    table: &Table,
+    times: &[f64],
+    values: &[DVec3],
+    order: usize,
+) -> Result<Vec<DVec3>> {
     if times.len() <= order {
-        return Err(Error::input(table.place(0), format!("{} row(s) are too few to differentiate", times.len()), format!("give at least {}", order + 1)));
+        return Err(Error::input(
+            table.place(0),
+            format!("{} row(s) are too few to differentiate", times.len()),
+            format!("give at least {}", order + 1),
+        ));
     }
     Ok((0..times.len())
         .map(|row| {
@@ -194,12 +248,21 @@ fn differentiate(table: &Table, times: &[f64], values: &[DVec3], order: usize) -
 
 /// Angular velocity and acceleration in world axes from orientations.
 ///
-/// With `R(t) = R_i exp(phi(t))` and `phi(t_i) = 0`, the derivatives of `phi` at `t_i` ARE the angular velocity and acceleration in
-/// part axes: the Jacobian of exp is `1 - phi/2 x ..`, whose first-order term contributes `phi' x phi' = 0`.
-fn turn_rates(table: &Table, times: &[f64], quaternions: &[DQuat]) -> Result<(Vec<DVec3>, Vec<DVec3>)> {
+/// With `R(t) = R_i exp(phi(t))` and `phi(t_i) = 0`, the derivatives of `phi` at `t_i` ARE the
+/// angular velocity and acceleration in part axes: the Jacobian of exp is `1 - phi/2 x ..`, whose
+/// first-order term contributes `phi' x phi' = 0`.
+fn turn_rates(
+    table: &Table,
+    times: &[f64],
+    quaternions: &[DQuat],
+) -> Result<(Vec<DVec3>, Vec<DVec3>)> {
     let rows = times.len();
     if rows < 3 {
-        return Err(Error::input(table.place(0), format!("{rows} row(s) of orientations are too few to differentiate"), "give at least 3"));
+        return Err(Error::input(
+            table.place(0),
+            format!("{rows} row(s) of orientations are too few to differentiate"),
+            "give at least 3",
+        ));
     }
     for row in 1..rows {
         let turn = rotation_vector(quaternions[row - 1].conjugate() * quaternions[row]).length();
@@ -207,7 +270,10 @@ fn turn_rates(table: &Table, times: &[f64], quaternions: &[DQuat]) -> Result<(Ve
             return Err(Error::input(
                 table.place(row),
                 format!("the part turns by {:.1} degrees since the row before", turn.to_degrees()),
-                format!("sample the trajectory finer: at most {:.0} degrees between rows", LARGEST_TURN.to_degrees()),
+                format!(
+                    "sample the trajectory finer: at most {:.0} degrees between rows",
+                    LARGEST_TURN.to_degrees()
+                ),
             ));
         }
     }
@@ -235,7 +301,8 @@ fn rotation_vector(quaternion: DQuat) -> DVec3 {
     quaternion.xyz() * (2.0 * sine.atan2(quaternion.w) / sine)
 }
 
-/// Weights of the samples at `nodes` for the value and the first two derivatives at `at` (Fornberg 1988).
+/// Weights of the samples at `nodes` for the value and the first two derivatives at `at` (Fornberg
+/// 1988).
 fn weights(at: f64, nodes: &[f64]) -> Vec<[f64; 3]> {
     let mut weights = vec![[0.0; 3]; nodes.len()];
     weights[0][0] = 1.0;

@@ -1,8 +1,10 @@
-//! The seven equations (3)-(9) together: pressure and slip coupled by the friction forces' lever `d/2`, with separation.
+//! The seven equations (3)-(9) together: pressure and slip coupled by the friction forces' lever
+//! `d/2`, with separation.
 //!
-//! Unknowns, in the pads' scale: the twist `v` (three, its length carries `mu`) and `q = (a_i0, a_ii0, a1, a2)`.
-//! Residuals: `w - D grad D` (three), the two normal forces, the two out-of-plane moments. The Jacobian is analytic;
-//! a zero-pressure line that moves adds nothing to it because the pressure is zero there.
+//! Unknowns, in the pads' scale: the twist `v` (three, its length carries `mu`) and `q = (a_i0,
+//! a_ii0, a1, a2)`. Residuals: `w - D grad D` (three), the two normal forces, the two out-of-plane
+//! moments. The Jacobian is analytic; a zero-pressure line that moves adds nothing to it because
+//! the pressure is zero there.
 
 use glam::{DMat2, DVec2};
 use nalgebra::{SMatrix, SVector, Vector3};
@@ -23,8 +25,8 @@ pub(super) type Matrix7 = SMatrix<f64, 7, 7>;
 pub struct State {
     /// Twist, then pressure coefficients.
     pub z: Vector7,
-    /// Residuals of the seven equations, forces in units of `Fn`, moments of `Fn` times the pads' length; the first
-    /// three over the load's size.
+    /// Residuals of the seven equations, forces in units of `Fn`, moments of `Fn` times the pads'
+    /// length; the first three over the load's size.
     pub residual: Vector7,
     /// `mu` over the load's size.
     pub mu_over_size: f64,
@@ -64,11 +66,24 @@ pub const TOLERANCE: f64 = 1e-11;
 impl<'a> Solver<'a> {
     /// A solver for `load` with a non-zero in-plane part.
     pub fn new(pads: &'a Pads, load: Load, refiner: Refiner) -> Self {
-        Self { pads, load, refiner, scratch: [Loops::default(), Loops::default()], evaluations: 0, iterations: 0 }
+        Self {
+            pads,
+            load,
+            refiner,
+            scratch: [Loops::default(), Loops::default()],
+            evaluations: 0,
+            iterations: 0,
+        }
     }
 
-    /// Residuals and, if wanted, the Jacobian at `z`, the coupling scaled by `coupling` (1: the real one).
-    pub(super) fn evaluate(&mut self, z: &Vector7, coupling: f64, jacobian: Option<&mut Matrix7>) -> State {
+    /// Residuals and, if wanted, the Jacobian at `z`, the coupling scaled by `coupling` (1: the
+    /// real one).
+    pub(super) fn evaluate(
+        &mut self,
+        z: &Vector7,
+        coupling: f64,
+        jacobian: Option<&mut Matrix7>,
+    ) -> State {
         self.evaluations += 1;
         let v = Vector3::new(z[0], z[1], z[2]);
         let q = [z[3], z[4], z[5], z[6]];
@@ -89,7 +104,8 @@ impl<'a> Solver<'a> {
             };
             let f = friction(area, [v.x, v.y, v.z], p);
             let sign = if k == 0 { 1.0 } else { -1.0 };
-            by_pressure[k] = [Vector3::from(f.g[0]), sign * Vector3::from(f.g[1]), sign * Vector3::from(f.g[2])];
+            by_pressure[k] =
+                [Vector3::from(f.g[0]), sign * Vector3::from(f.g[1]), sign * Vector3::from(f.g[2])];
             gradients[k] = Vector3::from(f.gradient(p));
             hessians[k] = nalgebra::Matrix3::from_fn(|i, j| f.hessian[i][j]);
         }
@@ -115,7 +131,9 @@ impl<'a> Solver<'a> {
             let dh = hessians[0] - hessians[1];
             let by_v = -(g * g.transpose() + d * h);
             jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&by_v);
-            let lever_row = |i: usize, dd: f64, ddifference: f64| lever * (dd * difference[i] + d * ddifference);
+            let lever_row = |i: usize, dd: f64, ddifference: f64| {
+                lever * (dd * difference[i] + d * ddifference)
+            };
             for j in 0..3 {
                 jacobian[(3, j)] = 0.0;
                 jacobian[(4, j)] = 0.0;
@@ -126,7 +144,10 @@ impl<'a> Solver<'a> {
                 let (sum, minus) = match j {
                     0 => (by_pressure[0][0], by_pressure[0][0]),
                     1 => (by_pressure[1][0], -by_pressure[1][0]),
-                    _ => (by_pressure[0][j - 1] + by_pressure[1][j - 1], by_pressure[0][j - 1] - by_pressure[1][j - 1]),
+                    _ => (
+                        by_pressure[0][j - 1] + by_pressure[1][j - 1],
+                        by_pressure[0][j - 1] - by_pressure[1][j - 1],
+                    ),
                 };
                 let dd = sum.dot(&v);
                 let column = -(dd * g + d * sum);
@@ -139,13 +160,17 @@ impl<'a> Solver<'a> {
                 jacobian[(6, 3 + j)] = -lever_row(0, dd, minus.x) + k[(2, j)];
             }
         }
-        let (first_i, first_ii) = (pressure::first_moment(&m[0], face_pressure(&q, 0)), pressure::first_moment(&m[1], face_pressure(&q, 1)));
+        let (first_i, first_ii) = (
+            pressure::first_moment(&m[0], face_pressure(&q, 0)),
+            pressure::first_moment(&m[1], face_pressure(&q, 1)),
+        );
         let normal = carried[0] + carried[1];
         let friction = Support { gradient: g, normal, centre: (first_i + first_ii) / normal };
         State { z: *z, residual, mu_over_size: d, moments: m, friction }
     }
 
-    /// Damped semi-smooth Newton from `z`; `None` when it does not come below [`TOLERANCE`] in `most` steps.
+    /// Damped semi-smooth Newton from `z`; `None` when it does not come below [`TOLERANCE`] in
+    /// `most` steps.
     pub(super) fn newton(&mut self, z: Vector7, coupling: f64, most: u32) -> Option<State> {
         let mut jacobians = [Matrix7::zeros(), Matrix7::zeros()];
         let mut current = 0;
@@ -163,7 +188,8 @@ impl<'a> Solver<'a> {
             let mut t = 1.0;
             let mut next = None;
             for _ in 0..8 {
-                let tried = self.evaluate(&(at.z + t * step), coupling, Some(&mut jacobians[1 - current]));
+                let tried =
+                    self.evaluate(&(at.z + t * step), coupling, Some(&mut jacobians[1 - current]));
                 let pressed = tried.moments.iter().all(|m| m[0] > 0.0);
                 if pressed && tried.residual.norm() <= (1.0 - 0.1 * t) * at.residual.norm() {
                     next = Some(tried);
@@ -180,16 +206,22 @@ impl<'a> Solver<'a> {
         (at.residual.amax() < self.tolerance(&at) && at.mu_over_size > 0.0).then_some(at)
     }
 
-    /// [`TOLERANCE`], or what rounding the pressure's coefficients leaves where that is more: on a contact of relative
-    /// width `e` the pressure is `e` times as large as the coefficients that it is the difference of.
+    /// [`TOLERANCE`], or what rounding the pressure's coefficients leaves where that is more: on a
+    /// contact of relative width `e` the pressure is `e` times as large as the coefficients that it
+    /// is the difference of.
     fn tolerance(&self, at: &State) -> f64 {
         let q = at.q();
         let coefficients = |k: usize| q[k].abs() + q[2].hypot(q[3]) * self.pads.areas[k].radius();
         let rounding = (0..2).map(|k| coefficients(k) * at.moments[k][0]).sum::<f64>();
-        TOLERANCE.max(8.0 * f64::EPSILON * rounding * (1.0 + self.load.half_distance.abs() * self.load.size * at.mu_over_size))
+        TOLERANCE.max(
+            8.0 * f64::EPSILON
+                * rounding
+                * (1.0 + self.load.half_distance.abs() * self.load.size * at.mu_over_size),
+        )
     }
 
-    /// Shanno's method on half the squared residual, in variables scaled by the Jacobian at the start of each round.
+    /// Shanno's method on half the squared residual, in variables scaled by the Jacobian at the
+    /// start of each round.
     fn conjugate(&mut self, z: Vector7) -> Option<State> {
         let mut jacobian = Matrix7::zeros();
         let mut at = self.evaluate(&z, 1.0, Some(&mut jacobian));
@@ -199,10 +231,15 @@ impl<'a> Solver<'a> {
             }
             let back = jacobian.try_inverse()?;
             let (origin, before) = (at.z, at.residual.norm());
-            let options = shanno::Options { gradient_tolerance: 0.0, value_target: 0.5e-28, max_evaluations: 60 };
+            let options = shanno::Options {
+                gradient_tolerance: 0.0,
+                value_target: 0.5e-28,
+                max_evaluations: 60,
+            };
             let run = shanno::minimise([0.0; 7], &options, |y: &[f64; 7]| {
                 let mut jacobian = Matrix7::zeros();
-                let state = self.evaluate(&(origin + back * Vector7::from(*y)), 1.0, Some(&mut jacobian));
+                let state =
+                    self.evaluate(&(origin + back * Vector7::from(*y)), 1.0, Some(&mut jacobian));
                 let gradient = (jacobian * back).transpose() * state.residual;
                 (0.5 * state.residual.norm_squared(), gradient.into())
             });
@@ -216,20 +253,35 @@ impl<'a> Solver<'a> {
         (pressed && at.residual.amax() < self.tolerance(&at) && at.mu_over_size > 0.0).then_some(at)
     }
 
-    /// A state from the contact moment `target` (see [`pressure::reach`]): its pressure, and the slip under it.
+    /// A state from the contact moment `target` (see [`pressure::reach`]): its pressure, and the
+    /// slip under it.
     pub fn state_at(&mut self, target: DVec2, seed: Option<Vector3<f64>>) -> Option<Vector7> {
         self.state_from(target, seed, None).or_else(|| {
-            let q = pressure::solve_near_rim(self.pads, self.load.normal, target, &mut self.scratch[0])?;
+            let q = pressure::solve_near_rim(
+                self.pads,
+                self.load.normal,
+                target,
+                &mut self.scratch[0],
+            )?;
             self.state_from(target, seed, Some(q))
         })
     }
 
     /// As [`Solver::state_at`], from the pressure and slip of the state `near`.
     pub fn state_near(&mut self, target: DVec2, near: Option<&Vector7>) -> Option<Vector7> {
-        self.state_from(target, near.map(|z| Vector3::new(z[0], z[1], z[2])), near.map(|z| [z[3], z[4], z[5], z[6]]))
+        self.state_from(
+            target,
+            near.map(|z| Vector3::new(z[0], z[1], z[2])),
+            near.map(|z| [z[3], z[4], z[5], z[6]]),
+        )
     }
 
-    fn state_from(&mut self, target: DVec2, seed: Option<Vector3<f64>>, start: Option<[f64; 4]>) -> Option<Vector7> {
+    fn state_from(
+        &mut self,
+        target: DVec2,
+        seed: Option<Vector3<f64>>,
+        start: Option<[f64; 4]>,
+    ) -> Option<Vector7> {
         let q = pressure::solve(self.pads, self.load.normal, target, start, &mut self.scratch[0])?;
         let fields = slip::pressed_fields(self.pads, &q, &mut self.scratch);
         let slip = slip::solve(&fields, self.load.direction, seed, self.refiner);
@@ -239,8 +291,9 @@ impl<'a> Solver<'a> {
         Some(Vector7::from([v.x, v.y, v.z, q[0], q[1], q[2], q[3]]))
     }
 
-    /// Newton's method on all seven equations from the pressure `q` without coupling and a rough slip under it. Only for a
-    /// coupling so weak that there is one solution: whichever way it was reached, it is the one on the branch from `d = 0`.
+    /// Newton's method on all seven equations from the pressure `q` without coupling and a rough
+    /// slip under it. Only for a coupling so weak that there is one solution: whichever way it was
+    /// reached, it is the one on the branch from `d = 0`.
     fn direct(&mut self, q: [f64; 4], seed: Option<Vector3<f64>>) -> Option<State> {
         let p = [face_pressure(&q, 0), face_pressure(&q, 1)];
         let parted = [0, 1].map(|k| separates(&self.pads.areas[k], p[k]));
@@ -248,7 +301,12 @@ impl<'a> Solver<'a> {
         let v = if self.pads.congruent && parted == [false; 2] {
             // The summed pressure is constant: the slip does not depend on the rest.
             let level = [p[0][0] + p[1][0], 0.0, 0.0];
-            let slip = slip::solve(&[Field { area: &self.pads.areas[0], p: level }], w, seed, Refiner::Newton);
+            let slip = slip::solve(
+                &[Field { area: &self.pads.areas[0], p: level }],
+                w,
+                seed,
+                Refiner::Newton,
+            );
             self.evaluations += slip.evaluations;
             self.iterations += slip.iterations;
             slip.twist
@@ -261,12 +319,18 @@ impl<'a> Solver<'a> {
         (!super::strong(&state, &self.load)).then_some(state)
     }
 
-    /// The solution on the branch that starts at `d = 0` without coupling; `None` when that branch does not exist, or
-    /// ends before the real `d`.
+    /// The solution on the branch that starts at `d = 0` without coupling; `None` when that branch
+    /// does not exist, or ends before the real `d`.
     pub fn branch(&mut self, seed: Option<Vector3<f64>>) -> Option<State> {
         if self.refiner == Refiner::Newton {
             // None at the rim, where [`Solver::state_at`] knows the way.
-            let q = pressure::solve(self.pads, self.load.normal, self.load.contact_moment(), None, &mut self.scratch[0]);
+            let q = pressure::solve(
+                self.pads,
+                self.load.normal,
+                self.load.contact_moment(),
+                None,
+                &mut self.scratch[0],
+            );
             if let Some(state) = q.and_then(|q| self.direct(q, seed)) {
                 return Some(state);
             }
@@ -282,14 +346,18 @@ impl<'a> Solver<'a> {
         })
     }
 
-    /// The solution close to `z`, that of another load, by Newton's method from there; where the coupling is so strong that
-    /// there may be others, only a short way off and on the same side of any turning point.
+    /// The solution close to `z`, that of another load, by Newton's method from there; where the
+    /// coupling is so strong that there may be others, only a short way off and on the same side of
+    /// any turning point.
     pub(super) fn next_to(&mut self, z: &Vector7) -> Option<State> {
         let found = self.newton(*z, 1.0, 6)?;
         if super::strong(&found, &self.load) {
             let to = self.node(&found.z)?;
             let q = [z[3], z[4], z[5], z[6]];
-            let x = pressure::carried(&pressure::pressed_moments(self.pads, &q, &mut self.scratch[0]), &q);
+            let x = pressure::carried(
+                &pressure::pressed_moments(self.pads, &q, &mut self.scratch[0]),
+                &q,
+            );
             if to.x.distance(x) > FOLLOW_STEP / 2.0 || to.slope.determinant() <= 0.0 {
                 return None;
             }
@@ -297,9 +365,9 @@ impl<'a> Solver<'a> {
         Some(found)
     }
 
-    /// Follows the branch from coupling 0 to 1, in the plane of contact moments where even the last of a contact has room:
-    /// along its tangent, then Newton's method, in steps short enough that each ends close to where the tangent led.
-    /// `None` where the branch turns back or ends.
+    /// Follows the branch from coupling 0 to 1, in the plane of contact moments where even the last
+    /// of a contact has room: along its tangent, then Newton's method, in steps short enough that
+    /// each ends close to where the tangent led. `None` where the branch turns back or ends.
     pub fn follow(&mut self, start: Vector7) -> Option<State> {
         let mut at = self.newton(start, 0.0, 25)?;
         let (mut reached, mut step) = (if self.load.half_distance == 0.0 { 1.0 } else { 0.0 }, 1.0);
@@ -319,9 +387,13 @@ impl<'a> Solver<'a> {
                 let left = pressure::reach(self.pads, self.load.normal, here.x + moved);
                 let short = moved.length() <= FOLLOW_STEP && left >= FOLLOW_SHARE * room;
                 let found = if short { self.onwards(&at, here.x + moved, next) } else { None };
-                let close = |node: &Node| (node.x - here.x - moved).length() <= (0.3 * moved.length()).max(FOLLOW_KINK);
+                let close = |node: &Node| {
+                    (node.x - here.x - moved).length() <= (0.3 * moved.length()).max(FOLLOW_KINK)
+                };
                 match found {
-                    Some((found, node)) if close(&node) && Self::slope_at(&node, next).determinant() > 0.0 => {
+                    Some((found, node))
+                        if close(&node) && Self::slope_at(&node, next).determinant() > 0.0 =>
+                    {
                         (at, reached) = (found, next);
                         step *= 2.0;
                         break;
@@ -336,8 +408,9 @@ impl<'a> Solver<'a> {
         None
     }
 
-    /// The solution at a coupling near the contact moment `x`, found from the solution `at`, and its point of the map:
-    /// Newton's method on the map until what is left is small beside the room there, then on all seven equations.
+    /// The solution at a coupling near the contact moment `x`, found from the solution `at`, and
+    /// its point of the map: Newton's method on the map until what is left is small beside the room
+    /// there, then on all seven equations.
     fn onwards(&mut self, at: &State, mut x: DVec2, coupling: f64) -> Option<(State, Node)> {
         let (mut z, mut before) = (at.z, f64::INFINITY);
         loop {
@@ -359,8 +432,9 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Derivative of `g` at a coupling. Its determinant is positive where the branch starts and changes its sign at a
-    /// turning point; another limit state that a long step has led to most often has the other sign, too.
+    /// Derivative of `g` at a coupling. Its determinant is positive where the branch starts and
+    /// changes its sign at a turning point; another limit state that a long step has led to most
+    /// often has the other sign, too.
     fn slope_at(node: &Node, coupling: f64) -> DMat2 {
         DMat2::IDENTITY + coupling * (node.slope - DMat2::IDENTITY)
     }
@@ -373,16 +447,18 @@ const FOLLOW_LEAST: f64 = 1e-9;
 const FOLLOW_MOST: usize = 1000;
 /// Share that a step leaves of the way to the region's rim, where no contact is left.
 const FOLLOW_SHARE: f64 = 0.25;
-/// What [`Solver::follow`] leaves to Newton's method on all equations, as a share of the way to the rim.
+/// What [`Solver::follow`] leaves to Newton's method on all equations, as a share of the way to the
+/// rim.
 const FOLLOW_CLOSE: f64 = 1e-3;
-/// How far from the tangent's end a step may lead, however short it is: where a pad begins to separate the branch turns
-/// sharply.
+/// How far from the tangent's end a step may lead, however short it is: where a pad begins to
+/// separate the branch turns sharply.
 const FOLLOW_KINK: f64 = 1e-3;
 /// Residual at rounding level: no further step is taken.
 const ROUNDING: f64 = 1e-14;
 
-/// Solves `jacobian x = rhs`; `None` where it is singular. The rows of the normal forces know the pressure alone and give
-/// the offsets from its slopes, so that five unknowns are left for elimination with pivoting.
+/// Solves `jacobian x = rhs`; `None` where it is singular. The rows of the normal forces know the
+/// pressure alone and give the offsets from its slopes, so that five unknowns are left for
+/// elimination with pivoting.
 fn solve_newton(jacobian: &Matrix7, rhs: &Vector7) -> Option<Vector7> {
     let j = |row: usize, column: usize| jacobian[(row, column)];
     // offset_k = base_k + slope_k . (a1, a2)
@@ -392,10 +468,18 @@ fn solve_newton(jacobian: &Matrix7, rhs: &Vector7) -> Option<Vector7> {
     });
     let mut rows: [[f64; 6]; 5] = [0, 1, 2, 5, 6].map(|row| {
         let fill = |k: usize| j(row, 3) * offset[0][k] + j(row, 4) * offset[1][k];
-        [j(row, 0), j(row, 1), j(row, 2), j(row, 5) + fill(1), j(row, 6) + fill(2), rhs[row] - fill(0)]
+        [
+            j(row, 0),
+            j(row, 1),
+            j(row, 2),
+            j(row, 5) + fill(1),
+            j(row, 6) + fill(2),
+            rhs[row] - fill(0),
+        ]
     });
     for step in 0..5 {
-        let pivot = (step..5).max_by(|&a, &b| rows[a][step].abs().total_cmp(&rows[b][step].abs()))?;
+        let pivot =
+            (step..5).max_by(|&a, &b| rows[a][step].abs().total_cmp(&rows[b][step].abs()))?;
         rows.swap(step, pivot);
         let lead = rows[step];
         if lead[step] == 0.0 {
@@ -424,5 +508,6 @@ const CONJUGATE_ROUNDS: u32 = 8;
 /// Whether two states are the same solution.
 pub fn same(a: &State, b: &State) -> bool {
     let tilt = (a.z.fixed_rows::<4>(3) - b.z.fixed_rows::<4>(3)).norm();
-    (a.mu_over_size / b.mu_over_size - 1.0).abs() < 1e-6 && tilt < 1e-5 * (1.0 + a.z.fixed_rows::<4>(3).norm())
+    (a.mu_over_size / b.mu_over_size - 1.0).abs() < 1e-6
+        && tilt < 1e-5 * (1.0 + a.z.fixed_rows::<4>(3).norm())
 }

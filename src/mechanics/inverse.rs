@@ -1,11 +1,13 @@
-//! Questions asked the other way round: how hard to squeeze for a given pad friction, how much load before slip.
+//! Questions asked the other way round: how hard to squeeze for a given pad friction, how much load
+//! before slip.
 //!
-//! Loads and forces enter the equations only by their ratio `k`, the load in units of the gripping force, so both are one
-//! question: up to which `k` does the grip hold? `mu_s(k)` is `k` times a constant while congruent faces are pressed all
-//! over. It rises with `k` on any faces pressed all over as long as the friction coupling is weak: `D(v)` is linear in the
-//! pressure, so every twist's bound `k w.v / (D_0 + k D_1)` rises. Where the pads separate it may fall again before the
-//! contact twists out, and a `k` at which `mu_s` equals the pad friction need not be the smallest one: there the limit is
-//! looked for from small loads upwards.
+//! Loads and forces enter the equations only by their ratio `k`, the load in units of the gripping
+//! force, so both are one question: up to which `k` does the grip hold? `mu_s(k)` is `k` times a
+//! constant while congruent faces are pressed all over. It rises with `k` on any faces pressed all
+//! over as long as the friction coupling is weak: `D(v)` is linear in the pressure, so every
+//! twist's bound `k w.v / (D_0 + k D_1)` rises. Where the pads separate it may fall again before
+//! the contact twists out, and a `k` at which `mu_s` equals the pad friction need not be the
+//! smallest one: there the limit is looked for from small loads upwards.
 
 use std::cell::Cell;
 
@@ -13,13 +15,20 @@ use crate::model::{Score, Status, Wrench};
 
 use super::{COUPLING_SEARCH, Options, Pads, Search, solve_next, solve_pads};
 
-/// The gripping force [N] needed to hold `wrench` with the pad friction `friction`: every larger force holds it too, and
-/// just below it the load slips (`mu_s` equals `friction`, to 1e-9), twists out or pulls a pad off (to 1e-4). `None` when no
-/// force up to `1e9` times the load's size holds it (or `friction` is not positive).
+/// The gripping force [N] needed to hold `wrench` with the pad friction `friction`: every larger
+/// force holds it too, and just below it the load slips (`mu_s` equals `friction`, to 1e-9), twists
+/// out or pulls a pad off (to 1e-4). `None` when no force up to `1e9` times the load's size holds
+/// it (or `friction` is not positive).
 ///
-/// Limit states are those that [`super::solve_pads`] finds with these `options`; with [`Search::Off`] only those on the
-/// branch from `d = 0`, which errs towards more force.
-pub fn force_needed(pads: &Pads, distance: f64, wrench: &Wrench, friction: f64, options: &Options) -> Option<f64> {
+/// Limit states are those that [`super::solve_pads`] finds with these `options`; with
+/// [`Search::Off`] only those on the branch from `d = 0`, which errs towards more force.
+pub fn force_needed(
+    pads: &Pads,
+    distance: f64,
+    wrench: &Wrench,
+    friction: f64,
+    options: &Options,
+) -> Option<f64> {
     if friction.is_nan() || friction <= 0.0 {
         return None;
     }
@@ -38,32 +47,43 @@ pub fn force_needed(pads: &Pads, distance: f64, wrench: &Wrench, friction: f64, 
     };
     let search = Limit { friction, solve };
     let start = START.iter().copied().find(|&k| search.holds(k))?;
-    // Where the friction coupling is strong, contact that is whole at the limit may separate before it.
+    // Where the friction coupling is strong, contact that is whole at the limit may separate before
+    // it.
     let weak = friction * distance.abs() <= COUPLING_SEARCH * pads.length;
     let by_proportion = if weak { search.by_proportion(start, pads) } else { None };
-    let limit = by_proportion.or_else(|| search.upwards(start, first_step(pads, distance, wrench, size, &search, start)))?;
+    let limit = by_proportion.or_else(|| {
+        search.upwards(start, first_step(pads, distance, wrench, size, &search, start))
+    })?;
     Some(size / limit)
 }
 
-/// The largest multiple of `wrench` that `friction` holds at the gripping force `force` [N] together with every smaller
-/// multiple; infinite for no load, 0 when not even a small one is held.
+/// The largest multiple of `wrench` that `friction` holds at the gripping force `force` [N]
+/// together with every smaller multiple; infinite for no load, 0 when not even a small one is held.
 ///
-/// The whole wrench grows, moments and normal force with it. It is one load's answer: of several loads, the one with the
-/// smallest multiple need not be the one with the largest `mu_s`, because `M1`, `M2` and `F3` may twist the contact out
-/// or pull a pad off long before another load slips.
-pub fn load_multiple(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, friction: f64, options: &Options) -> f64 {
+/// The whole wrench grows, moments and normal force with it. It is one load's answer: of several
+/// loads, the one with the smallest multiple need not be the one with the largest `mu_s`, because
+/// `M1`, `M2` and `F3` may twist the contact out or pull a pad off long before another load slips.
+pub fn load_multiple(
+    pads: &Pads,
+    distance: f64,
+    force: f64,
+    wrench: &Wrench,
+    friction: f64,
+    options: &Options,
+) -> f64 {
     match force_needed(pads, distance, wrench, friction, options) {
         Some(needed) => force / needed,
         None => 0.0,
     }
 }
 
-/// Loads in units of the gripping force at which the search may begin; the first is below any limit of practice.
+/// Loads in units of the gripping force at which the search may begin; the first is below any limit
+/// of practice.
 const START: [f64; 3] = [1e-3, 1e-6, 1e-9];
 /// Largest load in units of the gripping force.
 const MOST: f64 = 1e9;
-/// Equal steps up to the limit that small loads foretell. A window narrower than a step in which the load is not held,
-/// between loads that are, can be missed.
+/// Equal steps up to the limit that small loads foretell. A window narrower than a step in which
+/// the load is not held, between loads that are, can be missed.
 const STEPS: u32 = 16;
 /// Growth of the steps beyond it.
 const GROWTH: f64 = 1.05;
@@ -71,8 +91,9 @@ const GROWTH: f64 = 1.05;
 const PARTS: u32 = 8;
 /// Relative width at which the limit counts as found where the load slips.
 const FOUND: f64 = 1e-9;
-/// The same where it twists out or pulls a pad off. The last of a contact is smaller than doubles resolve, so a much sharper
-/// limit would mean nothing; the load returned is one that was found held.
+/// The same where it twists out or pulls a pad off. The last of a contact is smaller than doubles
+/// resolve, so a much sharper limit would mean nothing; the load returned is one that was found
+/// held.
 const FOUND_LOST: f64 = 1e-4;
 /// Relative difference at which `mu_s` counts as the pad friction.
 const EQUAL: f64 = 1e-10;
@@ -87,7 +108,8 @@ struct Limit<S: Fn(f64) -> Score> {
 }
 
 impl<S: Fn(f64) -> Score> Limit<S> {
-    /// By how much the friction that `k` asks for exceeds the pads', as a share of it; `None` without a limit state.
+    /// By how much the friction that `k` asks for exceeds the pads', as a share of it; `None`
+    /// without a limit state.
     fn excess(&self, k: f64) -> Option<f64> {
         let score = (self.solve)(k);
         score.mu_s.filter(|_| score.status.holds()).map(|mu| mu / self.friction - 1.0)
@@ -102,7 +124,9 @@ impl<S: Fn(f64) -> Score> Limit<S> {
         for _ in 0..PROPORTIONS {
             let score = (self.solve)(k);
             let left = [score.contact_area_i, score.contact_area_ii];
-            let whole = (0..2).all(|face| left[face] >= pads.moments[face][0] * pads.length * pads.length * (1.0 - 1e-12));
+            let whole = (0..2).all(|face| {
+                left[face] >= pads.moments[face][0] * pads.length * pads.length * (1.0 - 1e-12)
+            });
             let mu = score.mu_s.filter(|mu| whole && score.status == Status::Ok && *mu > 0.0)?;
             if (mu / self.friction - 1.0).abs() <= EQUAL {
                 return Some(k);
@@ -112,7 +136,8 @@ impl<S: Fn(f64) -> Score> Limit<S> {
         None
     }
 
-    /// The smallest load above `start`, which holds, at which it holds no longer; `None` beyond [`MOST`].
+    /// The smallest load above `start`, which holds, at which it holds no longer; `None` beyond
+    /// [`MOST`].
     fn upwards(&self, start: f64, step: f64) -> Option<f64> {
         let (mut low, mut high) = (start, start + step);
         let mut steps = 0;
@@ -139,8 +164,9 @@ impl<S: Fn(f64) -> Score> Limit<S> {
         Some(self.between(low, high))
     }
 
-    /// The limit between a load that holds and one that does not: by false position, an end that stays counting half
-    /// (Illinois), where `mu_s` is known at both, by bisection where the load ends otherwise.
+    /// The limit between a load that holds and one that does not: by false position, an end that
+    /// stays counting half (Illinois), where `mu_s` is known at both, by bisection where the load
+    /// ends otherwise.
     fn between(&self, mut low: f64, mut high: f64) -> f64 {
         let (mut below, mut above) = (self.excess(low).unwrap_or(-1.0), self.excess(high));
         let mut stays = 0;
@@ -165,9 +191,16 @@ impl<S: Fn(f64) -> Score> Limit<S> {
     }
 }
 
-/// A step up from small loads: a share of the nearest of the limits that they foretell, to slip, to a pad pulled off and to
-/// twisting out.
-fn first_step<S: Fn(f64) -> Score>(pads: &Pads, distance: f64, wrench: &Wrench, size: f64, search: &Limit<S>, start: f64) -> f64 {
+/// A step up from small loads: a share of the nearest of the limits that they foretell, to slip, to
+/// a pad pulled off and to twisting out.
+fn first_step<S: Fn(f64) -> Score>(
+    pads: &Pads,
+    distance: f64,
+    wrench: &Wrench,
+    size: f64,
+    search: &Limit<S>,
+    start: f64,
+) -> f64 {
     let load = pads.load(distance, size, wrench);
     let reach = pads.hulls.iter().flatten().map(|point| point.length()).fold(0.0, f64::max);
     let slip = (search.solve)(start).mu_s.map_or(f64::INFINITY, |mu| start * search.friction / mu);
@@ -185,7 +218,9 @@ mod tests {
     use crate::model::{Contact, Polygon};
 
     fn pads() -> Pads {
-        let ring = [(-0.01, -0.01), (0.01, -0.01), (0.01, 0.01), (-0.01, 0.01)].map(|(x, y)| DVec2::new(x, y)).to_vec();
+        let ring = [(-0.01, -0.01), (0.01, -0.01), (0.01, 0.01), (-0.01, 0.01)]
+            .map(|(x, y)| DVec2::new(x, y))
+            .to_vec();
         let patch = vec![Polygon { outer: ring, holes: Vec::new() }];
         Pads::new(&Contact { face_i: patch.clone(), face_ii: patch }).unwrap()
     }
@@ -194,40 +229,67 @@ mod tests {
     fn the_force_found_is_the_one_at_which_the_friction_just_holds() {
         let pads = pads();
         for moment in [[0.0, 0.0, 0.2], [0.3, 0.0, 0.2], [0.3, -0.2, 0.05]] {
-            let wrench = Wrench { force: DVec3::new(3.0, -2.0, 1.0), moment: DVec3::from_array(moment) };
+            let wrench =
+                Wrench { force: DVec3::new(3.0, -2.0, 1.0), moment: DVec3::from_array(moment) };
             let force = force_needed(&pads, 0.02, &wrench, 0.4, &Options::default()).unwrap();
             let at = |force: f64| solve_pads(&pads, 0.02, force, &wrench, &Options::default());
             // The last of these twists out before its mu_s comes up to the pads' friction.
             let twists_out = at(force * 0.9998).status == Status::TwistedOut;
-            assert!(twists_out == (moment[1] != 0.0) && (twists_out || (at(force).mu_s.unwrap() / 0.4 - 1.0).abs() < 1e-8), "{moment:?}");
+            assert!(
+                twists_out == (moment[1] != 0.0)
+                    && (twists_out || (at(force).mu_s.unwrap() / 0.4 - 1.0).abs() < 1e-8),
+                "{moment:?}"
+            );
             let held = |score: Score| score.status.holds() && score.mu_s.unwrap() <= 0.4;
             assert!(!held(at(force * 0.9998)) && held(at(force * (1.0 + 1e-9))), "{moment:?}");
-            let multiple = load_multiple(&pads, 0.02, 50.0, &wrench, 0.4, &Options::default()) * if twists_out { 1.0 - 1e-9 } else { 1.0 };
+            let multiple = load_multiple(&pads, 0.02, 50.0, &wrench, 0.4, &Options::default())
+                * if twists_out { 1.0 - 1e-9 } else { 1.0 };
             let grown = Wrench { force: wrench.force * multiple, moment: wrench.moment * multiple };
             let mu = solve_pads(&pads, 0.02, 50.0, &grown, &Options::default()).mu_s.unwrap();
-            assert!(if twists_out { mu < 0.4 } else { (mu / 0.4 - 1.0).abs() < 1e-8 }, "{moment:?} {multiple}");
+            assert!(
+                if twists_out { mu < 0.4 } else { (mu / 0.4 - 1.0).abs() < 1e-8 },
+                "{moment:?} {multiple}"
+            );
         }
     }
 
     #[test]
     fn the_limit_is_the_first_on_the_way_up() {
-        // Different faces, every kind of load, a friction that many loads reach only with the pads separated: a scan
-        // finer than the search's steps finds no load below the limit that is not held.
+        // Different faces, every kind of load, a friction that many loads reach only with the pads
+        // separated: a scan finer than the search's steps finds no load below the limit that is not
+        // held.
         let square = |x: f64, a: f64, b: f64| {
             let corner = |i: f64, j: f64| DVec2::new(x + i * a / 2.0, j * b / 2.0);
-            vec![Polygon { outer: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], holes: Vec::new() }]
+            vec![Polygon {
+                outer: vec![
+                    corner(-1.0, -1.0),
+                    corner(1.0, -1.0),
+                    corner(1.0, 1.0),
+                    corner(-1.0, 1.0),
+                ],
+                holes: Vec::new(),
+            }]
         };
         let number = |index: u32, factor: f64| (f64::from(index) * factor).fract() * 2.0 - 1.0;
         let (mut by_slip, mut otherwise, mut falling, mut exact) = (0, 0, 0, 0);
         for index in 1..=60 {
-            let contact = Contact { face_i: square(0.0, 0.02, 0.01), face_ii: square(0.004 * number(index, 0.31), 0.02, 0.012) };
+            let contact = Contact {
+                face_i: square(0.0, 0.02, 0.01),
+                face_ii: square(0.004 * number(index, 0.31), 0.02, 0.012),
+            };
             let pads = Pads::new(&contact).unwrap();
             let n = |factor: f64| number(index, factor);
             let force = DVec3::new(n(0.754_877), n(0.569_840), n(0.819_172));
-            let wrench = Wrench { force, moment: DVec3::new(0.05 * n(0.671_043), 0.05 * n(0.549_700), 0.02 * n(0.450_299)) };
-            let (distance, friction) = (0.01 * f64::from(index % 4), 0.2 + 0.4 * f64::from(index % 3));
+            let wrench = Wrench {
+                force,
+                moment: DVec3::new(0.05 * n(0.671_043), 0.05 * n(0.549_700), 0.02 * n(0.450_299)),
+            };
+            let (distance, friction) =
+                (0.01 * f64::from(index % 4), 0.2 + 0.4 * f64::from(index % 3));
             let limit = load_multiple(&pads, distance, 1.0, &wrench, friction, &Options::default());
-            let at = |multiple: f64| solve_pads(&pads, distance, 1.0 / multiple, &wrench, &Options::default());
+            let at = |multiple: f64| {
+                solve_pads(&pads, distance, 1.0 / multiple, &wrench, &Options::default())
+            };
             let held = |multiple: f64| {
                 let score = at(multiple);
                 score.status.holds() && score.mu_s.unwrap() <= friction
@@ -244,20 +306,34 @@ mod tests {
             } else {
                 otherwise += 1
             }
-            falling += u32::from(at(limit * 0.9).mu_s.unwrap() > at(limit * (1.0 - sharp)).mu_s.unwrap());
+            falling +=
+                u32::from(at(limit * 0.9).mu_s.unwrap() > at(limit * (1.0 - sharp)).mu_s.unwrap());
             // Without coupling the limit of the contact is known exactly.
             if distance == 0.0 && !slips {
-                let grown = |multiple: f64| Wrench { force: wrench.force * multiple, moment: wrench.moment * multiple };
+                let grown = |multiple: f64| Wrench {
+                    force: wrench.force * multiple,
+                    moment: wrench.moment * multiple,
+                };
                 let (mut low, mut high) = (0.0, 1e3);
                 for _ in 0..100 {
                     let middle = (low + high) / 2.0;
-                    if TwistOut::new(&contact).margin(1.0, &grown(middle)) > 0.0 { low = middle } else { high = middle }
+                    if TwistOut::new(&contact).margin(1.0, &grown(middle)) > 0.0 {
+                        low = middle
+                    } else {
+                        high = middle
+                    }
                 }
-                assert!(limit <= low * (1.0 + 1e-9) && limit > (1.0 - 2.0 * FOUND_LOST) * low, "{index}: {limit} {low}");
+                assert!(
+                    limit <= low * (1.0 + 1e-9) && limit > (1.0 - 2.0 * FOUND_LOST) * low,
+                    "{index}: {limit} {low}"
+                );
                 exact += 1;
             }
         }
-        assert!(by_slip > 10 && otherwise > 10 && falling > 0 && exact > 2, "{by_slip} {otherwise} {falling} {exact}");
+        assert!(
+            by_slip > 10 && otherwise > 10 && falling > 0 && exact > 2,
+            "{by_slip} {otherwise} {falling} {exact}"
+        );
     }
 
     #[test]

@@ -37,12 +37,13 @@ pub enum Separation {
 /// Whether to look for further solutions where several are possible.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Search {
-    /// Where the coupling is strong ([`COUPLING_SEARCH`]) or the branch from `d = 0` does not reach the load: the whole
-    /// region of contact moments is looked over ([`states`]).
+    /// Where the coupling is strong ([`COUPLING_SEARCH`]) or the branch from `d = 0` does not reach
+    /// the load: the whole region of contact moments is looked over ([`states`]).
     #[default]
     WhereNeeded,
-    /// Never: only the branch from `d = 0` counts, and a load that it does not reach is refused; no certificate is made.
-    /// For comparing many loads or forces before the answer that matters is solved in full.
+    /// Never: only the branch from `d = 0` counts, and a load that it does not reach is refused; no
+    /// certificate is made. For comparing many loads or forces before the answer that matters is
+    /// solved in full.
     Off,
 }
 
@@ -53,26 +54,35 @@ pub struct Options {
     pub separation: Separation,
     /// Minimiser that polishes the solution.
     pub refiner: Refiner,
-    /// A twist `(u1, u2, omega)` about the grip origin to start from (SI, any length), e.g. the best seed.
+    /// A twist `(u1, u2, omega)` about the grip origin to start from (SI, any length), e.g. the
+    /// best seed.
     pub seed: Option<[f64; 3]>,
     /// Whether to look for further solutions.
     pub search: Search,
 }
 
-/// Strength of the coupling, `mu |d| / sqrt(A)`, above which other solutions are looked for. Below it none was ever seen
-/// (0 of 1408 random cases with different areas on the two faces); at 1-2 they are 0.65 % of such cases, at 4-8 23 %.
+/// Strength of the coupling, `mu |d| / sqrt(A)`, above which other solutions are looked for. Below
+/// it none was ever seen (0 of 1408 random cases with different areas on the two faces); at 1-2
+/// they are 0.65 % of such cases, at 4-8 23 %.
 pub const COUPLING_SEARCH: f64 = 1.0;
 
-/// Smallest friction coefficient that holds `wrench` (about the grip origin) in a grip with the two contact areas of
-/// `contact`, squeezed with `force` [N] on each pad on average (equation (9)).
+/// Smallest friction coefficient that holds `wrench` (about the grip origin) in a grip with the two
+/// contact areas of `contact`, squeezed with `force` [N] on each pad on average (equation (9)).
 ///
-/// `distance` [m] is the height of face I over face II along `x3`, the `d` of (6)(7): positive for a part between the
-/// jaws, negative where the jaws press outwards against the walls of a slot. There face I lies at `x3 = -width/2`, still
-/// pushed along `-x3`, and `d = -width`. Reversing `d` and the in-plane load `(F1, F2, M3)` together changes no answer.
+/// `distance` [m] is the height of face I over face II along `x3`, the `d` of (6)(7): positive for
+/// a part between the jaws, negative where the jaws press outwards against the walls of a slot.
+/// There face I lies at `x3 = -width/2`, still pushed along `-x3`, and `d = -width`. Reversing `d`
+/// and the in-plane load `(F1, F2, M3)` together changes no answer.
 ///
 /// # Errors
 /// When a number is not finite or `force` is not positive. A hard case is a [`Status`].
-pub fn solve(contact: &Contact, distance: f64, force: f64, wrench: &Wrench, options: &Options) -> Result<Score> {
+pub fn solve(
+    contact: &Contact,
+    distance: f64,
+    force: f64,
+    wrench: &Wrench,
+    options: &Options,
+) -> Result<Score> {
     check(contact, distance, force, wrench)?;
     Ok(match Pads::new(contact) {
         Some(pads) => solve_pads(&pads, distance, force, wrench, options),
@@ -80,13 +90,20 @@ pub fn solve(contact: &Contact, distance: f64, force: f64, wrench: &Wrench, opti
     })
 }
 
-/// Every limit state of a load by rising `mu_s`, arguments as [`solve`]: none for a load that [`solve`] refuses, one for
-/// most, of which the status is [`Status::Ok`]; several, or one that could not be shown to be the only one, are
-/// [`Status::Ambiguous`]. [`solve`] answers with the one on the branch from `d = 0`, where there is one.
+/// Every limit state of a load by rising `mu_s`, arguments as [`solve`]: none for a load that
+/// [`solve`] refuses, one for most, of which the status is [`Status::Ok`]; several, or one that
+/// could not be shown to be the only one, are [`Status::Ambiguous`]. [`solve`] answers with the one
+/// on the branch from `d = 0`, where there is one.
 ///
 /// # Errors
 /// As [`solve`].
-pub fn limit_states(contact: &Contact, distance: f64, force: f64, wrench: &Wrench, options: &Options) -> Result<Vec<Score>> {
+pub fn limit_states(
+    contact: &Contact,
+    distance: f64,
+    force: f64,
+    wrench: &Wrench,
+    options: &Options,
+) -> Result<Vec<Score>> {
     check(contact, distance, force, wrench)?;
     let Some(pads) = Pads::new(contact) else { return Ok(Vec::new()) };
     let load = pads.load(distance, force, wrench);
@@ -98,24 +115,44 @@ pub fn limit_states(contact: &Contact, distance: f64, force: f64, wrench: &Wrenc
     let known = solver.branch(seed);
     let found = solver.limit_states(known.as_slice());
     let unique = found.complete && found.states.len() == 1;
-    Ok(found.states.iter().map(|state| finish(&pads, force, &load, state, unique, solver.evaluations, options)).collect())
+    Ok(found
+        .states
+        .iter()
+        .map(|state| finish(&pads, force, &load, state, unique, solver.evaluations, options))
+        .collect())
 }
 
 fn check(contact: &Contact, distance: f64, force: f64, wrench: &Wrench) -> Result<()> {
-    let bad = |what: &str, value: String, allowed: &str| Err(Error::input(what, format!("is {value}"), format!("give {allowed}")));
+    let bad = |what: &str, value: String, allowed: &str| {
+        Err(Error::input(what, format!("is {value}"), format!("give {allowed}")))
+    };
     if !distance.is_finite() {
-        return bad("d", distance.to_string(), "a finite distance [m], negative for a grip from inside");
+        return bad(
+            "d",
+            distance.to_string(),
+            "a finite distance [m], negative for a grip from inside",
+        );
     }
     if !(force.is_finite() && force > 0.0) {
         return bad("Fn", force.to_string(), "a finite positive force [N]");
     }
     if !wrench.force.is_finite() || !wrench.moment.is_finite() {
-        return bad("F, M", format!("{:?} {:?}", wrench.force.to_array(), wrench.moment.to_array()), "finite numbers");
+        return bad(
+            "F, M",
+            format!("{:?} {:?}", wrench.force.to_array(), wrench.moment.to_array()),
+            "finite numbers",
+        );
     }
     for (name, patch) in [("A_I", &contact.face_i), ("A_II", &contact.face_ii)] {
-        for ring in patch.iter().flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes)) {
+        for ring in
+            patch.iter().flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes))
+        {
             if let Some(point) = ring.iter().find(|point| !point.is_finite()) {
-                return bad(name, format!("has a point {:?}", point.to_array()), "finite coordinates [m]");
+                return bad(
+                    name,
+                    format!("has a point {:?}", point.to_array()),
+                    "finite coordinates [m]",
+                );
             }
         }
     }
@@ -124,11 +161,27 @@ fn check(contact: &Contact, distance: f64, force: f64, wrench: &Wrench) -> Resul
 
 /// An answer without a limit state.
 pub fn refused(status: Status, evaluations: u32) -> Score {
-    Score { status, mu_s: None, slip: None, pressure: None, contact_area_i: 0.0, contact_area_ii: 0.0, residual: 0.0, bounds: None, evaluations }
+    Score {
+        status,
+        mu_s: None,
+        slip: None,
+        pressure: None,
+        contact_area_i: 0.0,
+        contact_area_ii: 0.0,
+        residual: 0.0,
+        bounds: None,
+        evaluations,
+    }
 }
 
 /// [`solve`] for a contact already made ready; the numbers must be finite, `force` positive.
-pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, options: &Options) -> Score {
+pub fn solve_pads(
+    pads: &Pads,
+    distance: f64,
+    force: f64,
+    wrench: &Wrench,
+    options: &Options,
+) -> Score {
     if options.search == Search::Off {
         return solve_next(pads, distance, force, wrench, options, &mut None);
     }
@@ -140,7 +193,9 @@ pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, optio
     let mut solver = Solver::new(pads, load, options.refiner);
     let (state, unique) = match solver.branch(seed) {
         Some(state) if !strong(&state, &load) => (state, true),
-        None if load.half_distance == 0.0 => return refused(out_of_reach(pads, &load), solver.evaluations),
+        None if load.half_distance == 0.0 => {
+            return refused(out_of_reach(pads, &load), solver.evaluations);
+        }
         branch => {
             let found = solver.limit_states(branch.as_slice());
             match (found.states.as_slice(), found.complete) {
@@ -154,7 +209,8 @@ pub fn solve_pads(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, optio
     finish(pads, force, &load, &state, unique, solver.evaluations, options)
 }
 
-/// The answer to a load that needs no slip: without normal force on a pad, or without a part in the pad plane.
+/// The answer to a load that needs no slip: without normal force on a pad, or without a part in the
+/// pad plane.
 fn at_once(pads: &Pads, force: f64, load: &Load, options: &Options) -> Option<Score> {
     if load.normal.iter().any(|&n| n <= 0.0) {
         return Some(refused(Status::NoNormalForce, 0));
@@ -166,9 +222,16 @@ fn at_once(pads: &Pads, force: f64, load: &Load, options: &Options) -> Option<Sc
 #[derive(Debug, Clone, Copy)]
 pub struct Start(Vector7);
 
-/// [`solve_pads`] with [`Search::Off`] from the limit state `near` of a load like this one; afterwards `near` is this load's, if
-/// it has one.
-pub fn solve_next(pads: &Pads, distance: f64, force: f64, wrench: &Wrench, options: &Options, near: &mut Option<Start>) -> Score {
+/// [`solve_pads`] with [`Search::Off`] from the limit state `near` of a load like this one;
+/// afterwards `near` is this load's, if it has one.
+pub fn solve_next(
+    pads: &Pads,
+    distance: f64,
+    force: f64,
+    wrench: &Wrench,
+    options: &Options,
+    near: &mut Option<Start>,
+) -> Score {
     let options = &Options { search: Search::Off, ..*options };
     let load = pads.load(distance, force, wrench);
     if let Some(score) = at_once(pads, force, &load, options) {
@@ -192,13 +255,24 @@ fn strong(state: &State, load: &Load) -> bool {
 }
 
 /// Turns a solved state into an answer with its certificate.
-fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, evaluations: u32, options: &Options) -> Score {
+fn finish(
+    pads: &Pads,
+    force: f64,
+    load: &Load,
+    state: &State,
+    unique: bool,
+    evaluations: u32,
+    options: &Options,
+) -> Score {
     let q = state.q();
     let separated = (0..2).any(|k| pressure::separates(&pads.areas[k], face_pressure(&q, k)));
-    let rotation = |v| slip::dissipation(&slip::pressed_fields(pads, &q, &mut Default::default()), v).gradient;
+    let rotation =
+        |v| slip::dissipation(&slip::pressed_fields(pads, &q, &mut Default::default()), v).gradient;
     let mu_s = state.mu_over_size * load.size;
     // Answers that are only compared need no certificate.
-    let bounds = (options.search != Search::Off).then(|| slip::certificate(load.direction * load.size, state.twist(), &state.friction, rotation));
+    let bounds = (options.search != Search::Off).then(|| {
+        slip::certificate(load.direction * load.size, state.twist(), &state.friction, rotation)
+    });
     let r = state.residual;
     let slip_residual = Vector3::new(r[0], r[1], r[2]).amax() * load.size;
     let unit = pads.length * pads.length;
@@ -221,10 +295,14 @@ fn finish(pads: &Pads, force: f64, load: &Load, state: &State, unique: bool, eva
     }
 }
 
-/// Why no pressure was found without friction's help: there is none, or the contact left is too small for doubles
-/// (below about 1e-6 of the area).
+/// Why no pressure was found without friction's help: there is none, or the contact left is too
+/// small for doubles (below about 1e-6 of the area).
 fn out_of_reach(pads: &Pads, load: &Load) -> Status {
-    if pressure::reach(pads, load.normal, load.contact_moment()) > 0.0 { Status::NotConverged } else { Status::TwistedOut }
+    if pressure::reach(pads, load.normal, load.contact_moment()) > 0.0 {
+        Status::NotConverged
+    } else {
+        Status::TwistedOut
+    }
 }
 
 /// No load in the pad plane: only the pressure is asked for, and any friction holds.
@@ -232,7 +310,9 @@ fn pressed_only(pads: &Pads, force: f64, load: &Load, options: &Options) -> Scor
     let mut scratch = Loops::default();
     let target = load.contact_moment();
     let whole = pressure::solve(pads, load.normal, target, None, &mut scratch);
-    let Some(q) = whole.or_else(|| pressure::solve_near_rim(pads, load.normal, target, &mut scratch)) else {
+    let Some(q) =
+        whole.or_else(|| pressure::solve_near_rim(pads, load.normal, target, &mut scratch))
+    else {
         return refused(out_of_reach(pads, load), 0);
     };
     let m = pressure::pressed_moments(pads, &q, &mut scratch);
@@ -241,7 +321,11 @@ fn pressed_only(pads: &Pads, force: f64, load: &Load, options: &Options) -> Scor
     let wanted = nalgebra::Vector4::new(load.normal[0], load.normal[1], target.x, target.y);
     let unit = pads.length * pads.length;
     Score {
-        status: if separated && options.separation == Separation::Discard { Status::Separating } else { Status::Ok },
+        status: if separated && options.separation == Separation::Discard {
+            Status::Separating
+        } else {
+            Status::Ok
+        },
         mu_s: Some(0.0),
         slip: Some(Slip::None),
         pressure: Some(pads.pressure(q, force)),

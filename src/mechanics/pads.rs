@@ -15,7 +15,8 @@ pub struct Pads {
     pub moments: [[f64; 6]; 2],
     /// Their convex hulls, counter-clockwise, scaled.
     pub hulls: [Vec<DVec2>; 2],
-    /// Outward normals of the edges of `conv A_I - conv A_II` with the supports of the two terms in that direction, scaled.
+    /// Outward normals of the edges of `conv A_I - conv A_II` with the supports of the two terms in
+    /// that direction, scaled.
     pub supports: Vec<(DVec2, [f64; 2])>,
     /// Whether the areas agree in their moments, as two that are the same do.
     pub congruent: bool,
@@ -35,21 +36,27 @@ impl Pads {
         let area = raw[0][0] + raw[1][0];
         let origin = DVec2::new(raw[0][1] + raw[1][1], raw[0][2] + raw[1][2]) / area;
         let length = (area / 2.0).sqrt();
-        let areas = [&contact.face_i, &contact.face_ii].map(|patch| Loops::mapped(patch, |point| (point - origin) / length));
+        let areas = [&contact.face_i, &contact.face_ii]
+            .map(|patch| Loops::mapped(patch, |point| (point - origin) / length));
         let moments = [moments(&areas[0]), moments(&areas[1])];
         let hulls = [convex_hull(areas[0].points()), convex_hull(areas[1].points())];
         let normals = |hull: &[DVec2], sign: f64| -> Vec<DVec2> {
             let edge = |i: usize| hull[(i + 1) % hull.len()] - hull[i];
             (0..hull.len()).map(|i| sign * -edge(i).perp().normalize_or_zero()).collect()
         };
-        let all = normals(&hulls[0], 1.0).into_iter().chain(normals(&hulls[1], -1.0)).filter(|e| *e != DVec2::ZERO);
+        let all = normals(&hulls[0], 1.0)
+            .into_iter()
+            .chain(normals(&hulls[1], -1.0))
+            .filter(|e| *e != DVec2::ZERO);
         let supports = all.map(|e| (e, [support(&hulls[0], e), support(&hulls[1], -e)])).collect();
-        let congruent = moments[0].iter().zip(moments[1]).all(|(a, b)| (a - b).abs() <= 1e-12 * moments[0][0].max(moments[0][3] + moments[0][5]));
+        let congruent = moments[0].iter().zip(moments[1]).all(|(a, b)| {
+            (a - b).abs() <= 1e-12 * moments[0][0].max(moments[0][3] + moments[0][5])
+        });
         Some(Self { areas, moments, hulls, supports, congruent, origin, length })
     }
 
-    /// The load in units of `force` [N] and of this contact's length, its moment about the scaled frame's origin;
-    /// `distance` [m] is negative for a grip from inside.
+    /// The load in units of `force` [N] and of this contact's length, its moment about the scaled
+    /// frame's origin; `distance` [m] is negative for a grip from inside.
     pub fn load(&self, distance: f64, force: f64, wrench: &Wrench) -> Load {
         let origin = DVec3::new(self.origin.x, self.origin.y, 0.0);
         let f = wrench.force / force;
@@ -57,10 +64,17 @@ impl Pads {
         let in_plane = nalgebra::Vector3::new(f.x, f.y, m.z);
         let size = in_plane.norm();
         let direction = if size > 0.0 { in_plane / size } else { nalgebra::Vector3::zeros() };
-        Load { direction, size, normal: [1.0 + f.z / 2.0, 1.0 - f.z / 2.0], moment: [m.x, m.y], half_distance: distance / self.length / 2.0 }
+        Load {
+            direction,
+            size,
+            normal: [1.0 + f.z / 2.0, 1.0 - f.z / 2.0],
+            moment: [m.x, m.y],
+            half_distance: distance / self.length / 2.0,
+        }
     }
 
-    /// Pressure planes in SI about the grip origin from scaled coefficients `(a_i0, a_ii0, a1, a2)`.
+    /// Pressure planes in SI about the grip origin from scaled coefficients `(a_i0, a_ii0, a1,
+    /// a2)`.
     pub fn pressure(&self, q: [f64; 4], force: f64) -> Pressure {
         let unit = force / (self.length * self.length);
         let (a1, a2) = (q[2] * unit / self.length, q[3] * unit / self.length);
@@ -82,12 +96,16 @@ impl Pads {
     /// A twist `(u1, u2, omega)` about the grip origin, SI up to scale, in the scaled frame.
     pub fn scaled_twist(&self, twist: [f64; 3]) -> nalgebra::Vector3<f64> {
         let [u1, u2, omega] = twist;
-        nalgebra::Vector3::new(u1 - omega * self.origin.y, u2 + omega * self.origin.x, omega * self.length)
+        nalgebra::Vector3::new(
+            u1 - omega * self.origin.y,
+            u2 + omega * self.origin.x,
+            omega * self.length,
+        )
     }
 }
 
-/// Angular over linear velocity, in pad lengths, below which a slip is called a translation: rounding of the load's
-/// moment alone moves the slip centre this far out.
+/// Angular over linear velocity, in pad lengths, below which a slip is called a translation:
+/// rounding of the load's moment alone moves the slip centre this far out.
 const TRANSLATION: f64 = 1e-14;
 
 /// A scaled load: forces in units of the gripping force, lengths in the pads' length.

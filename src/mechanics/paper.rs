@@ -1,14 +1,17 @@
-//! The paper's own method (its section 4): one error figure `E` of equations (17)(18) in six unknowns, brought to zero
-//! by Shanno's conjugate directions from several starts, with separation by clipping and solving again (3.6).
+//! The paper's own method (its section 4): one error figure `E` of equations (17)(18) in six
+//! unknowns, brought to zero by Shanno's conjugate directions from several starts, with separation
+//! by clipping and solving again (3.6).
 //!
-//! It is here for comparison and is not the default: `E = 0` does not imply the seven equations. Each term couples two
-//! neighbouring equations, `e_i = (g_i h_(i+1) - g_(i+1) h_i)^2`, so where an inner pair `(g_i, h_i)` vanishes the chain
-//! is cut, and points that satisfy neither half with the same `mu_s` are zeros too. A load along an axis does that.
-//! Every end point is therefore checked against all seven equations, and a false zero is called one.
+//! It is here for comparison and is not the default: `E = 0` does not imply the seven equations.
+//! Each term couples two neighbouring equations, `e_i = (g_i h_(i+1) - g_(i+1) h_i)^2`, so where an
+//! inner pair `(g_i, h_i)` vanishes the chain is cut, and points that satisfy neither half with the
+//! same `mu_s` are zeros too. A load along an axis does that. Every end point is therefore checked
+//! against all seven equations, and a false zero is called one.
 //!
-//! DEVIATION, misprints of the text corrected: `mu` in both friction terms of (6); `h4 = -(S_I + S_II)`;
-//! `h5 = C_I + C_II`; `g1 = M1 - int_I p x2 + int_II p x2` with `h1 = -(d/2)(C_I - C_II)`; `g2 = M2 + int_I p x1 -
-//! int_II p x1` with `h2 = -(d/2)(S_I - S_II)`. The gradient of `E` is analytic.
+//! DEVIATION, misprints of the text corrected: `mu` in both friction terms of (6); `h4 = -(S_I +
+//! S_II)`; `h5 = C_I + C_II`; `g1 = M1 - int_I p x2 + int_II p x2` with `h1 = -(d/2)(C_I - C_II)`;
+//! `g2 = M2 + int_I p x1 - int_II p x1` with `h2 = -(d/2)(S_I - S_II)`. The gradient of `E` is
+//! analytic.
 
 use crate::contact::{Loops, friction, moments};
 use crate::error::Result;
@@ -18,15 +21,18 @@ use super::pads::{Load, Pads};
 use super::pressure::{face_pressure, separates};
 use super::shanno::{self, StopReason};
 
-/// The six unknowns: `c1, c2` in pad lengths, then `a_I0, a_II0, a1, a2` in gripping force per pad area (and length).
+/// The six unknowns: `c1, c2` in pad lengths, then `a_I0, a_II0, a1, a2` in gripping force per pad
+/// area (and length).
 pub type Unknowns = [f64; 6];
 
 /// Settings of the method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// The `k_i` of (18), for the error terms in scaled units (lengths over the pads' length, forces over `Fn`).
+    /// The `k_i` of (18), for the error terms in scaled units (lengths over the pads' length,
+    /// forces over `Fn`).
     pub weights: [f64; 6],
-    /// Number of starts: the middle of the pads, then points on a circle of one pad length about it.
+    /// Number of starts: the middle of the pads, then points on a circle of one pad length about
+    /// it.
     pub starts: usize,
     /// Evaluations of `E` with its gradient allowed to each start.
     pub max_evaluations: u32,
@@ -41,15 +47,20 @@ impl Default for Options {
     }
 }
 
-/// `E` below this counts as zero. In scaled units: each weighted term is then below 1e-5 of the gripping force.
+/// `E` below this counts as zero. In scaled units: each weighted term is then below 1e-5 of the
+/// gripping force.
 pub const ZERO: f64 = 1e-10;
-/// Residual of the seven equations (forces over `Fn`, moments over `Fn` times the pads' length) that passes the check.
+/// Residual of the seven equations (forces over `Fn`, moments over `Fn` times the pads' length)
+/// that passes the check.
 pub const CHECK: f64 = 1e-6;
-/// Slip centres farther out than this many pad lengths are taken to be on their way to infinity (paper, section 4).
+/// Slip centres farther out than this many pad lengths are taken to be on their way to infinity
+/// (paper, section 4).
 const RUNS_AWAY: f64 = 1e3;
-/// A minimisation that stalls (no lower point, or no evaluations left) with the slip centre beyond this is tried there too.
+/// A minimisation that stalls (no lower point, or no evaluations left) with the slip centre beyond
+/// this is tried there too.
 const STALLED_OUT: f64 = 30.0;
-/// Where such a slip centre is fixed. The moment left over falls with this distance, the rounding of `E` grows with it.
+/// Where such a slip centre is fixed. The moment left over falls with this distance, the rounding
+/// of `E` grows with it.
 const FIXED_AT: f64 = 1e8;
 /// Rounds of clipping and solving again. Most loads take 4 to 8.
 const ROUNDS: u32 = 60;
@@ -72,7 +83,8 @@ pub enum Outcome {
 pub struct Run {
     /// End point, scaled.
     pub x: Unknowns,
-    /// Friction coefficient by (12), the one quotient whose denominator never vanishes; negative for the other sense.
+    /// Friction coefficient by (12), the one quotient whose denominator never vanishes; negative
+    /// for the other sense.
     pub mu: f64,
     /// `E` at the end.
     pub error: f64,
@@ -97,7 +109,8 @@ pub struct Run {
 pub struct Report {
     /// The starts that were run, in order.
     pub runs: Vec<Run>,
-    /// The answer that the paper's rule takes, which does not look further than `E = 0`: index of the first such run.
+    /// The answer that the paper's rule takes, which does not look further than `E = 0`: index of
+    /// the first such run.
     pub published: Option<usize>,
     /// The answer after the check: index of the first run that solves the equations.
     pub checked: Option<usize>,
@@ -109,9 +122,20 @@ pub struct Report {
 ///
 /// # Errors
 /// As [`super::solve`]: numbers that are not finite, a force that is not positive.
-pub fn solve(contact: &Contact, distance: f64, force: f64, wrench: &Wrench, options: &Options) -> Result<Report> {
+pub fn solve(
+    contact: &Contact,
+    distance: f64,
+    force: f64,
+    wrench: &Wrench,
+    options: &Options,
+) -> Result<Report> {
     super::check(contact, distance, force, wrench)?;
-    let refused = |status| Report { runs: vec![], published: None, checked: None, score: super::refused(status, 0) };
+    let refused = |status| Report {
+        runs: vec![],
+        published: None,
+        checked: None,
+        score: super::refused(status, 0),
+    };
     let Some(pads) = Pads::new(contact) else { return Ok(refused(Status::NoContact)) };
     let load = pads.load(distance, force, wrench);
     if load.normal.iter().any(|&n| n <= 0.0) {
@@ -126,7 +150,8 @@ pub fn solve(contact: &Contact, distance: f64, force: f64, wrench: &Wrench, opti
     }
     let published = runs.iter().position(|run| run.error <= ZERO);
     let checked = runs.iter().position(|run| run.outcome == Outcome::Solved);
-    let best = checked.or_else(|| (0..runs.len()).min_by(|&a, &b| runs[a].residual.total_cmp(&runs[b].residual)));
+    let best = checked
+        .or_else(|| (0..runs.len()).min_by(|&a, &b| runs[a].residual.total_cmp(&runs[b].residual)));
     let evaluations = runs.iter().map(|run| run.evaluations).sum();
     let score = match best {
         Some(k) => score(&pads, force, &load, &runs[k], evaluations),
@@ -135,9 +160,17 @@ pub fn solve(contact: &Contact, distance: f64, force: f64, wrench: &Wrench, opti
     Ok(Report { runs, published, checked, score })
 }
 
-/// The `k`-th start: uniform pressure, slip centre in the middle of the pads or on a circle about it.
+/// The `k`-th start: uniform pressure, slip centre in the middle of the pads or on a circle about
+/// it.
 fn start(pads: &Pads, load: &Load, k: usize, starts: usize) -> Unknowns {
-    let mut x = [0.0, 0.0, load.normal[0] / pads.moments[0][0], load.normal[1] / pads.moments[1][0], 0.0, 0.0];
+    let mut x = [
+        0.0,
+        0.0,
+        load.normal[0] / pads.moments[0][0],
+        load.normal[1] / pads.moments[1][0],
+        0.0,
+        0.0,
+    ];
     if k > 0 {
         // Half a step off the axes, where symmetric pads have stationary points of E.
         let (s, c) = (std::f64::consts::TAU * (k as f64 - 0.5) / (starts - 1) as f64).sin_cos();
@@ -199,13 +232,17 @@ fn agrees(a: &Loops, b: &Loops) -> bool {
 
 /// One minimisation of `E` on fixed areas from `run.x`, by the rule for slip centres that run away.
 fn stage(problem: &Problem<'_>, run: &mut Run, options: &Options) {
-    let settings =
-        |used: u32| shanno::Options { gradient_tolerance: 1e-16, value_target: 1e-30, max_evaluations: options.max_evaluations.saturating_sub(used).max(1) };
+    let settings = |used: u32| shanno::Options {
+        gradient_tolerance: 1e-16,
+        value_target: 1e-30,
+        max_evaluations: options.max_evaluations.saturating_sub(used).max(1),
+    };
     let force = problem.force[0].hypot(problem.force[1]);
     let mut out = run.far;
     if !run.far {
         let away = |x: &Unknowns| force > 0.0 && x[0].hypot(x[1]) > RUNS_AWAY;
-        let found = shanno::minimise_until(run.x, &settings(run.evaluations), |x| problem.error(x), away);
+        let found =
+            shanno::minimise_until(run.x, &settings(run.evaluations), |x| problem.error(x), away);
         run.evaluations += found.evaluations;
         run.iterations += found.iterations;
         (run.x, run.error, run.stop) = (found.x, found.value, found.reason);
@@ -214,7 +251,8 @@ fn stage(problem: &Problem<'_>, run: &mut Run, options: &Options) {
         out = run.far || (stalled && force > 0.0 && found.x[0].hypot(found.x[1]) > STALLED_OUT);
     }
     if out {
-        // Perpendicular to the force, on the side where the rotation of the paper's sense carries the body along it.
+        // Perpendicular to the force, on the side where the rotation of the paper's sense carries
+        // the body along it.
         let fixed = [-problem.force[1] / force * FIXED_AT, problem.force[0] / force * FIXED_AT];
         let whole = |y: &[f64; 4]| [fixed[0], fixed[1], y[0], y[1], y[2], y[3]];
         let from = [run.x[2], run.x[3], run.x[4], run.x[5]];
@@ -225,7 +263,8 @@ fn stage(problem: &Problem<'_>, run: &mut Run, options: &Options) {
         run.evaluations += found.evaluations;
         run.iterations += found.iterations;
         if run.far || found.value < run.error {
-            (run.x, run.error, run.stop, run.far) = (whole(&found.x), found.value, found.reason, true);
+            (run.x, run.error, run.stop, run.far) =
+                (whole(&found.x), found.value, found.reason, true);
         }
     }
 }
@@ -311,7 +350,11 @@ impl<'a> Problem<'a> {
             t.h[6] += p[0] * m[0] + p[1] * m[1] + p[2] * m[2];
             t.g[0] -= sign * (p[0] * m[2] + p[1] * m[4] + p[2] * m[5]);
             t.g[1] += sign * (p[0] * m[1] + p[1] * m[3] + p[2] * m[4]);
-            for (column, by, n, x1, x2) in [(2 + k, 1.0, m[0], m[1], m[2]), (4, sign, m[1], m[3], m[4]), (5, sign, m[2], m[4], m[5])] {
+            for (column, by, n, x1, x2) in [
+                (2 + k, 1.0, m[0], m[1], m[2]),
+                (4, sign, m[1], m[3], m[4]),
+                (5, sign, m[2], m[4], m[5]),
+            ] {
                 t.dh[5][column] += sign * by * n;
                 t.dh[6][column] += by * n;
                 t.dg[0][column] -= sign * by * x2;
@@ -334,7 +377,11 @@ impl<'a> Problem<'a> {
         };
         for i in 0..4 {
             let e = t.g[i] * t.h[i + 1] - t.g[i + 1] * t.h[i];
-            add(self.weights[i], e, &|j| t.dg[i][j] * t.h[i + 1] + t.g[i] * t.dh[i + 1][j] - t.dg[i + 1][j] * t.h[i] - t.g[i + 1] * t.dh[i][j]);
+            add(self.weights[i], e, &|j| {
+                t.dg[i][j] * t.h[i + 1] + t.g[i] * t.dh[i + 1][j]
+                    - t.dg[i + 1][j] * t.h[i]
+                    - t.g[i + 1] * t.dh[i][j]
+            });
         }
         for i in 4..6 {
             add(self.weights[i], t.g[i + 1] - t.h[i + 1], &|j| t.dg[i + 1][j] - t.dh[i + 1][j]);
@@ -348,15 +395,21 @@ impl Terms {
     fn residual(&self, x: &Unknowns, load: &Load, mu: f64) -> f64 {
         let off = |i: usize| self.g[i] - mu * self.h[i];
         let (r3, r4) = (off(3), off(4));
-        // About the slip centre (5) grows with its distance; the forces' share of it is taken out again.
+        // About the slip centre (5) grows with its distance; the forces' share of it is taken out
+        // again.
         let about_origin = off(2) - r3 * x[1] + r4 * x[0];
-        let normal = [0.5 * (self.h[6] + self.h[5]) - load.normal[0], 0.5 * (self.h[6] - self.h[5]) - load.normal[1]];
+        let normal = [
+            0.5 * (self.h[6] + self.h[5]) - load.normal[0],
+            0.5 * (self.h[6] - self.h[5]) - load.normal[1],
+        ];
         let all = [off(0), off(1), about_origin, r3, r4, normal[0], normal[1]];
-        all.into_iter().fold(0.0, |most: f64, r| if r.is_nan() { f64::INFINITY } else { most.max(r.abs()) })
+        all.into_iter()
+            .fold(0.0, |most: f64, r| if r.is_nan() { f64::INFINITY } else { most.max(r.abs()) })
     }
 }
 
-/// Largest residual of the seven equations at a scaled state on the whole areas, with `mu` of either sign.
+/// Largest residual of the seven equations at a scaled state on the whole areas, with `mu` of
+/// either sign.
 pub(super) fn residual(pads: &Pads, load: &Load, x: &Unknowns, mu: f64) -> f64 {
     Problem::new(&pads.areas, load, [1.0; 6]).terms(x).residual(x, load, mu)
 }
@@ -376,7 +429,11 @@ fn score(pads: &Pads, force: f64, load: &Load, run: &Run, evaluations: u32) -> S
     let slip = if load.size == 0.0 {
         Slip::None
     } else if run.far {
-        Slip::Translation { direction: (sense * glam::DVec2::new(load.direction.x, load.direction.y)).normalize_or_zero().to_array() }
+        Slip::Translation {
+            direction: (sense * glam::DVec2::new(load.direction.x, load.direction.y))
+                .normalize_or_zero()
+                .to_array(),
+        }
     } else {
         pads.slip(sense * nalgebra::Vector3::new(run.x[1], -run.x[0], 1.0))
     };
@@ -403,7 +460,10 @@ mod tests {
 
     fn square(side: f64) -> Contact {
         let h = side / 2.0;
-        let face = vec![Polygon { outer: vec![DVec2::new(-h, -h), DVec2::new(h, -h), DVec2::new(h, h), DVec2::new(-h, h)], holes: vec![] }];
+        let face = vec![Polygon {
+            outer: vec![DVec2::new(-h, -h), DVec2::new(h, -h), DVec2::new(h, h), DVec2::new(-h, h)],
+            holes: vec![],
+        }];
         Contact { face_i: face.clone(), face_ii: face }
     }
 
@@ -427,8 +487,13 @@ mod tests {
                     problem.error(&moved).0
                 };
                 let step = 1e-4;
-                let want = (8.0 * (at(step) - at(-step)) - (at(2.0 * step) - at(-2.0 * step))) / (12.0 * step);
-                assert!((gradient[i] - want).abs() < 1e-8 * (1.0 + want.abs()), "{i}: {} {want}", gradient[i]);
+                let want = (8.0 * (at(step) - at(-step)) - (at(2.0 * step) - at(-2.0 * step)))
+                    / (12.0 * step);
+                assert!(
+                    (gradient[i] - want).abs() < 1e-8 * (1.0 + want.abs()),
+                    "{i}: {} {want}",
+                    gradient[i]
+                );
             }
         }
     }
@@ -438,7 +503,9 @@ mod tests {
         let contact = square(0.02);
         let load = wrench([4.0, 12.0, 0.0], [0.0, 0.0, 0.1]);
         let report = solve(&contact, 0.04, 50.0, &load, &Options::default()).unwrap();
-        let want = super::super::solve(&contact, 0.04, 50.0, &load, &super::super::Options::default()).unwrap();
+        let want =
+            super::super::solve(&contact, 0.04, 50.0, &load, &super::super::Options::default())
+                .unwrap();
         assert_eq!(report.score.status, Status::Ok, "{report:?}");
         assert!((report.score.mu_s.unwrap() / want.mu_s.unwrap() - 1.0).abs() < 1e-6, "{report:?}");
     }
@@ -452,13 +519,24 @@ mod tests {
         let report = solve(&contact, 0.01, 50.0, &load, &options).unwrap();
         assert!(report.runs.iter().any(|run| run.outcome == Outcome::FalseZero), "{report:?}");
         for run in &report.runs {
-            assert_eq!(run.outcome == Outcome::Solved, (run.mu.abs() - 0.201_192_597_992_577_85).abs() < 1e-5, "{run:?}");
+            assert_eq!(
+                run.outcome == Outcome::Solved,
+                (run.mu.abs() - 0.201_192_597_992_577_85).abs() < 1e-5,
+                "{run:?}"
+            );
         }
     }
 
     #[test]
     fn a_slip_centre_that_runs_away_is_fixed_far_out() {
-        let report = solve(&square(0.02), 0.05, 50.0, &wrench([3.0, -4.0, 0.0], [0.0; 3]), &Options::default()).unwrap();
+        let report = solve(
+            &square(0.02),
+            0.05,
+            50.0,
+            &wrench([3.0, -4.0, 0.0], [0.0; 3]),
+            &Options::default(),
+        )
+        .unwrap();
         let Some(Slip::Translation { direction }) = report.score.slip else { panic!("{report:?}") };
         assert!((report.score.mu_s.unwrap() - 0.05).abs() < 1e-7, "{report:?}");
         assert!((direction[0] - 0.6).abs() < 1e-6 && (direction[1] + 0.8).abs() < 1e-6);
@@ -466,10 +544,33 @@ mod tests {
 
     #[test]
     fn refuses_what_the_equations_refuse() {
-        let none = solve(&square(0.02), 0.05, 50.0, &wrench([1.0, 0.0, 200.0], [0.0; 3]), &Options::default()).unwrap();
+        let none = solve(
+            &square(0.02),
+            0.05,
+            50.0,
+            &wrench([1.0, 0.0, 200.0], [0.0; 3]),
+            &Options::default(),
+        )
+        .unwrap();
         assert_eq!(none.score.status, Status::NoNormalForce);
-        let out = solve(&square(0.02), 0.001, 50.0, &wrench([1.0, 2.0, 0.0], [1.5, 0.0, 0.1]), &Options::default()).unwrap();
+        let out = solve(
+            &square(0.02),
+            0.001,
+            50.0,
+            &wrench([1.0, 2.0, 0.0], [1.5, 0.0, 0.1]),
+            &Options::default(),
+        )
+        .unwrap();
         assert_eq!(out.score.status, Status::NotConverged);
-        assert!(solve(&square(0.02), 0.05, f64::NAN, &wrench([1.0, 0.0, 0.0], [0.0; 3]), &Options::default()).is_err());
+        assert!(
+            solve(
+                &square(0.02),
+                0.05,
+                f64::NAN,
+                &wrench([1.0, 0.0, 0.0], [0.0; 3]),
+                &Options::default()
+            )
+            .is_err()
+        );
     }
 }

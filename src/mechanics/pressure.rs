@@ -1,5 +1,5 @@
-//! The pressure that carries given normal forces and out-of-plane moments, with separation where the pads pull
-//! (equations (6)-(9) with given friction, (19)(20)).
+//! The pressure that carries given normal forces and out-of-plane moments, with separation where
+//! the pads pull (equations (6)-(9) with given friction, (19)(20)).
 
 use glam::DVec2;
 use nalgebra::{Matrix4, Vector4};
@@ -65,19 +65,28 @@ pub fn stiffness(m: &[[f64; 6]; 2]) -> Matrix4<f64> {
     )
 }
 
-/// Distance of the contact moment `target = (X1, X2)` inside the region `N_I conv A_I - N_II conv A_II` that pressing
-/// pads can carry, in units of force times length; not positive: the contact twists out.
+/// Distance of the contact moment `target = (X1, X2)` inside the region `N_I conv A_I - N_II conv
+/// A_II` that pressing pads can carry, in units of force times length; not positive: the contact
+/// twists out.
 pub fn reach(pads: &Pads, normal: [f64; 2], target: DVec2) -> f64 {
-    region_edges(pads, normal).map(|(e, support)| support - e.dot(target)).fold(f64::INFINITY, f64::min)
+    region_edges(pads, normal)
+        .map(|(e, support)| support - e.dot(target))
+        .fold(f64::INFINITY, f64::min)
 }
 
-/// Corners of the region of [`reach`], counter-clockwise: the hulls' edges one after the other by their direction.
+/// Corners of the region of [`reach`], counter-clockwise: the hulls' edges one after the other by
+/// their direction.
 pub fn region(pads: &Pads, normal: [f64; 2]) -> Ring {
-    let scaled = |k: usize, factor: f64| -> Ring { pads.hulls[k].iter().map(|x| factor * *x).collect() };
+    let scaled =
+        |k: usize, factor: f64| -> Ring { pads.hulls[k].iter().map(|x| factor * *x).collect() };
     let rings = [scaled(0, normal[0]), scaled(1, -normal[1])];
-    // Both from their lowest corner on, of two the left one, from where directions rise from 0 to a whole turn.
-    let first =
-        rings.each_ref().map(|ring| (0..ring.len()).min_by(|&a, &b| ring[a].y.total_cmp(&ring[b].y).then(ring[a].x.total_cmp(&ring[b].x))).unwrap_or(0));
+    // Both from their lowest corner on, of two the left one, from where directions rise from 0 to a
+    // whole turn.
+    let first = rings.each_ref().map(|ring| {
+        (0..ring.len())
+            .min_by(|&a, &b| ring[a].y.total_cmp(&ring[b].y).then(ring[a].x.total_cmp(&ring[b].x)))
+            .unwrap_or(0)
+    });
     let corner = |k: usize, i: usize| rings[k][(first[k] + i) % rings[k].len()];
     let mut done = [0, 0];
     let mut region = Ring::new();
@@ -98,11 +107,12 @@ fn region_edges(pads: &Pads, normal: [f64; 2]) -> impl Iterator<Item = (DVec2, f
     pads.supports.iter().map(move |&(e, [i, ii])| (e, normal[0] * i + normal[1] * ii))
 }
 
-/// Solves `K q = load` for the stiffness of [`stiffness`], of which `lift` times the diagonal is added to the part that
-/// tilts the pressure; `None` where that part is not positive definite.
+/// Solves `K q = load` for the stiffness of [`stiffness`], of which `lift` times the diagonal is
+/// added to the part that tilts the pressure; `None` where that part is not positive definite.
 fn solve_stiffness(m: &[[f64; 6]; 2], load: &Vector4<f64>, lift: f64) -> Option<Vector4<f64>> {
     let [a, b] = m;
-    // The offsets follow from the normal forces; what is left are the second moments about the centroids.
+    // The offsets follow from the normal forces; what is left are the second moments about the
+    // centroids.
     let (a1, a2, b1, b2) = (a[1] / a[0], a[2] / a[0], b[1] / b[0], b[2] / b[0]);
     let s11 = (a[3] + b[3]) * (1.0 + lift) - a1 * a[1] - b1 * b[1];
     let s12 = a[4] + b[4] - a1 * a[2] - b1 * b[2];
@@ -115,15 +125,27 @@ fn solve_stiffness(m: &[[f64; 6]; 2], load: &Vector4<f64>, lift: f64) -> Option<
     }
     let tilt2 = (x2 - l * x1) / d;
     let tilt1 = x1 / s11 - l * tilt2;
-    Some(Vector4::new(load[0] / a[0] - a1 * tilt1 - a2 * tilt2, load[1] / b[0] + b1 * tilt1 + b2 * tilt2, tilt1, tilt2))
+    Some(Vector4::new(
+        load[0] / a[0] - a1 * tilt1 - a2 * tilt2,
+        load[1] / b[0] + b1 * tilt1 + b2 * tilt2,
+        tilt1,
+        tilt2,
+    ))
 }
 
-/// The pressure `q = (a_i0, a_ii0, a1, a2)` that carries the normal forces and the contact moment `target`, from a
-/// `start` or from uniform pressure; `None` outside [`reach`] or at its very rim, where the iteration ends unresolved.
+/// The pressure `q = (a_i0, a_ii0, a1, a2)` that carries the normal forces and the contact moment
+/// `target`, from a `start` or from uniform pressure; `None` outside [`reach`] or at its very rim,
+/// where the iteration ends unresolved.
 ///
-/// It minimises the convex `1/2 sum int p^2 - f . q` by Newton's method; each step is one solve on the areas cut at the
-/// current zero-pressure lines (paper 3.6), damped so that the function falls.
-pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, start: Option<[f64; 4]>, scratch: &mut Loops) -> Option<[f64; 4]> {
+/// It minimises the convex `1/2 sum int p^2 - f . q` by Newton's method; each step is one solve on
+/// the areas cut at the current zero-pressure lines (paper 3.6), damped so that the function falls.
+pub fn solve(
+    pads: &Pads,
+    normal: [f64; 2],
+    target: DVec2,
+    start: Option<[f64; 4]>,
+    scratch: &mut Loops,
+) -> Option<[f64; 4]> {
     let load = Vector4::new(normal[0], normal[1], target.x, target.y);
     if let Some(q) = whole(pads, &load) {
         return Some(q);
@@ -133,7 +155,10 @@ pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, start: Option<[f64; 4
     }
     let (q, mut m) = match start {
         Some(q) => (q, pressed_moments(pads, &q, scratch)),
-        None => ([normal[0] / pads.moments[0][0], normal[1] / pads.moments[1][0], 0.0, 0.0], pads.moments),
+        None => (
+            [normal[0] / pads.moments[0][0], normal[1] / pads.moments[1][0], 0.0, 0.0],
+            pads.moments,
+        ),
     };
     let mut q = Vector4::from(q);
     let k = stiffness(&m);
@@ -144,7 +169,9 @@ pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, start: Option<[f64; 4
         if error.amax() <= 1e-15 * scale {
             break;
         }
-        let step = -[0.0, 1e-14, 1e-10, 1e-6].into_iter().find_map(|lift| solve_stiffness(&m, &error, lift))?;
+        let step = -[0.0, 1e-14, 1e-10, 1e-6]
+            .into_iter()
+            .find_map(|lift| solve_stiffness(&m, &error, lift))?;
         let slope = error.dot(&step);
         let mut t = 1.0;
         let mut moved = false;
@@ -154,7 +181,11 @@ pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, start: Option<[f64; 4
             let stiff = stiffness(&tried_m);
             let tried_error = stiff * tried - load;
             let tried_value = 0.5 * tried.dot(&(stiff * tried)) - load.dot(&tried);
-            if tried_m[0][0] > 0.0 && tried_m[1][0] > 0.0 && (tried_value <= value + 1e-4 * t * slope || tried_error.norm() < 0.5 * error.norm()) {
+            if tried_m[0][0] > 0.0
+                && tried_m[1][0] > 0.0
+                && (tried_value <= value + 1e-4 * t * slope
+                    || tried_error.norm() < 0.5 * error.norm())
+            {
                 moved = tried_error.norm() < error.norm() || error.amax() > 1e-10 * scale;
                 if moved {
                     (q, m, error, value) = (tried, tried_m, tried_error, tried_value);
@@ -168,13 +199,21 @@ pub fn solve(pads: &Pads, normal: [f64; 2], target: DVec2, start: Option<[f64; 4
         }
     }
     // On a contact of relative width `e` the iteration ends at `1e-16/e`.
-    let rounding = (0..2).map(|k| (q[k].abs() + q[2].hypot(q[3]) * pads.areas[k].radius()) * m[k][0]).sum::<f64>();
+    let rounding = (0..2)
+        .map(|k| (q[k].abs() + q[2].hypot(q[3]) * pads.areas[k].radius()) * m[k][0])
+        .sum::<f64>();
     (error.amax() <= (1e-9 * scale).max(8.0 * f64::EPSILON * rounding)).then(|| q.into())
 }
 
-/// [`solve`] for a contact moment close to the rim, where Newton's method from afar gets lost: from the middle of the
-/// region towards it in steps that leave a quarter of the way each, every one from the pressure before.
-pub fn solve_near_rim(pads: &Pads, normal: [f64; 2], target: DVec2, scratch: &mut Loops) -> Option<[f64; 4]> {
+/// [`solve`] for a contact moment close to the rim, where Newton's method from afar gets lost: from
+/// the middle of the region towards it in steps that leave a quarter of the way each, every one
+/// from the pressure before.
+pub fn solve_near_rim(
+    pads: &Pads,
+    normal: [f64; 2],
+    target: DVec2,
+    scratch: &mut Loops,
+) -> Option<[f64; 4]> {
     let left = reach(pads, normal, target);
     if left <= 0.0 {
         return None;

@@ -1,10 +1,13 @@
-//! Shanno's conjugate-direction minimiser with Beale-Powell restarts: the optimiser the paper names as its reference [17].
+//! Shanno's conjugate-direction minimiser with Beale-Powell restarts: the optimiser the paper names
+//! as its reference [17].
 //!
-//! D. F. Shanno, "Conjugate gradient methods with inexact searches", Mathematics of Operations Research 3 (1978); the
-//! algorithm is the one known as CONMIN. It keeps two pairs of vectors (the last step, and the last restart) and needs
-//! no matrix. The line search is inexact: Wolfe's conditions with a cubic through the last two trial points.
+//! D. F. Shanno, "Conjugate gradient methods with inexact searches", Mathematics of Operations
+//! Research 3 (1978); the algorithm is the one known as CONMIN. It keeps two pairs of vectors (the
+//! last step, and the last restart) and needs no matrix. The line search is inexact: Wolfe's
+//! conditions with a cubic through the last two trial points.
 //!
-//! It finds a stationary point near the start. Whether that point answers the question asked is the caller's to check.
+//! It finds a stationary point near the start. Whether that point answers the question asked is the
+//! caller's to check.
 
 /// Sufficient decrease of Wolfe's first condition, as published.
 const DECREASE: f64 = 1e-4;
@@ -12,7 +15,8 @@ const DECREASE: f64 = 1e-4;
 const CURVATURE: f64 = 0.9;
 /// Powell's test: restart when successive gradients are this far from orthogonal.
 const POWELL: f64 = 0.2;
-/// Largest growth of the step from one trial to the next. A badly scaled quadratic rightly asks for thousands.
+/// Largest growth of the step from one trial to the next. A badly scaled quadratic rightly asks for
+/// thousands.
 const LONGEST_JUMP: f64 = 1e6;
 /// Trials of one line search before it is given up; a healthy one takes two to four.
 const LINE_TRIALS: u32 = 40;
@@ -20,7 +24,8 @@ const LINE_TRIALS: u32 = 40;
 /// When to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Stop when `|g| <= gradient_tolerance * max(1, |x|)`; 0 asks for as much as the arithmetic gives.
+    /// Stop when `|g| <= gradient_tolerance * max(1, |x|)`; 0 asks for as much as the arithmetic
+    /// gives.
     pub gradient_tolerance: f64,
     /// Stop when the value is at or below this; negative infinity for never.
     pub value_target: f64,
@@ -79,7 +84,8 @@ fn plus<const N: usize>(a: &[f64; N], t: f64, b: &[f64; N]) -> [f64; N] {
     std::array::from_fn(|i| a[i] + t * b[i])
 }
 
-/// The step and gradient change of the last restart: the two-vector approximation `H` of the inverse Hessian.
+/// The step and gradient change of the last restart: the two-vector approximation `H` of the
+/// inverse Hessian.
 struct Memory<const N: usize> {
     step: [f64; N],
     change: [f64; N],
@@ -88,15 +94,15 @@ struct Memory<const N: usize> {
 }
 
 impl<const N: usize> Memory<N> {
-    /// `None` when the pair carries no curvature (rounding, or a concave stretch that Wolfe's test let through).
+    /// `None` when the pair carries no curvature (rounding, or a concave stretch that Wolfe's test
+    /// let through).
     fn new(step: [f64; N], change: [f64; N]) -> Option<Self> {
         let (step_change, change_change) = (dot(&step, &change), dot(&change, &change));
-        (step_change > 0.0 && change_change > 0.0 && step_change.is_finite() && change_change.is_finite()).then_some(Self {
-            step,
-            change,
-            step_change,
-            change_change,
-        })
+        (step_change > 0.0
+            && change_change > 0.0
+            && step_change.is_finite()
+            && change_change.is_finite())
+        .then_some(Self { step, change, step_change, change_change })
     }
 
     /// `H w`.
@@ -105,15 +111,19 @@ impl<const N: usize> Memory<N> {
         let along_change = -step_w / self.change_change;
         let along_step = 2.0 * step_w / self.step_change - change_w / self.change_change;
         let scale = self.step_change / self.change_change;
-        std::array::from_fn(|i| scale * w[i] + along_change * self.change[i] + along_step * self.step[i])
+        std::array::from_fn(|i| {
+            scale * w[i] + along_change * self.change[i] + along_step * self.step[i]
+        })
     }
 
-    /// The next direction from the last step and gradient change (Shanno's equation for a step within a restart cycle).
+    /// The next direction from the last step and gradient change (Shanno's equation for a step
+    /// within a restart cycle).
     fn direction(&self, gradient: &[f64; N], step: &[f64; N], change: &[f64; N]) -> [f64; N] {
         let (h_gradient, h_change) = (self.apply(gradient), self.apply(change));
         let step_change = dot(step, change);
         let step_gradient = dot(step, gradient) / step_change;
-        let along_step = (1.0 + dot(change, &h_change) / step_change) * step_gradient - dot(change, &h_gradient) / step_change;
+        let along_step = (1.0 + dot(change, &h_change) / step_change) * step_gradient
+            - dot(change, &h_gradient) / step_change;
         std::array::from_fn(|i| -h_gradient[i] + step_gradient * h_change[i] - along_step * step[i])
     }
 }
@@ -130,10 +140,14 @@ struct Trial {
 fn next_step(before: Trial, now: Trial) -> f64 {
     let u = before.slope + now.slope - 3.0 * (before.value - now.value) / (before.step - now.step);
     let root = (u * u - before.slope * now.slope).max(0.0).sqrt();
-    let cubic = now.step - (now.step - before.step) * (now.slope + root - u) / (now.slope - before.slope + 2.0 * root);
-    let (low, high) = if before.step < now.step { (before.step, now.step) } else { (now.step, before.step) };
+    let cubic = now.step
+        - (now.step - before.step) * (now.slope + root - u)
+            / (now.slope - before.slope + 2.0 * root);
+    let (low, high) =
+        if before.step < now.step { (before.step, now.step) } else { (now.step, before.step) };
     if before.slope * now.slope < 0.0 {
-        // The minimum lies between the two; near the line's origin it may be arbitrarily close to it.
+        // The minimum lies between the two; near the line's origin it may be arbitrarily close to
+        // it.
         return if cubic > 1.01 * low && cubic < 0.99 * high { cubic } else { 0.5 * (low + high) };
     }
     if now.slope > 0.0 {
@@ -146,8 +160,13 @@ fn next_step(before: Trial, now: Trial) -> f64 {
 
 /// Minimises `evaluate` (value and gradient at a point) from `start`.
 ///
-/// A point whose value or gradient is not finite is stepped back from, so `evaluate` may answer NaN outside its domain.
-pub fn minimise<const N: usize>(start: [f64; N], options: &Options, evaluate: impl FnMut(&[f64; N]) -> (f64, [f64; N])) -> Minimum<N> {
+/// A point whose value or gradient is not finite is stepped back from, so `evaluate` may answer NaN
+/// outside its domain.
+pub fn minimise<const N: usize>(
+    start: [f64; N],
+    options: &Options,
+    evaluate: impl FnMut(&[f64; N]) -> (f64, [f64; N]),
+) -> Minimum<N> {
     minimise_until(start, options, evaluate, |_| false)
 }
 
@@ -159,7 +178,15 @@ pub fn minimise_until<const N: usize>(
     mut stop: impl FnMut(&[f64; N]) -> bool,
 ) -> Minimum<N> {
     let (value, gradient) = evaluate(&start);
-    let mut at = Minimum { x: start, value, gradient, iterations: 0, evaluations: 1, restarts: 0, reason: StopReason::NotFinite };
+    let mut at = Minimum {
+        x: start,
+        value,
+        gradient,
+        iterations: 0,
+        evaluations: 1,
+        restarts: 0,
+        reason: StopReason::NotFinite,
+    };
     if !value.is_finite() || gradient.iter().any(|g| !g.is_finite()) {
         return at;
     }
@@ -175,7 +202,9 @@ pub fn minimise_until<const N: usize>(
             return at;
         }
         let previous = at;
-        let Some(step) = search_line(&mut at, &direction, slope, trial_step, options, &mut evaluate) else {
+        let Some(step) =
+            search_line(&mut at, &direction, slope, trial_step, options, &mut evaluate)
+        else {
             if at.evaluations >= options.max_evaluations {
                 at.reason = StopReason::EvaluationLimit;
                 return at;
@@ -197,10 +226,13 @@ pub fn minimise_until<const N: usize>(
         let moved = std::array::from_fn(|i| at.x[i] - previous.x[i]);
         let change = std::array::from_fn(|i| at.gradient[i] - previous.gradient[i]);
         since_restart += 1;
-        let powell = dot(&at.gradient, &previous.gradient).abs() > POWELL * dot(&at.gradient, &at.gradient);
+        let powell =
+            dot(&at.gradient, &previous.gradient).abs() > POWELL * dot(&at.gradient, &at.gradient);
         let restart = steepest || powell || since_restart >= N as u32;
         let next = match (&memory, restart) {
-            (Some(memory), false) if dot(&moved, &change) > 0.0 => Some(memory.direction(&at.gradient, &moved, &change)),
+            (Some(memory), false) if dot(&moved, &change) > 0.0 => {
+                Some(memory.direction(&at.gradient, &moved, &change))
+            }
             _ => {
                 memory = Memory::new(moved, change);
                 at.restarts += 1;
@@ -227,7 +259,8 @@ pub fn minimise_until<const N: usize>(
 
 fn finished<const N: usize>(at: &Minimum<N>, options: &Options) -> Option<StopReason> {
     let gradient = dot(&at.gradient, &at.gradient).sqrt();
-    if gradient <= options.gradient_tolerance * dot(&at.x, &at.x).sqrt().max(1.0) || gradient == 0.0 {
+    if gradient <= options.gradient_tolerance * dot(&at.x, &at.x).sqrt().max(1.0) || gradient == 0.0
+    {
         Some(StopReason::Gradient)
     } else if at.value <= options.value_target {
         Some(StopReason::Value)
@@ -238,8 +271,9 @@ fn finished<const N: usize>(at: &Minimum<N>, options: &Options) -> Option<StopRe
     }
 }
 
-/// Moves `at` to a point of the line that meets Wolfe's conditions, and returns its step length. Without one, `at` moves
-/// to the lowest point tried if that is lower than the start (its step is returned), else stays (`None`).
+/// Moves `at` to a point of the line that meets Wolfe's conditions, and returns its step length.
+/// Without one, `at` moves to the lowest point tried if that is lower than the start (its step is
+/// returned), else stays (`None`).
 fn search_line<const N: usize>(
     at: &mut Minimum<N>,
     direction: &[f64; N],
@@ -271,7 +305,8 @@ fn search_line<const N: usize>(
         let point = Minimum { x, value, gradient, ..origin };
         let decreased = value <= origin.value + DECREASE * step * slope;
         let flat = now.slope.abs() <= CURVATURE * slope.abs();
-        // At least two trials a line: one inexact trial leaves too little of the conjugacy that the update relies on.
+        // At least two trials a line: one inexact trial leaves too little of the conjugacy that the
+        // update relies on.
         if decreased && flat && (trials >= 2 || now.slope.abs() <= 1e-9 * slope.abs()) {
             best = Some((step, point));
             break;
@@ -294,8 +329,14 @@ mod tests {
     fn wood(x: &[f64; 4]) -> (f64, [f64; 4]) {
         let (a, b) = (x[1] - x[0] * x[0], x[3] - x[2] * x[2]);
         let (p, q, r, s) = (1.0 - x[0], 1.0 - x[2], x[1] - 1.0, x[3] - 1.0);
-        let value = 100.0 * a * a + p * p + 90.0 * b * b + q * q + 10.1 * (r * r + s * s) + 19.8 * r * s;
-        let gradient = [-400.0 * x[0] * a - 2.0 * p, 200.0 * a + 20.2 * r + 19.8 * s, -360.0 * x[2] * b - 2.0 * q, 180.0 * b + 20.2 * s + 19.8 * r];
+        let value =
+            100.0 * a * a + p * p + 90.0 * b * b + q * q + 10.1 * (r * r + s * s) + 19.8 * r * s;
+        let gradient = [
+            -400.0 * x[0] * a - 2.0 * p,
+            200.0 * a + 20.2 * r + 19.8 * s,
+            -360.0 * x[2] * b - 2.0 * q,
+            180.0 * b + 20.2 * s + 19.8 * r,
+        ];
         (value, gradient)
     }
 
@@ -308,11 +349,18 @@ mod tests {
     fn woods_function_as_published() {
         let options = Options { gradient_tolerance: 1e-5, ..Options::default() };
         let found = minimise([-3.0, -1.0, -3.0, -1.0], &options, wood);
-        println!("Wood: {} iterations, {} evaluations, {} restarts", found.iterations, found.evaluations, found.restarts);
+        println!(
+            "Wood: {} iterations, {} evaluations, {} restarts",
+            found.iterations, found.evaluations, found.restarts
+        );
         assert_eq!(found.reason, StopReason::Gradient);
         assert!(found.x.iter().all(|x| (x - 1.0).abs() < 1e-5), "{:?}", found.x);
-        // As published: 48 iterations, 106 evaluations. A little room, for another machine's rounding.
-        assert!((46..=50).contains(&found.iterations) && (100..=112).contains(&found.evaluations), "{found:?}");
+        // As published: 48 iterations, 106 evaluations. A little room, for another machine's
+        // rounding.
+        assert!(
+            (46..=50).contains(&found.iterations) && (100..=112).contains(&found.evaluations),
+            "{found:?}"
+        );
     }
 
     #[test]
@@ -325,7 +373,8 @@ mod tests {
 
     #[test]
     fn a_quadratic_of_n_variables_takes_about_n_lines() {
-        // Two trials a line make the search exact on a quadratic, and then conjugate directions end after n lines.
+        // Two trials a line make the search exact on a quadratic, and then conjugate directions end
+        // after n lines.
         const N: usize = 6;
         let quadratic = |x: &[f64; N]| {
             let weight = |i: usize| 1.0 + i as f64;
@@ -349,7 +398,8 @@ mod tests {
 
     #[test]
     fn stops_for_each_reason() {
-        let limited = Options { max_evaluations: 10, gradient_tolerance: 0.0, ..Options::default() };
+        let limited =
+            Options { max_evaluations: 10, gradient_tolerance: 0.0, ..Options::default() };
         let found = minimise([-1.2, 1.0], &limited, rosenbrock);
         assert_eq!(found.reason, StopReason::EvaluationLimit);
         assert!(found.evaluations == 10 && found.value < 24.2);
@@ -357,6 +407,9 @@ mod tests {
         assert_eq!(minimise([-1.2, 1.0], &target, rosenbrock).reason, StopReason::Value);
         assert_eq!(minimise([1.0, 1.0], &Options::default(), rosenbrock).evaluations, 1);
         // A gradient that lies: no lower point is found and the iteration says so.
-        assert_eq!(minimise([1.0], &Options::default(), |x| (x[0], [-1.0])).reason, StopReason::LineSearch);
+        assert_eq!(
+            minimise([1.0], &Options::default(), |x| (x[0], [-1.0])).reason,
+            StopReason::LineSearch
+        );
     }
 }

@@ -1,8 +1,9 @@
-//! The slip problem for a given pressure: `mu_s = max over v of (w.v)/D(v)` with `D(v) = sum int p |v| dA`.
+//! The slip problem for a given pressure: `mu_s = max over v of (w.v)/D(v)` with `D(v) = sum int p
+//! |v| dA`.
 //!
-//! `D` is a norm of the twist, convex and twice differentiable, so the incipient motion and `mu_s` are unique up to
-//! scale. The solver minimises `D^2/2 - w.v`; at the minimum `w = D grad D`, which are equations (3), (4) and the
-//! moment equation about the origin, and `mu_s = D`.
+//! `D` is a norm of the twist, convex and twice differentiable, so the incipient motion and `mu_s`
+//! are unique up to scale. The solver minimises `D^2/2 - w.v`; at the minimum `w = D grad D`, which
+//! are equations (3), (4) and the moment equation about the origin, and `mu_s = D`.
 
 use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
@@ -23,8 +24,13 @@ pub struct Field<'a> {
     pub p: [f64; 3],
 }
 
-/// Both areas as the pressure `q` leaves them in contact, with it; a face that is pressed all over is not cut.
-pub fn pressed_fields<'a>(pads: &'a Pads, q: &[f64; 4], scratch: &'a mut [Loops; 2]) -> [Field<'a>; 2] {
+/// Both areas as the pressure `q` leaves them in contact, with it; a face that is pressed all over
+/// is not cut.
+pub fn pressed_fields<'a>(
+    pads: &'a Pads,
+    q: &[f64; 4],
+    scratch: &'a mut [Loops; 2],
+) -> [Field<'a>; 2] {
     let p = [face_pressure(q, 0), face_pressure(q, 1)];
     let parted = [0, 1].map(|k| separates(&pads.areas[k], p[k]));
     for k in 0..2 {
@@ -68,8 +74,8 @@ pub struct Solution {
     pub twist: Vector3<f64>,
     /// Smallest friction coefficient.
     pub mu: f64,
-    /// Largest component of `D grad D - w` over that of `w`. The last step is not evaluated where the rate of convergence
-    /// tells what is left; then this is what it tells.
+    /// Largest component of `D grad D - w` over that of `w`. The last step is not evaluated where
+    /// the rate of convergence tells what is left; then this is what it tells.
     pub residual: f64,
     /// Evaluations of the integrals.
     pub evaluations: u32,
@@ -83,23 +89,23 @@ pub enum Refiner {
     /// Damped Newton with the analytic Hessian or Jacobian.
     #[default]
     Newton,
-    /// Shanno's conjugate-direction method (the paper's reference [17]), in variables scaled by the Hessian or Jacobian
-    /// at the start.
+    /// Shanno's conjugate-direction method (the paper's reference [17]), in variables scaled by the
+    /// Hessian or Jacobian at the start.
     Shanno,
 }
 
 /// Below this residual, relative to the load, a solution is at rounding level.
 const CONVERGED: f64 = 2e-15;
 
-/// Below this residual one more Newton step, taken without an evaluation after it, leaves no error in `mu` that can be
-/// seen: `mu` follows to third order, and the convergence is quadratic.
+/// Below this residual one more Newton step, taken without an evaluation after it, leaves no error
+/// in `mu` that can be seen: `mu` follows to third order, and the convergence is quadratic.
 const LAST_STEP: f64 = 1e-6;
 
 /// Residual that the rate of convergence must promise for that step.
 const PROMISED: f64 = 1e-12;
 
-/// A twist from an ellipsoid as the limit surface, its radius for the mix of force and moment at hand: the start where no
-/// seed is known.
+/// A twist from an ellipsoid as the limit surface, its radius for the mix of force and moment at
+/// hand: the start where no seed is known.
 pub fn ellipsoid_start(fields: &[Field<'_>], w: Vector3<f64>) -> Vector3<f64> {
     let (mut normal, mut first) = (0.0, DVec2::ZERO);
     let (mut q11, mut q12, mut q22, mut area) = (0.0, 0.0, 0.0, 0.0);
@@ -116,22 +122,34 @@ pub fn ellipsoid_start(fields: &[Field<'_>], w: Vector3<f64>) -> Vector3<f64> {
     let centre = first / normal;
     let force = DVec2::new(w.x, w.y);
     let moment = w.z - centre.perp_dot(force);
-    // What resists a rotation is the mean distance, and near a translation the mean square of the extent along it.
+    // What resists a rotation is the mean distance, and near a translation the mean square of the
+    // extent along it.
     let turning = MEAN_DISTANCE * (q11 + q22) / area;
     let size = force.length_squared();
     let share = size / (size + moment * moment / turning);
-    let along = if size > 0.0 { (q11 * force.x * force.x + 2.0 * q12 * force.x * force.y + q22 * force.y * force.y) / (size * area) } else { 0.0 };
+    let along = if size > 0.0 {
+        (q11 * force.x * force.x + 2.0 * q12 * force.x * force.y + q22 * force.y * force.y)
+            / (size * area)
+    } else {
+        0.0
+    };
     let radius_squared = turning + share * share * (along - turning);
     let omega = moment / radius_squared;
     Vector3::new(w.x + omega * centre.y, w.y - omega * centre.x, omega)
 }
 
-/// Square of the mean distance from the centroid over the mean square distance: 8/9 for a disc, 3/4 for a thin bar.
+/// Square of the mean distance from the centroid over the mean square distance: 8/9 for a disc, 3/4
+/// for a thin bar.
 const MEAN_DISTANCE: f64 = 0.85;
 
-/// Solves the slip problem for the in-plane load `w = (F1, F2, M3)`, not zero, from `start` or, without one, from the
-/// ellipsoid approximation.
-pub fn solve(fields: &[Field<'_>], w: Vector3<f64>, start: Option<Vector3<f64>>, refiner: Refiner) -> Solution {
+/// Solves the slip problem for the in-plane load `w = (F1, F2, M3)`, not zero, from `start` or,
+/// without one, from the ellipsoid approximation.
+pub fn solve(
+    fields: &[Field<'_>],
+    w: Vector3<f64>,
+    start: Option<Vector3<f64>>,
+    refiner: Refiner,
+) -> Solution {
     let (start, at_start) = begin(fields, w, start);
     match refiner {
         Refiner::Newton => newton(fields, w, start, at_start),
@@ -140,21 +158,45 @@ pub fn solve(fields: &[Field<'_>], w: Vector3<f64>, start: Option<Vector3<f64>>,
 }
 
 /// A twist near that of [`solve`], for one evaluation: the start and one Newton step.
-pub fn approach(fields: &[Field<'_>], w: Vector3<f64>, start: Option<Vector3<f64>>) -> Vector3<f64> {
+pub fn approach(
+    fields: &[Field<'_>],
+    w: Vector3<f64>,
+    start: Option<Vector3<f64>>,
+) -> Vector3<f64> {
     let (start, at) = begin(fields, w, start);
-    start - newton_step(at.gradient * at.gradient.transpose() + at.value * at.hessian, at.value * at.gradient - w)
+    start
+        - newton_step(
+            at.gradient * at.gradient.transpose() + at.value * at.hessian,
+            at.value * at.gradient - w,
+        )
 }
 
 /// The minimum of `D^2/2 - w.v` along the ray of the start, and `D` there.
-fn begin(fields: &[Field<'_>], w: Vector3<f64>, start: Option<Vector3<f64>>) -> (Vector3<f64>, Dissipation) {
+fn begin(
+    fields: &[Field<'_>],
+    w: Vector3<f64>,
+    start: Option<Vector3<f64>>,
+) -> (Vector3<f64>, Dissipation) {
     let start = start.filter(|v| w.dot(v) > 0.0).unwrap_or_else(|| ellipsoid_start(fields, w));
     let start = start / start.norm();
     let first = dissipation(fields, start);
     let scale = w.dot(&start) / (first.value * first.value);
-    (start * scale, Dissipation { value: first.value * scale, gradient: first.gradient, hessian: first.hessian / scale })
+    (
+        start * scale,
+        Dissipation {
+            value: first.value * scale,
+            gradient: first.gradient,
+            hessian: first.hessian / scale,
+        },
+    )
 }
 
-fn newton(fields: &[Field<'_>], w: Vector3<f64>, mut v: Vector3<f64>, mut at: Dissipation) -> Solution {
+fn newton(
+    fields: &[Field<'_>],
+    w: Vector3<f64>,
+    mut v: Vector3<f64>,
+    mut at: Dissipation,
+) -> Solution {
     let scale = w.amax();
     let mut evaluations = 1;
     let mut iterations = 0;
@@ -182,9 +224,11 @@ fn newton(fields: &[Field<'_>], w: Vector3<f64>, mut v: Vector3<f64>, mut at: Di
             evaluations += 1;
             let next_error = next.value * next.gradient - w;
             // Near the minimum the value no longer resolves the step, the gradient does.
-            let descends = next.value * next.value / 2.0 - w.dot(&tried) <= value + 1e-4 * t * slope;
+            let descends =
+                next.value * next.value / 2.0 - w.dot(&tried) <= value + 1e-4 * t * slope;
             if (descends && next.value.is_finite()) || next_error.norm() < 0.5 * error.norm() {
-                improved = next_error.norm() < error.norm() || (descends && error.amax() > 1e-9 * scale);
+                improved =
+                    next_error.norm() < error.norm() || (descends && error.amax() > 1e-9 * scale);
                 if improved {
                     (v, at, error) = (tried, next, next_error);
                 }
@@ -199,7 +243,8 @@ fn newton(fields: &[Field<'_>], w: Vector3<f64>, mut v: Vector3<f64>, mut at: Di
     Solution { twist: v, mu: at.value, residual: error.amax() / scale, evaluations, iterations }
 }
 
-/// Solves with the (semi-definite) matrix, lifted off singularity where the area is a line or a point.
+/// Solves with the (semi-definite) matrix, lifted off singularity where the area is a line or a
+/// point.
 fn newton_step(matrix: Matrix3<f64>, rhs: Vector3<f64>) -> Vector3<f64> {
     let mut lift = 0.0;
     let trace = matrix.trace();
@@ -231,12 +276,25 @@ fn solve_definite(matrix: &Matrix3<f64>, lift: f64, rhs: &Vector3<f64>) -> Optio
     Some(Vector3::new(y1 / d1 - l21 * x2 - l31 * x3, x2, x3))
 }
 
-/// Shanno's method on the same convex function, in variables in which its Hessian at the start is the identity.
-fn conjugate(fields: &[Field<'_>], w: Vector3<f64>, start: Vector3<f64>, at: Dissipation) -> Solution {
+/// Shanno's method on the same convex function, in variables in which its Hessian at the start is
+/// the identity.
+fn conjugate(
+    fields: &[Field<'_>],
+    w: Vector3<f64>,
+    start: Vector3<f64>,
+    at: Dissipation,
+) -> Solution {
     let matrix = at.gradient * at.gradient.transpose() + at.value * at.hessian;
-    let back = matrix.cholesky().and_then(|factor| factor.l().transpose().try_inverse()).unwrap_or_else(Matrix3::identity);
+    let back = matrix
+        .cholesky()
+        .and_then(|factor| factor.l().transpose().try_inverse())
+        .unwrap_or_else(Matrix3::identity);
     let scale = w.amax();
-    let options = shanno::Options { gradient_tolerance: 1e-13 * (back.transpose() * w).norm(), max_evaluations: 400, ..Default::default() };
+    let options = shanno::Options {
+        gradient_tolerance: 1e-13 * (back.transpose() * w).norm(),
+        max_evaluations: 400,
+        ..Default::default()
+    };
     let run = shanno::minimise([0.0; 3], &options, |y: &[f64; 3]| {
         let v = start + back * Vector3::from(*y);
         let at = dissipation(fields, v);
@@ -246,7 +304,13 @@ fn conjugate(fields: &[Field<'_>], w: Vector3<f64>, start: Vector3<f64>, at: Dis
     let twist = start + back * Vector3::from(run.x);
     let end = dissipation(fields, twist);
     let residual = (end.value * end.gradient - w).amax() / scale;
-    Solution { twist, mu: end.value, residual, evaluations: run.evaluations + 2, iterations: run.iterations }
+    Solution {
+        twist,
+        mu: end.value,
+        residual,
+        evaluations: run.evaluations + 2,
+        iterations: run.iterations,
+    }
 }
 
 /// A wrench that the friction can give with `mu = 1`, and where the pressure acts.
@@ -260,23 +324,33 @@ pub struct Support {
     pub centre: DVec2,
 }
 
-/// Moment of a support about the pressure's centre, over the normal force and in lengths of the scaled frame, from which
-/// on it serves for the certificate. Below, the slip is nearly a translation and a rotation is evaluated beside it.
+/// Moment of a support about the pressure's centre, over the normal force and in lengths of the
+/// scaled frame, from which on it serves for the certificate. Below, the slip is nearly a
+/// translation and a rotation is evaluated beside it.
 const CERTIFYING_MOMENT: f64 = 1e-2;
 
-/// Lower and upper bound on `mu_s` for a pressure, from the twist `v` and the `support` there; `rotation` gives the
-/// gradient of the dissipation at another twist.
+/// Lower and upper bound on `mu_s` for a pressure, from the twist `v` and the `support` there;
+/// `rotation` gives the gradient of the dissipation at another twist.
 ///
-/// Lower: `(w.v)/D(v)`, `D = v . gradient`. Upper: the wrenches that unit friction can give are a convex set, symmetric
-/// about zero, and the support is one of them. What `w` has beyond `lower` times the support is next to nothing at a
-/// solution; it is made up of two more, that of a translation and the support again or that of a rotation. The sizes of
-/// the coefficients add up.
-pub fn certificate(w: Vector3<f64>, v: Vector3<f64>, support: &Support, rotation: impl FnOnce(Vector3<f64>) -> Vector3<f64>) -> Bounds {
+/// Lower: `(w.v)/D(v)`, `D = v . gradient`. Upper: the wrenches that unit friction can give are a
+/// convex set, symmetric about zero, and the support is one of them. What `w` has beyond `lower`
+/// times the support is next to nothing at a solution; it is made up of two more, that of a
+/// translation and the support again or that of a rotation. The sizes of the coefficients add up.
+pub fn certificate(
+    w: Vector3<f64>,
+    v: Vector3<f64>,
+    support: &Support,
+    rotation: impl FnOnce(Vector3<f64>) -> Vector3<f64>,
+) -> Bounds {
     let Support { gradient, normal, centre } = *support;
     let lower = w.dot(&v) / gradient.dot(&v);
     // The moment about the pressure's centre, which translations leave alone.
     let about = |g: &Vector3<f64>| g.z - centre.perp_dot(DVec2::new(g.x, g.y));
-    let turning = if about(&gradient).abs() < CERTIFYING_MOMENT * normal { rotation(Vector3::new(centre.y, -centre.x, 1.0)) } else { gradient };
+    let turning = if about(&gradient).abs() < CERTIFYING_MOMENT * normal {
+        rotation(Vector3::new(centre.y, -centre.x, 1.0))
+    } else {
+        gradient
+    };
     let left = w - lower * gradient;
     let third = about(&left) / about(&turning);
     let rest = left - third * turning;
@@ -290,21 +364,34 @@ mod tests {
     use crate::model::Polygon;
 
     fn area() -> Loops {
-        let outer = [(-1.0, -0.6), (0.9, -0.8), (0.7, 0.5), (0.1, 0.2), (-0.8, 0.9)].map(|(x, y)| DVec2::new(x, y)).to_vec();
+        let outer = [(-1.0, -0.6), (0.9, -0.8), (0.7, 0.5), (0.1, 0.2), (-0.8, 0.9)]
+            .map(|(x, y)| DVec2::new(x, y))
+            .to_vec();
         Loops::new(&[Polygon { outer, holes: Vec::new() }])
     }
 
     fn support(field: &Field<'_>, v: Vector3<f64>) -> Support {
         let m = moments(field.area);
         let normal = field.p[0] * m[0] + field.p[1] * m[1] + field.p[2] * m[2];
-        Support { gradient: dissipation(&[*field], v).gradient, normal, centre: first_moment(&m, field.p) / normal }
+        Support {
+            gradient: dissipation(&[*field], v).gradient,
+            normal,
+            centre: first_moment(&m, field.p) / normal,
+        }
     }
 
     /// Loads of all kinds, the last ones near and at a translation.
     fn loads(field: &Field<'_>) -> Vec<Vector3<f64>> {
         let centre = support(field, Vector3::x()).centre;
-        let push = |lever: f64| Vector3::new(0.6, -0.8, centre.perp_dot(DVec2::new(0.6, -0.8)) + lever);
-        let turning = (0..40).map(|i| Vector3::new((0.7 * f64::from(i)).sin(), (1.3 * f64::from(i)).cos(), (0.4 * f64::from(i)).sin()));
+        let push =
+            |lever: f64| Vector3::new(0.6, -0.8, centre.perp_dot(DVec2::new(0.6, -0.8)) + lever);
+        let turning = (0..40).map(|i| {
+            Vector3::new(
+                (0.7 * f64::from(i)).sin(),
+                (1.3 * f64::from(i)).cos(),
+                (0.4 * f64::from(i)).sin(),
+            )
+        });
         turning.chain([1e-2, 1e-5, -1e-9, 0.0].map(push)).collect()
     }
 
@@ -316,11 +403,19 @@ mod tests {
         for w in loads(&field) {
             let exact = solve(&[field], w, None, Refiner::Newton);
             let tight = certificate(w, exact.twist, &support(&field, exact.twist), rotation);
-            assert!((tight.lower / exact.mu - 1.0).abs() < 1e-13 && (tight.upper / exact.mu - 1.0).abs() < 1e-11, "{w:?} {exact:?} {tight:?}");
+            assert!(
+                (tight.lower / exact.mu - 1.0).abs() < 1e-13
+                    && (tight.upper / exact.mu - 1.0).abs() < 1e-11,
+                "{w:?} {exact:?} {tight:?}"
+            );
             for turn in [1e-3, 0.1, 0.5] {
                 let v = exact.twist + turn * exact.twist.norm() * Vector3::new(0.5, 0.7, -0.5);
                 let Bounds { lower, upper } = certificate(w, v, &support(&field, v), rotation);
-                assert!(lower <= exact.mu * (1.0 + 1e-13) && exact.mu <= upper * (1.0 + 1e-13), "{w:?} {turn}: {lower} {} {upper}", exact.mu);
+                assert!(
+                    lower <= exact.mu * (1.0 + 1e-13) && exact.mu <= upper * (1.0 + 1e-13),
+                    "{w:?} {turn}: {lower} {} {upper}",
+                    exact.mu
+                );
             }
         }
     }
@@ -333,9 +428,16 @@ mod tests {
             let found = solve(&[field], w, None, Refiner::Newton);
             let at = dissipation(&[field], found.twist);
             let residual = (at.value * at.gradient - w).amax() / w.amax();
-            assert!(residual < 1e-11 && (at.value / found.mu - 1.0).abs() < 1e-11, "{w:?} {found:?} {residual:e}");
-            // The maximum of (w.v)/D(v) is flat: the value is right to the square of the twist's error.
-            assert!((w.dot(&found.twist) / at.value / found.mu - 1.0).abs() < 1e-14, "{w:?} {found:?}");
+            assert!(
+                residual < 1e-11 && (at.value / found.mu - 1.0).abs() < 1e-11,
+                "{w:?} {found:?} {residual:e}"
+            );
+            // The maximum of (w.v)/D(v) is flat: the value is right to the square of the twist's
+            // error.
+            assert!(
+                (w.dot(&found.twist) / at.value / found.mu - 1.0).abs() < 1e-14,
+                "{w:?} {found:?}"
+            );
         }
     }
 }

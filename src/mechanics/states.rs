@@ -1,11 +1,12 @@
 //! All limit states of a load, found by looking at the whole region of contact moments.
 //!
-//! A contact moment `X = int_I x p_I - int_II x p_II` in the convex region `N_I conv A_I - N_II conv A_II` fixes the
-//! pressure, that the slip, and (6)(7) then leave over `g(X) = X - X_0 - (d/2) mu (T_I - T_II)`, with `X_0` the moment
-//! that the load asks for without friction. Limit states are the zeros of this continuous map of the plane. Its
-//! derivative is known too, so a cell of the region is set aside when the values at its corners stay farther from zero
-//! than the map's bend over the cell could carry it, and cut smaller otherwise. The signs of the zeros found must add up
-//! to the turns of `g` along the region's rim, which no zero inside can escape.
+//! A contact moment `X = int_I x p_I - int_II x p_II` in the convex region `N_I conv A_I - N_II
+//! conv A_II` fixes the pressure, that the slip, and (6)(7) then leave over `g(X) = X - X_0 - (d/2)
+//! mu (T_I - T_II)`, with `X_0` the moment that the load asks for without friction. Limit states
+//! are the zeros of this continuous map of the plane. Its derivative is known too, so a cell of the
+//! region is set aside when the values at its corners stay farther from zero than the map's bend
+//! over the cell could carry it, and cut smaller otherwise. The signs of the zeros found must add
+//! up to the turns of `g` along the region's rim, which no zero inside can escape.
 
 use glam::{DMat2, DVec2};
 use nalgebra::SMatrix;
@@ -19,7 +20,8 @@ use super::pressure;
 pub struct LimitStates {
     /// Distinct limit states by rising `mu`.
     pub states: Vec<State>,
-    /// Whether the signs of the states add up to the map's turns along the rim; if not, there is another one.
+    /// Whether the signs of the states add up to the map's turns along the rim; if not, there is
+    /// another one.
     pub complete: bool,
 }
 
@@ -31,24 +33,29 @@ const CORNERS: usize = 16;
 const RINGS: u32 = 4;
 /// Halvings of a starting cell along each coordinate.
 const HALVINGS: u32 = 6;
-/// The outermost ring, in the coordinate whose fourth power is the distance from the rim: 1e-4 of the way to the middle.
-/// There a contact is down to about 3e-4 of its width; the map hardly changes from there to the rim, where the pressure
-/// is left on an edge or a corner, and Newton's method is started from every point of this ring with a small value.
+/// The outermost ring, in the coordinate whose fourth power is the distance from the rim: 1e-4 of
+/// the way to the middle. There a contact is down to about 3e-4 of its width; the map hardly
+/// changes from there to the rim, where the pressure is left on an edge or a corner, and Newton's
+/// method is started from every point of this ring with a small value.
 const OUTERMOST: f64 = 0.9;
-/// The innermost ring within which the zeros must be counted to call the search complete: 1 % of the way from the rim.
+/// The innermost ring within which the zeros must be counted to call the search complete: 1 % of
+/// the way from the rim.
 const WITHIN: u32 = RINGS - 1;
-/// A cell holds no zero when its corners' values stay this many times the bend away from zero. Inside a cell a quadratic
-/// map strays by at most half the bend from the values between its corners.
+/// A cell holds no zero when its corners' values stay this many times the bend away from zero.
+/// Inside a cell a quadratic map strays by at most half the bend from the values between its
+/// corners.
 const BEND: f64 = 0.75;
 /// The same when the signs do not add up at first.
 const BEND_AGAIN: f64 = 3.0;
-/// Value on the outermost ring, in units of force times the pads' length, from which a zero beyond it is sought.
+/// Value on the outermost ring, in units of force times the pads' length, from which a zero beyond
+/// it is sought.
 const BEYOND: f64 = 0.05;
 /// Newton's step on the outermost ring, in its distances from the rim, up to which the same.
 const BEYOND_STEPS: f64 = 30.0;
 /// The same, up to which there should be one.
 const EXPECTED_STEPS: f64 = 5.0;
-/// Residual of the slip's equations up to which a point of the map is drawn; the states themselves are solved in full.
+/// Residual of the slip's equations up to which a point of the map is drawn; the states themselves
+/// are solved in full.
 const LOOSE: f64 = 1e-4;
 /// Most points looked at, and most starts of Newton's method.
 const MOST_NODES: usize = 500;
@@ -77,7 +84,8 @@ struct Cell {
 struct Map<'s, 'a> {
     solver: &'s mut Solver<'a>,
     middle: DVec2,
-    /// The rim relative to the middle, cut into pieces; each piece goes through several corners when there are many.
+    /// The rim relative to the middle, cut into pieces; each piece goes through several corners
+    /// when there are many.
     pieces: Vec<Vec<DVec2>>,
     nodes: FxHashMap<(u32, u32), Option<Node>>,
     starts: usize,
@@ -95,7 +103,8 @@ impl Solver<'_> {
         LimitStates { states, complete }
     }
 
-    /// The point of the map whose pressure and slip are those of `z`; `None` where they do not fit each other.
+    /// The point of the map whose pressure and slip are those of `z`; `None` where they do not fit
+    /// each other.
     pub(super) fn node(&mut self, z: &Vector7) -> Option<Node> {
         let mut jacobian = Matrix7::zeros();
         let state = self.evaluate(z, 1.0, Some(&mut jacobian));
@@ -114,15 +123,24 @@ impl Solver<'_> {
         unit[(6, 1)] = 1.0;
         let moved = along.lu().solve(&unit)?;
         let change = jacobian.fixed_view::<2, 7>(5, 0) * moved;
-        let slope = DMat2::from_cols(DVec2::new(change[(1, 0)], -change[(0, 0)]), DVec2::new(change[(1, 1)], -change[(0, 1)]));
-        (g.is_finite() && slope.is_finite()).then_some(Node { x: DVec2::new(carried[2], carried[3]), g, slope, z: *z })
+        let slope = DMat2::from_cols(
+            DVec2::new(change[(1, 0)], -change[(0, 0)]),
+            DVec2::new(change[(1, 1)], -change[(0, 1)]),
+        );
+        (g.is_finite() && slope.is_finite()).then_some(Node {
+            x: DVec2::new(carried[2], carried[3]),
+            g,
+            slope,
+            z: *z,
+        })
     }
 
     /// `1` or `-1`: how often `g` turns about the state.
     fn turns(&mut self, state: &State) -> i32 {
         let mut jacobian = Matrix7::zeros();
         self.evaluate(&state.z, 1.0, Some(&mut jacobian));
-        // Without coupling the Jacobian's determinant is negative and the map is the identity but for a constant.
+        // Without coupling the Jacobian's determinant is negative and the map is the identity but
+        // for a constant.
         if jacobian.determinant() < 0.0 { 1 } else { -1 }
     }
 }
@@ -138,7 +156,11 @@ impl<'s, 'a> Map<'s, 'a> {
         let mut pieces = Vec::new();
         if rim.len() > CORNERS {
             let many = rim.len().div_ceil(CORNERS);
-            pieces.extend((0..rim.len()).step_by(many).map(|i| (i..=(i + many).min(rim.len())).map(corner).collect()));
+            pieces.extend(
+                (0..rim.len())
+                    .step_by(many)
+                    .map(|i| (i..=(i + many).min(rim.len())).map(corner).collect()),
+            );
         } else {
             let cuts = PIECES.div_ceil(rim.len());
             for i in 0..rim.len() {
@@ -185,8 +207,13 @@ impl<'s, 'a> Map<'s, 'a> {
     fn search(&mut self, states: &mut Vec<State>) -> bool {
         self.cells(BEND, MOST_NODES, states);
         let open = self.beyond(states);
-        // On slivers the outermost points can be beyond what doubles resolve: then the next ring in.
-        let Some((ring, turns)) = (1..=RINGS).rev().find_map(|ring| Some((ring, self.winding(ring << HALVINGS)?))) else { return false };
+        // On slivers the outermost points can be beyond what doubles resolve: then the next ring
+        // in.
+        let Some((ring, turns)) =
+            (1..=RINGS).rev().find_map(|ring| Some((ring, self.winding(ring << HALVINGS)?)))
+        else {
+            return false;
+        };
         if self.signs(states, ring) != turns {
             self.cells(BEND_AGAIN, 2 * MOST_NODES, states);
         }
@@ -202,7 +229,10 @@ impl<'s, 'a> Map<'s, 'a> {
             let mut near = self.node(0, 0, None);
             for ring in 0..RINGS {
                 near = self.node(piece * whole, (ring + 1) * whole, near.as_ref()).or(near);
-                cells.push_back(Cell { rays: [piece * whole, (piece + 1) * whole], rings: [ring * whole, (ring + 1) * whole] });
+                cells.push_back(Cell {
+                    rays: [piece * whole, (piece + 1) * whole],
+                    rings: [ring * whole, (ring + 1) * whole],
+                });
             }
         }
         while let Some(cell) = cells.pop_front() {
@@ -232,8 +262,8 @@ impl<'s, 'a> Map<'s, 'a> {
         self.pieces.iter().flat_map(|piece| piece.windows(2)).map(outward).fold(0.0, f64::max)
     }
 
-    /// Newton's method from a point, unless enough have been tried: on all seven equations, and if that gets stuck on
-    /// the map first.
+    /// Newton's method from a point, unless enough have been tried: on all seven equations, and if
+    /// that gets stuck on the map first.
     fn start(&mut self, node: &Node, states: &mut Vec<State>) {
         self.starts += 1;
         if self.starts > MOST_STARTS {
@@ -255,7 +285,9 @@ impl<'s, 'a> Map<'s, 'a> {
     fn descend(&mut self, mut at: Node) -> Node {
         for _ in 0..10 {
             let step = -(at.slope.inverse() * at.g);
-            let next = [1.0, 0.4, 0.15, 0.05].into_iter().find_map(|t| self.look(at.x + t * step, Some(&at)).filter(|next| next.g.length() < at.g.length()));
+            let next = [1.0, 0.4, 0.15, 0.05].into_iter().find_map(|t| {
+                self.look(at.x + t * step, Some(&at)).filter(|next| next.g.length() < at.g.length())
+            });
             match next {
                 Some(next) if step.is_finite() => at = next,
                 _ => break,
@@ -264,13 +296,19 @@ impl<'s, 'a> Map<'s, 'a> {
         at
     }
 
-    /// Zeros between the outermost ring and the rim: the value on the ring is small beside them. Whether there should be
-    /// one, but none was found.
+    /// Zeros between the outermost ring and the rim: the value on the ring is small beside them.
+    /// Whether there should be one, but none was found.
     fn beyond(&mut self, states: &mut Vec<State>) -> bool {
         let ring = RINGS << HALVINGS;
-        let mut near: Vec<Node> = self.nodes.iter().filter(|(key, _)| key.1 == ring).filter_map(|(_, node)| *node).collect();
+        let mut near: Vec<Node> = self
+            .nodes
+            .iter()
+            .filter(|(key, _)| key.1 == ring)
+            .filter_map(|(_, node)| *node)
+            .collect();
         let step = |node: &Node| (node.slope.inverse() * node.g).length();
-        let room = (1.0 - OUTERMOST).powi(4) * self.pieces.iter().flatten().map(|corner| corner.length()).fold(0.0, f64::max);
+        let room = (1.0 - OUTERMOST).powi(4)
+            * self.pieces.iter().flatten().map(|corner| corner.length()).fold(0.0, f64::max);
         near.retain(|node| node.g.length() < BEYOND || step(node) < BEYOND_STEPS * room);
         near.sort_by(|a, b| step(a).total_cmp(&step(b)));
         for node in near.iter().take(8) {
@@ -282,7 +320,13 @@ impl<'s, 'a> Map<'s, 'a> {
     }
 
     /// Sets the cell aside, finds its zero, or cuts it.
-    fn settle(&mut self, cell: Cell, bends: f64, budget: usize, states: &mut Vec<State>) -> Vec<Cell> {
+    fn settle(
+        &mut self,
+        cell: Cell,
+        bends: f64,
+        budget: usize,
+        states: &mut Vec<State>,
+    ) -> Vec<Cell> {
         let [a, b] = cell.rays;
         let [inner, outer] = cell.rings;
         let mut corners: Vec<Node> = Vec::with_capacity(4);
@@ -300,25 +344,40 @@ impl<'s, 'a> Map<'s, 'a> {
         let bend = |one: &Option<Node>, two: &Option<Node>| match (one, two) {
             (Some(one), Some(two)) => {
                 let step = two.x - one.x;
-                (two.g - one.g - one.slope * step).length().max((two.g - one.g - two.slope * step).length())
+                (two.g - one.g - one.slope * step)
+                    .length()
+                    .max((two.g - one.g - two.slope * step).length())
             }
             // A corner whose slip could not be found: judged by the others.
             _ => 0.0,
         };
-        let across = bend(&ends[1][0], &ends[1][1]).max(if inner == 0 { 0.0 } else { bend(&ends[0][0], &ends[0][1]) });
+        let across = bend(&ends[1][0], &ends[1][1]).max(if inner == 0 {
+            0.0
+        } else {
+            bend(&ends[0][0], &ends[0][1])
+        });
         let along = bend(&ends[0][0], &ends[1][0]).max(bend(&ends[0][1], &ends[1][1]));
         let most = across.max(along);
         if corners.len() < 3 || distance_from_zero(&corners) > bends * most {
             return Vec::new();
         }
-        let size = corners.iter().flat_map(|one| corners.iter().map(|two| one.x.distance(two.x))).fold(0.0, f64::max);
-        let stiff = corners.iter().map(|corner| least_stretch(corner.slope)).fold(f64::INFINITY, f64::min);
-        let straight = most <= 0.2 * stiff * size && corners.windows(2).all(|pair| pair[0].slope.determinant() * pair[1].slope.determinant() > 0.0);
+        let size = corners
+            .iter()
+            .flat_map(|one| corners.iter().map(|two| one.x.distance(two.x)))
+            .fold(0.0, f64::max);
+        let stiff =
+            corners.iter().map(|corner| least_stretch(corner.slope)).fold(f64::INFINITY, f64::min);
+        let straight = most <= 0.2 * stiff * size
+            && corners
+                .windows(2)
+                .all(|pair| pair[0].slope.determinant() * pair[1].slope.determinant() > 0.0);
         let finest = [b - a == 1, outer - inner == 1];
         let split = [across >= 0.5 * along && !finest[0], along >= 0.5 * across && !finest[1]];
-        let split = if split == [false, false] && most > 0.0 { [!finest[0], !finest[1]] } else { split };
+        let split =
+            if split == [false, false] && most > 0.0 { [!finest[0], !finest[1]] } else { split };
         if straight || split == [false, false] || self.nodes.len() >= budget {
-            // At most one zero in a straight cell; in one that cannot be cut any more, what Newton's method makes of it.
+            // At most one zero in a straight cell; in one that cannot be cut any more, what
+            // Newton's method makes of it.
             corners.sort_by(|a, b| a.g.length().total_cmp(&b.g.length()));
             let starts = if straight { 1 } else { corners.len() };
             for corner in corners.iter().take(starts) {
@@ -330,22 +389,35 @@ impl<'s, 'a> Map<'s, 'a> {
             }
             return Vec::new();
         }
-        let halves = |[low, high]: [u32; 2], cut: bool| if cut { vec![[low, (low + high) / 2], [(low + high) / 2, high]] } else { vec![[low, high]] };
+        let halves = |[low, high]: [u32; 2], cut: bool| {
+            if cut {
+                vec![[low, (low + high) / 2], [(low + high) / 2, high]]
+            } else {
+                vec![[low, high]]
+            }
+        };
         let rings = halves(cell.rings, split[1]);
-        halves(cell.rays, split[0]).into_iter().flat_map(|rays| rings.iter().map(move |&rings| Cell { rays, rings })).collect()
+        halves(cell.rays, split[0])
+            .into_iter()
+            .flat_map(|rays| rings.iter().map(move |&rings| Cell { rays, rings }))
+            .collect()
     }
 
     /// Turns of `g` along a ring; `None` where that cannot be told.
     fn winding(&mut self, ring: u32) -> Option<i32> {
         let whole = 1 << HALVINGS;
         let mut turned = 0.0;
-        let mut arcs: Vec<[u32; 2]> = (0..self.pieces.len() as u32).map(|piece| [piece * whole, (piece + 1) * whole]).collect();
+        let mut arcs: Vec<[u32; 2]> = (0..self.pieces.len() as u32)
+            .map(|piece| [piece * whole, (piece + 1) * whole])
+            .collect();
         while let Some([from, to]) = arcs.pop() {
             let one = self.node(from, ring, None)?;
             let two = self.node(to, ring, Some(&one))?;
             let turn = one.g.angle_to(two.g);
             let step = two.x - one.x;
-            let bent = (two.g - one.g - one.slope * step).length().max((two.g - one.g - two.slope * step).length());
+            let bent = (two.g - one.g - one.slope * step)
+                .length()
+                .max((two.g - one.g - two.slope * step).length());
             let short = turn.abs() < 1.0 || bent < 0.5 * one.g.length().min(two.g.length());
             if short && turn.abs() < 3.0 {
                 turned += turn;
@@ -366,7 +438,8 @@ fn distance_from_zero(corners: &[Node]) -> f64 {
     for i in 0..g.len() {
         for j in 0..i {
             let edge = g[j] - g[i];
-            let t = (-g[i].dot(edge) / edge.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            let t =
+                (-g[i].dot(edge) / edge.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
             least = least.min((g[i] + t * edge).length());
             for k in 0..j {
                 let turns = [g[i].perp_dot(g[j]), g[j].perp_dot(g[k]), g[k].perp_dot(g[i])];
@@ -381,7 +454,10 @@ fn distance_from_zero(corners: &[Node]) -> f64 {
 
 /// The smaller singular value.
 fn least_stretch(matrix: DMat2) -> f64 {
-    let (sum, product) = (matrix.x_axis.length_squared() + matrix.y_axis.length_squared(), matrix.determinant().abs());
+    let (sum, product) = (
+        matrix.x_axis.length_squared() + matrix.y_axis.length_squared(),
+        matrix.determinant().abs(),
+    );
     let large = (sum / 2.0 + ((sum / 2.0).powi(2) - product * product).max(0.0).sqrt()).sqrt();
     product / large.max(f64::MIN_POSITIVE)
 }

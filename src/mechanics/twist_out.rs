@@ -1,11 +1,14 @@
-//! Twisting out of the grip about an axis in the pad plane: the levers of the two contact areas, the terms `Delta_d` and
-//! `alpha` of the grip evaluation functions, and the margin against twist-out under a load.
+//! Twisting out of the grip about an axis in the pad plane: the levers of the two contact areas,
+//! the terms `Delta_d` and `alpha` of the grip evaluation functions, and the margin against
+//! twist-out under a load.
 //!
-//! `w(e)` is how far the two pressure resultants can be apart along the direction `e` of the pad plane: the support
-//! function of the Minkowski sum `conv A_I (+) (-conv A_II)`. A part that sits tilted by `phi` between flat jaws holds
-//! them `d cos phi + w sin phi` apart, and the jaws' force rights it with the couple `N (w cos phi - d sin phi)`, up to
-//! the barrier `tan phi = w/d`. `Delta_d` is the height of that well, `alpha` its half-width, both in the weakest
-//! direction. They read the two measures that the paper takes from its reference [4] (Wolter, Volz and Woo, 1984).
+//! `w(e)` is how far the two pressure resultants can be apart along the direction `e` of the pad
+//! plane: the support function of the Minkowski sum `conv A_I (+) (-conv A_II)`. A part that sits
+//! tilted by `phi` between flat jaws holds them `d cos phi + w sin phi` apart, and the jaws' force
+//! rights it with the couple `N (w cos phi - d sin phi)`, up to the barrier `tan phi = w/d`.
+//! `Delta_d` is the height of that well, `alpha` its half-width, both in the weakest direction.
+//! They read the two measures that the paper takes from its reference [4] (Wolter, Volz and Woo,
+//! 1984).
 
 use glam::DVec2;
 
@@ -26,20 +29,30 @@ pub struct TwistOut {
 pub struct Lever {
     /// `w_min` [m]; negative when no pressure on the areas can balance the jaws.
     pub width: f64,
-    /// Direction in the pad plane in which the resultants are displaced; the part twists out about the axis across it.
+    /// Direction in the pad plane in which the resultants are displaced; the part twists out about
+    /// the axis across it.
     pub direction: DVec2,
 }
 
 impl TwistOut {
-    /// Hulls of both areas. An area without a hull of positive area counts as no contact: see [`TwistOut::least_lever`].
+    /// Hulls of both areas. An area without a hull of positive area counts as no contact: see
+    /// [`TwistOut::least_lever`].
     pub fn new(contact: &Contact) -> Self {
-        let hull = |patch: &[crate::model::Polygon]| convex_hull(&patch.iter().flat_map(|polygon| polygon.outer.iter().copied()).collect::<Vec<_>>());
+        let hull = |patch: &[crate::model::Polygon]| {
+            convex_hull(
+                &patch.iter().flat_map(|polygon| polygon.outer.iter().copied()).collect::<Vec<_>>(),
+            )
+        };
         let (hull_i, hull_ii) = (hull(&contact.face_i), hull(&contact.face_ii));
         let mut normals = Vec::with_capacity(hull_i.len() + hull_ii.len());
         if hull_i.len() >= 3 && hull_ii.len() >= 3 {
             for (hull, sense) in [(&hull_i, 1.0), (&hull_ii, -1.0)] {
                 let edges = hull.iter().zip(hull.iter().cycle().skip(1));
-                normals.extend(edges.filter_map(|(&a, &b)| (b - a).try_normalize()).map(|t| sense * DVec2::new(t.y, -t.x)));
+                normals.extend(
+                    edges
+                        .filter_map(|(&a, &b)| (b - a).try_normalize())
+                        .map(|t| sense * DVec2::new(t.y, -t.x)),
+                );
             }
         }
         Self { hull_i, hull_ii, normals }
@@ -50,29 +63,32 @@ impl TwistOut {
         self.limit_moment(e, 1.0, 1.0)
     }
 
-    /// `N_I h_I(e) + N_II h_II(-e)` [N m]: the largest component along `e` of `int_I p x dA - int_II p x dA` that pads
-    /// with the normal forces `n_i` and `n_ii` [N] can take.
+    /// `N_I h_I(e) + N_II h_II(-e)` [N m]: the largest component along `e` of `int_I p x dA -
+    /// int_II p x dA` that pads with the normal forces `n_i` and `n_ii` [N] can take.
     pub fn limit_moment(&self, e: DVec2, n_i: f64, n_ii: f64) -> f64 {
         n_i * support(&self.hull_i, e) + n_ii * support(&self.hull_ii, -e)
     }
 
-    /// `w_min`: the least of `w(e)` over the edges of the Minkowski sum's hull, which is its minimum over all directions
-    /// wherever it is positive. `None` without contact on both faces.
+    /// `w_min`: the least of `w(e)` over the edges of the Minkowski sum's hull, which is its
+    /// minimum over all directions wherever it is positive. `None` without contact on both faces.
     pub fn least_lever(&self) -> Option<Lever> {
-        let levers = self.normals.iter().map(|&direction| Lever { width: self.lever(direction), direction });
+        let levers =
+            self.normals.iter().map(|&direction| Lever { width: self.lever(direction), direction });
         levers.min_by(|a, b| a.width.total_cmp(&b.width))
     }
 
-    /// Distance to twist-out under an external wrench in the grip frame: `1 - s` where the load's out-of-plane moment
-    /// times `1/s` is the largest that the contact can take without friction's help; 1 for no such moment, 0 at the
-    /// limit, negative beyond it. Negative infinity without contact or with a pad that carries no normal force.
+    /// Distance to twist-out under an external wrench in the grip frame: `1 - s` where the load's
+    /// out-of-plane moment times `1/s` is the largest that the contact can take without friction's
+    /// help; 1 for no such moment, 0 at the limit, negative beyond it. Negative infinity without
+    /// contact or with a pad that carries no normal force.
     ///
-    /// The pressure has to provide `q = int_I p x - int_II p x = (-M2, M1)`, and all that pads can provide is the convex
-    /// set `N_I conv A_I - N_II conv A_II`. Friction shifts `q` by `mu d/2` times its difference between the faces, which
-    /// is not counted here: a load just beyond the limit may still be held.
+    /// The pressure has to provide `q = int_I p x - int_II p x = (-M2, M1)`, and all that pads can
+    /// provide is the convex set `N_I conv A_I - N_II conv A_II`. Friction shifts `q` by `mu d/2`
+    /// times its difference between the faces, which is not counted here: a load just beyond the
+    /// limit may still be held.
     ///
-    /// DEVIATION: the limit is that along `q` itself. `w(q/|q|)` bounds it from above and equals it only where a corner
-    /// of the set lies on `q`'s ray or an edge across it.
+    /// DEVIATION: the limit is that along `q` itself. `w(q/|q|)` bounds it from above and equals it
+    /// only where a corner of the set lies on `q`'s ray or an edge across it.
     pub fn margin(&self, grip_force: f64, load: &Wrench) -> f64 {
         let (n_i, n_ii) = (grip_force + load.force.z / 2.0, grip_force - load.force.z / 2.0);
         if !(n_i > 0.0 && n_ii > 0.0) || self.normals.is_empty() {
@@ -82,16 +98,20 @@ impl TwistOut {
         let room = |normal: &DVec2| {
             let limit = self.limit_moment(*normal, n_i, n_ii);
             let left = limit - q.dot(*normal);
-            // With the areas apart, a limit can be negative: then only a moment the right way makes room.
+            // With the areas apart, a limit can be negative: then only a moment the right way makes
+            // room.
             if limit == 0.0 { left * f64::INFINITY } else { left / limit.abs() }
         };
-        self.normals.iter().map(room).fold(f64::INFINITY, |least, room| if room.is_nan() { 0.0 } else { least.min(room) })
+        self.normals
+            .iter()
+            .map(room)
+            .fold(f64::INFINITY, |least, room| if room.is_nan() { 0.0 } else { least.min(room) })
     }
 }
 
-/// `Delta_d = sqrt(d^2 + w^2) - d` [m]: how far the jaws must be forced open to twist the part out, for faces `d` apart
-/// and the least lever `w`. Zero for a lever that is not positive. For a grip from inside (`d` negative) it is how far
-/// the jaws must be pressed together.
+/// `Delta_d = sqrt(d^2 + w^2) - d` [m]: how far the jaws must be forced open to twist the part out,
+/// for faces `d` apart and the least lever `w`. Zero for a lever that is not positive. For a grip
+/// from inside (`d` negative) it is how far the jaws must be pressed together.
 pub fn delta_d(d: f64, w: f64) -> f64 {
     match (w <= 0.0, d < 0.0) {
         (true, _) => 0.0,
@@ -101,8 +121,9 @@ pub fn delta_d(d: f64, w: f64) -> f64 {
     }
 }
 
-/// `alpha = max(0, atan((w - 2 delta)/d) - atan mu_c)` [rad]: the tilt up to which closing jaws right the part.
-/// `delta`: uncertainty of the part's position along the pads [m]; `mu_c`: friction of the pads while closing.
+/// `alpha = max(0, atan((w - 2 delta)/d) - atan mu_c)` [rad]: the tilt up to which closing jaws
+/// right the part. `delta`: uncertainty of the part's position along the pads [m]; `mu_c`: friction
+/// of the pads while closing.
 pub fn alpha(d: f64, w: f64, delta: f64, mu_c: f64) -> f64 {
     ((w - 2.0 * delta).atan2(d) - mu_c.atan()).max(0.0)
 }
@@ -116,7 +137,10 @@ mod tests {
 
     fn rectangle(x: f64, y: f64, a: f64, b: f64) -> Vec<Polygon> {
         let corner = |i: f64, j: f64| DVec2::new(x + i * a / 2.0, y + j * b / 2.0);
-        vec![Polygon { outer: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], holes: vec![] }]
+        vec![Polygon {
+            outer: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
+            holes: vec![],
+        }]
     }
 
     fn pair(face_i: Vec<Polygon>, face_ii: Vec<Polygon>) -> TwistOut {
@@ -139,7 +163,11 @@ mod tests {
             (1.0, 0.3, 0.493_941_368_919_581_2, 2f64.sqrt() - 1.0),
             (4.0, 0.3, 0.0, 0.123_105_625_617_660_5),
         ] {
-            assert!((alpha(d, w, 0.0, mu_c) - want_alpha).abs() < 1e-12, "{d} {mu_c}: {}", alpha(d, w, 0.0, mu_c));
+            assert!(
+                (alpha(d, w, 0.0, mu_c) - want_alpha).abs() < 1e-12,
+                "{d} {mu_c}: {}",
+                alpha(d, w, 0.0, mu_c)
+            );
             assert!((delta_d(d, w) - want_delta).abs() < 1e-12, "{d}: {}", delta_d(d, w));
         }
         // The position uncertainty eats the lever from both sides.
@@ -148,14 +176,19 @@ mod tests {
         // Far thinner than wide, and far wider than thin: no cancellation.
         assert!((delta_d(1e9, 1.0) / 5e-10 - 1.0).abs() < 1e-15);
         // From inside the well starts at -d.
-        assert!((delta_d(-1e9, 1.0) - 2e9).abs() < 1e-6 && (delta_d(-0.75, 1.0) - 2.0).abs() < 1e-15);
+        assert!(
+            (delta_d(-1e9, 1.0) - 2e9).abs() < 1e-6 && (delta_d(-0.75, 1.0) - 2.0).abs() < 1e-15
+        );
     }
 
     #[test]
     fn levers_of_a_rectangle_and_of_shifted_areas() {
         let bars = pair(rectangle(0.0, 0.0, 3.0, 1.0), rectangle(0.0, 0.0, 3.0, 1.0));
         let lever = bars.least_lever().unwrap();
-        assert_eq!((lever.width, lever.direction.x.abs(), lever.direction.y.abs()), (1.0, 0.0, 1.0));
+        assert_eq!(
+            (lever.width, lever.direction.x.abs(), lever.direction.y.abs()),
+            (1.0, 0.0, 1.0)
+        );
         let shifted = pair(rectangle(0.75, 0.0, 1.0, 1.0), rectangle(0.0, 0.0, 1.0, 1.0));
         assert_eq!(shifted.least_lever().unwrap().width, 0.25);
         let apart = pair(rectangle(5.0, 0.0, 1.0, 1.0), rectangle(0.0, 0.0, 1.0, 1.0));
@@ -167,10 +200,17 @@ mod tests {
 
     #[test]
     fn the_least_lever_is_the_least_over_all_directions() {
-        let triangle = vec![Polygon { outer: vec![DVec2::new(-0.4, -0.3), DVec2::new(0.9, -0.1), DVec2::new(-0.2, 0.8)], holes: vec![] }];
+        let triangle = vec![Polygon {
+            outer: vec![DVec2::new(-0.4, -0.3), DVec2::new(0.9, -0.1), DVec2::new(-0.2, 0.8)],
+            holes: vec![],
+        }];
         let both = pair(triangle, rectangle(0.1, 0.2, 1.3, 0.6));
         let least = both.least_lever().unwrap().width;
-        let scan = (0..36_000).map(|i| both.lever(DVec2::from_angle(f64::from(i) * 1e-2 * std::f64::consts::PI / 180.0))).fold(f64::INFINITY, f64::min);
+        let scan = (0..36_000)
+            .map(|i| {
+                both.lever(DVec2::from_angle(f64::from(i) * 1e-2 * std::f64::consts::PI / 180.0))
+            })
+            .fold(f64::INFINITY, f64::min);
         assert!(least <= scan && scan < least + 1e-3, "{least} {scan}");
     }
 
@@ -178,17 +218,28 @@ mod tests {
     fn margin_counts_down_to_the_limit_of_a_square() {
         // Side s, gripping force Fn: no contact beyond |M1| = Fn s.
         let squares = pair(rectangle(0.0, 0.0, 0.02, 0.02), rectangle(0.0, 0.0, 0.02, 0.02));
-        for (m1, m2, want) in [(0.0, 0.0, 1.0), (0.6, 0.0, 0.4), (-0.99, 0.0, 0.01), (0.0, 1.1, -0.1), (0.45, -0.4, 0.55)] {
+        for (m1, m2, want) in [
+            (0.0, 0.0, 1.0),
+            (0.6, 0.0, 0.4),
+            (-0.99, 0.0, 0.01),
+            (0.0, 1.1, -0.1),
+            (0.45, -0.4, 0.55),
+        ] {
             let got = squares.margin(50.0, &load(m1, m2, 0.0));
             assert!((got - want).abs() < 1e-12, "{m1} {m2}: {got}");
         }
         // The normal forces shift with F3 but a square's limit is symmetric.
         assert!((squares.margin(50.0, &load(0.6, 0.0, 50.0)) - 0.4).abs() < 1e-12);
         assert_eq!(squares.margin(50.0, &load(0.0, 0.0, 100.0)), f64::NEG_INFINITY);
-        // Off the axes the limit is that along the moment: a corner of the set, not the support in its direction.
+        // Off the axes the limit is that along the moment: a corner of the set, not the support in
+        // its direction.
         let m = load(0.5, 0.25, 0.0);
         assert!((squares.margin(50.0, &m) - 0.5).abs() < 1e-12);
-        assert!(1.0 - 0.5f64.hypot(0.25) / squares.limit_moment(DVec2::new(-0.25, 0.5).normalize(), 50.0, 50.0) > 0.5);
+        assert!(
+            1.0 - 0.5f64.hypot(0.25)
+                / squares.limit_moment(DVec2::new(-0.25, 0.5).normalize(), 50.0, 50.0)
+                > 0.5
+        );
     }
 
     #[test]

@@ -8,9 +8,16 @@ use super::topology::{NONE, ends, next};
 use crate::geometry::polygon::{ring_area, ring_contains};
 use crate::model::{Frame, Polygon, Ring};
 
-/// Boundary of the region's triangles (`inside` says whether a triangle belongs to it) in the frame's `(x, y)`, points
-/// within `tolerance` [m] of the line between their neighbours left out.
-pub(super) fn polygons(mesh: &Mesh, twin: &[u32], region: &[u32], inside: impl Fn(u32) -> bool, frame: &Frame, tolerance: f64) -> Vec<Polygon> {
+/// Boundary of the region's triangles (`inside` says whether a triangle belongs to it) in the
+/// frame's `(x, y)`, points within `tolerance` [m] of the line between their neighbours left out.
+pub(super) fn polygons(
+    mesh: &Mesh,
+    twin: &[u32],
+    region: &[u32],
+    inside: impl Fn(u32) -> bool,
+    frame: &Frame,
+    tolerance: f64,
+) -> Vec<Polygon> {
     let on_boundary = |half: u32| {
         let twin = twin[half as usize];
         twin == NONE || !inside(twin / 3)
@@ -39,14 +46,16 @@ pub(super) fn polygons(mesh: &Mesh, twin: &[u32], region: &[u32], inside: impl F
                 _ => break,
             }
             chain.push(ends(&mesh.triangles, half).0);
-            // Turn about the end vertex through the region's own triangles to the next boundary half-edge: where the
-            // region touches itself at a vertex this keeps to one side.
+            // Turn about the end vertex through the region's own triangles to the next boundary
+            // half-edge: where the region touches itself at a vertex this keeps to one side.
             half = next(half);
             while !on_boundary(half) {
                 half = next(twin[half as usize]);
             }
         }
-        split_at_repeated(&chain, |ring| rings.push(simplify(&flatten(mesh, frame, ring), tolerance)));
+        split_at_repeated(&chain, |ring| {
+            rings.push(simplify(&flatten(mesh, frame, ring), tolerance))
+        });
     }
     assemble(rings)
 }
@@ -74,24 +83,35 @@ fn split_at_repeated(chain: &[u32], mut emit: impl FnMut(&[u32])) {
     emit(&stack);
 }
 
-/// Leaves out points that lie within `tolerance` of the line between their kept neighbours (Douglas and Peucker's
-/// method, then a pass that drops what it kept on straight stretches). Empty when nothing with an area is left.
+/// Leaves out points that lie within `tolerance` of the line between their kept neighbours (Douglas
+/// and Peucker's method, then a pass that drops what it kept on straight stretches). Empty when
+/// nothing with an area is left.
 fn simplify(ring: &[DVec2], tolerance: f64) -> Ring {
     if ring.len() < 3 {
         return Ring::new();
     }
-    // The farthest point from any point is a corner of the convex hull; so is the farthest point from that.
-    let farthest = |from: DVec2| (0..ring.len()).max_by(|&a, &b| ring[a].distance_squared(from).total_cmp(&ring[b].distance_squared(from))).unwrap_or(0);
+    // The farthest point from any point is a corner of the convex hull; so is the farthest point
+    // from that.
+    let farthest = |from: DVec2| {
+        (0..ring.len())
+            .max_by(|&a, &b| {
+                ring[a].distance_squared(from).total_cmp(&ring[b].distance_squared(from))
+            })
+            .unwrap_or(0)
+    };
     let first = farthest(ring[0]);
     let second = farthest(ring[first]);
     let mut keep = vec![false; ring.len()];
     keep[first] = true;
     keep[second] = true;
     let count = ring.len();
-    let mut stack = vec![(first, (second + count - first) % count), (second, (first + count - second) % count)];
+    let mut stack =
+        vec![(first, (second + count - first) % count), (second, (first + count - second) % count)];
     while let Some((from, length)) = stack.pop() {
         let (a, b) = (ring[from], ring[(from + length) % count]);
-        let worst = (1..length).map(|step| (distance_to_segment(ring[(from + step) % count], a, b), step)).max_by(|x, y| x.0.total_cmp(&y.0));
+        let worst = (1..length)
+            .map(|step| (distance_to_segment(ring[(from + step) % count], a, b), step))
+            .max_by(|x, y| x.0.total_cmp(&y.0));
         if let Some((distance, step)) = worst
             && distance > tolerance
         {
@@ -100,13 +120,15 @@ fn simplify(ring: &[DVec2], tolerance: f64) -> Ring {
             stack.push(((from + step) % count, length - step));
         }
     }
-    let mut points: Ring = ring.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(&point, _)| point).collect();
+    let mut points: Ring =
+        ring.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(&point, _)| point).collect();
     let mut index = 0;
     let mut unchanged = 0;
     while points.len() > 2 && unchanged < points.len() {
         let count = points.len();
         index %= count;
-        let (a, b, c) = (points[(index + count - 1) % count], points[index], points[(index + 1) % count]);
+        let (a, b, c) =
+            (points[(index + count - 1) % count], points[index], points[(index + 1) % count]);
         if distance_to_segment(b, a, c) <= tolerance {
             points.remove(index);
             unchanged = 0;
@@ -140,9 +162,13 @@ fn assemble(rings: Vec<Ring>) -> Vec<Polygon> {
         }
     }
     outers.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut polygons: Vec<Polygon> = outers.into_iter().map(|(_, outer)| Polygon { outer, holes: Vec::new() }).collect();
+    let mut polygons: Vec<Polygon> =
+        outers.into_iter().map(|(_, outer)| Polygon { outer, holes: Vec::new() }).collect();
     for hole in holes {
-        let owner = polygons.iter().position(|polygon| encloses(&polygon.outer, &hole)).or(polygons.len().checked_sub(1));
+        let owner = polygons
+            .iter()
+            .position(|polygon| encloses(&polygon.outer, &hole))
+            .or(polygons.len().checked_sub(1));
         if let Some(owner) = owner {
             polygons[owner].holes.push(hole);
         }

@@ -1,5 +1,5 @@
-//! Closing what is open only because corners that should be one differ a little, or because a vertex lies on a
-//! neighbour's edge (T-junction). Only vertices and edges at openings are touched.
+//! Closing what is open only because corners that should be one differ a little, or because a
+//! vertex lies on a neighbour's edge (T-junction). Only vertices and edges at openings are touched.
 
 use glam::DVec3;
 use parry3d_f64::bounding_volume::Aabb;
@@ -23,8 +23,8 @@ fn open_vertices(mesh: &Mesh, open: &[u32]) -> Vec<u32> {
     vertices
 }
 
-/// Joins vertices of open edges that lie within `tolerance` [m] of each other. Returns how many vertices went; triangles
-/// that lose their area by it go too.
+/// Joins vertices of open edges that lie within `tolerance` [m] of each other. Returns how many
+/// vertices went; triangles that lose their area by it go too.
 pub(super) fn join_vertices(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usize {
     let cell = |point: DVec3| (point / tolerance).floor().to_array().map(|x| x as i64);
     let mut cells: FxHashMap<[i64; 3], Vec<u32>> = FxHashMap::default();
@@ -56,8 +56,8 @@ pub(super) fn join_vertices(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> u
     joined.len()
 }
 
-/// Cuts open edges at the open vertices that lie on them within `tolerance` [m]. Returns how many edges were cut. A
-/// triangle with several such edges has one cut at a call.
+/// Cuts open edges at the open vertices that lie on them within `tolerance` [m]. Returns how many
+/// edges were cut. A triangle with several such edges has one cut at a call.
 pub(super) fn split_edges(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usize {
     let spans: Vec<(DVec3, DVec3)> = edges
         .open
@@ -67,7 +67,8 @@ pub(super) fn split_edges(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usi
             (mesh.vertices[from as usize], mesh.vertices[to as usize])
         })
         .collect();
-    let boxes: Vec<Aabb> = spans.iter().map(|&(a, b)| Aabb::new(a.min(b) - tolerance, a.max(b) + tolerance)).collect();
+    let boxes: Vec<Aabb> =
+        spans.iter().map(|&(a, b)| Aabb::new(a.min(b) - tolerance, a.max(b) + tolerance)).collect();
     let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
     let mut cuts: FxHashMap<u32, Vec<(f64, u32)>> = FxHashMap::default(); // half-edge -> (place along it, vertex)
     for vertex in open_vertices(mesh, &edges.open) {
@@ -81,7 +82,10 @@ pub(super) fn split_edges(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usi
             let (a, b) = spans[leaf as usize];
             let along = (b - a).normalize_or_zero();
             let place = (point - a).dot(along);
-            if place > tolerance && place < a.distance(b) - tolerance && point.distance(a + place * along) <= tolerance {
+            if place > tolerance
+                && place < a.distance(b) - tolerance
+                && point.distance(a + place * along) <= tolerance
+            {
                 cuts.entry(half).or_default().push((place, vertex));
             }
         }
@@ -100,8 +104,10 @@ pub(super) fn split_edges(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usi
         places.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let corners = mesh.triangles[triangle as usize];
         let corner = (half % 3) as usize;
-        let (from, to, apex) = (corners[corner], corners[(corner + 1) % 3], corners[(corner + 2) % 3]);
-        let mut stops: Vec<u32> = places.into_iter().map(|(_, vertex)| vertex).filter(|&vertex| vertex != apex).collect();
+        let (from, to, apex) =
+            (corners[corner], corners[(corner + 1) % 3], corners[(corner + 2) % 3]);
+        let mut stops: Vec<u32> =
+            places.into_iter().map(|(_, vertex)| vertex).filter(|&vertex| vertex != apex).collect();
         stops.dedup();
         if stops.is_empty() {
             continue;
@@ -114,8 +120,8 @@ pub(super) fn split_edges(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usi
     count
 }
 
-/// Removes triangles narrower than `tolerance` [m] that have an open or tangled edge: needles laid along an edge. Returns how
-/// many went.
+/// Removes triangles narrower than `tolerance` [m] that have an open or tangled edge: needles laid
+/// along an edge. Returns how many went.
 pub(super) fn remove_needles(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usize {
     let mut tangled = std::collections::BTreeSet::new();
     for &half in &edges.tangled {
@@ -131,8 +137,15 @@ pub(super) fn remove_needles(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> 
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
         (b - a).cross(c - a).length() <= tolerance * longest
     };
-    let on_tangled = |[a, b, c]: [u32; 3]| [(a, b), (b, c), (c, a)].iter().any(|&(a, b)| tangled.contains(&(a.min(b), a.max(b))));
-    let keep: Vec<bool> = mesh.triangles.iter().zip(&open).map(|(&triangle, &open)| !((open || on_tangled(triangle)) && narrow(triangle))).collect();
+    let on_tangled = |[a, b, c]: [u32; 3]| {
+        [(a, b), (b, c), (c, a)].iter().any(|&(a, b)| tangled.contains(&(a.min(b), a.max(b))))
+    };
+    let keep: Vec<bool> = mesh
+        .triangles
+        .iter()
+        .zip(&open)
+        .map(|(&triangle, &open)| !((open || on_tangled(triangle)) && narrow(triangle)))
+        .collect();
     let before = mesh.triangles.len();
     let mut keep = keep.into_iter();
     mesh.triangles.retain(|_| keep.next().unwrap_or(true));

@@ -1,4 +1,5 @@
-//! A drawing of a part: three views with its planar faces numbered, coloured by how jaws can grip them.
+//! A drawing of a part: three views with its planar faces numbered, coloured by how jaws can grip
+//! them.
 
 use std::fmt::Write;
 
@@ -31,7 +32,12 @@ struct View {
 
 const VIEWS: [View; 3] = [
     View { name: "front (x to the right, z up)", right: DVec3::X, up: DVec3::Z, eye: DVec3::NEG_Y },
-    View { name: "right side (y to the right, z up)", right: DVec3::Y, up: DVec3::Z, eye: DVec3::X },
+    View {
+        name: "right side (y to the right, z up)",
+        right: DVec3::Y,
+        up: DVec3::Z,
+        eye: DVec3::X,
+    },
     View { name: "top (x to the right, y up)", right: DVec3::X, up: DVec3::Y, eye: DVec3::Z },
 ];
 
@@ -43,7 +49,8 @@ struct Shape {
     face: Option<usize>,
 }
 
-/// The drawing as a complete SVG document: front, right side and top, equally scaled; lengths in its text are millimetres.
+/// The drawing as a complete SVG document: front, right side and top, equally scaled; lengths in
+/// its text are millimetres.
 pub fn svg(part: &Part) -> String {
     let (low, high) = part.mesh.bounding_box();
     let size = high - low;
@@ -70,16 +77,32 @@ pub fn svg(part: &Part) -> String {
         let flat = |point: DVec3| DVec2::new(view.right.dot(point), view.up.dot(point));
         let corner = flat(low).min(flat(high));
         let extent = (flat(high) - flat(low)).abs();
-        let place = |point: DVec2| DVec2::new(left + (point.x - corner.x) * scale, 1.8 * MARGIN + (corner.y + extent.y - point.y) * scale);
+        let place = |point: DVec2| {
+            DVec2::new(
+                left + (point.x - corner.x) * scale,
+                1.8 * MARGIN + (corner.y + extent.y - point.y) * scale,
+            )
+        };
         let (shapes, skipped) = shapes(part, view, &class);
         left_out += skipped;
-        let _ = writeln!(text, "<g><text x=\"{left:.1}\" y=\"{:.1}\" fill=\"#456\">{}</text>", 1.8 * MARGIN - 14.0, view.name);
+        let _ = writeln!(
+            text,
+            "<g><text x=\"{left:.1}\" y=\"{:.1}\" fill=\"#456\">{}</text>",
+            1.8 * MARGIN - 14.0,
+            view.name
+        );
         for shape in &shapes {
             let mut path = String::new();
             for ring in shape.polygons.iter().flat_map(rings) {
                 for (index, &point) in ring.iter().enumerate() {
                     let point = place(point);
-                    let _ = write!(path, "{}{:.1} {:.1}", if index == 0 { "M" } else { "L" }, point.x, point.y);
+                    let _ = write!(
+                        path,
+                        "{}{:.1} {:.1}",
+                        if index == 0 { "M" } else { "L" },
+                        point.x,
+                        point.y
+                    );
                 }
                 path.push('Z');
             }
@@ -87,19 +110,37 @@ pub fn svg(part: &Part) -> String {
         }
         for (number, at) in numbers(part, view, &shapes) {
             let at = place(at);
-            let _ = writeln!(text, "<text class=\"number\" x=\"{:.1}\" y=\"{:.1}\">{number}</text>", at.x, at.y);
+            let _ = writeln!(
+                text,
+                "<text class=\"number\" x=\"{:.1}\" y=\"{:.1}\">{number}</text>",
+                at.x, at.y
+            );
         }
         text.push_str("</g>\n");
         left += extent.x * scale + MARGIN;
     }
     let mut x = MARGIN;
-    for (class, meaning) in [("outside", "gripped from outside"), ("inside", "from inside"), ("both", "either"), ("none", "no opposite face")] {
+    for (class, meaning) in [
+        ("outside", "gripped from outside"),
+        ("inside", "from inside"),
+        ("both", "either"),
+        ("none", "no opposite face"),
+    ] {
         let y = height - 22.0;
-        let _ = writeln!(text, "<path class=\"{class}\" d=\"M{x:.0} {y:.0}h12v12h-12Z\"/><text x=\"{:.0}\" y=\"{:.0}\">{meaning}</text>", x + 18.0, y + 10.0);
+        let _ = writeln!(
+            text,
+            "<path class=\"{class}\" d=\"M{x:.0} {y:.0}h12v12h-12Z\"/><text x=\"{:.0}\" y=\"{:.0}\">{meaning}</text>",
+            x + 18.0,
+            y + 10.0
+        );
         x += 34.0 + 6.6 * meaning.len() as f64;
     }
     if left_out > 0 {
-        let _ = writeln!(text, "<text x=\"{x:.0}\" y=\"{:.0}\" fill=\"#456\">{left_out} triangles of curved surfaces not drawn</text>", height - 12.0);
+        let _ = writeln!(
+            text,
+            "<text x=\"{x:.0}\" y=\"{:.0}\" fill=\"#456\">{left_out} triangles of curved surfaces not drawn</text>",
+            height - 12.0
+        );
     }
     text.push_str("</svg>\n");
     text
@@ -108,7 +149,9 @@ pub fn svg(part: &Part) -> String {
 /// How each face can be gripped.
 fn classes(part: &Part) -> Vec<&'static str> {
     let mut gripped = vec![[false; 2]; part.faces.len()];
-    for (side, pairs) in [part.pairs(0.0, f64::INFINITY), part.internal_pairs(0.0, f64::INFINITY)].iter().enumerate() {
+    for (side, pairs) in
+        [part.pairs(0.0, f64::INFINITY), part.internal_pairs(0.0, f64::INFINITY)].iter().enumerate()
+    {
         for face in pairs.iter().flat_map(|pair| [pair.face_i, pair.face_ii]) {
             gripped[face as usize][side] = true;
         }
@@ -145,12 +188,19 @@ fn shapes(part: &Part, view: &View, class: &[&'static str]) -> (Vec<Shape>, usiz
         });
     }
     let mut curved: Vec<Shape> = Vec::new();
-    for triangle in (0..part.mesh.triangles.len() as u32).filter(|&triangle| !planar[triangle as usize]) {
+    for triangle in
+        (0..part.mesh.triangles.len() as u32).filter(|&triangle| !planar[triangle as usize])
+    {
         let [a, b, c] = part.mesh.corners(triangle);
         let normal = (b - a).cross(c - a).normalize_or_zero();
         if normal.dot(view.eye) >= EDGE_ON {
             let outer = [a, b, c].map(flat).to_vec();
-            curved.push(Shape { depth: (a + b + c).dot(view.eye) / 3.0, class: "curved", polygons: vec![Polygon { outer, holes: Vec::new() }], face: None });
+            curved.push(Shape {
+                depth: (a + b + c).dot(view.eye) / 3.0,
+                class: "curved",
+                polygons: vec![Polygon { outer, holes: Vec::new() }],
+                face: None,
+            });
         }
     }
     let left_out = if curved.len() > MOST_CURVED { curved.len() } else { 0 };
@@ -168,8 +218,14 @@ fn numbers(part: &Part, view: &View, shapes: &[Shape]) -> Vec<(u32, DVec2)> {
         let on_picture = view.right * point.x + view.up * point.y;
         (face.offset - face.normal.dot(on_picture)) / face.normal.dot(view.eye)
     };
-    let boxes: Vec<Bounds2> =
-        shapes.iter().map(|shape| Bounds2::of(&shape.polygons.iter().flat_map(|p| p.outer.iter().copied()).collect::<Vec<_>>())).collect();
+    let boxes: Vec<Bounds2> = shapes
+        .iter()
+        .map(|shape| {
+            Bounds2::of(
+                &shape.polygons.iter().flat_map(|p| p.outer.iter().copied()).collect::<Vec<_>>(),
+            )
+        })
+        .collect();
     let mut found = Vec::new();
     for (index, shape) in shapes.iter().enumerate() {
         let Some(face) = shape.face.map(|face| &part.faces[face]) else { continue };
@@ -182,19 +238,35 @@ fn numbers(part: &Part, view: &View, shapes: &[Shape]) -> Vec<(u32, DVec2)> {
                     Some(cover) => height(&part.faces[cover], point) > height(face, point) + 1e-9,
                     None => cover.depth > height(face, point),
                 };
-                other != index && in_front && point.clamp(boxes[other].min, boxes[other].max) == point && cover.polygons.iter().any(|p| contains(p, point))
+                other != index
+                    && in_front
+                    && point.clamp(boxes[other].min, boxes[other].max) == point
+                    && cover.polygons.iter().any(|p| contains(p, point))
             })
         };
         let size = boxes[index].size();
-        let tries = (0..TRIES * TRIES).map(|k| boxes[index].min + size * DVec2::new((k % TRIES) as f64 + 0.5, (k / TRIES) as f64 + 0.5) / TRIES as f64);
+        let tries = (0..TRIES * TRIES).map(|k| {
+            boxes[index].min
+                + size * DVec2::new((k % TRIES) as f64 + 0.5, (k / TRIES) as f64 + 0.5)
+                    / TRIES as f64
+        });
         let room = |point: DVec2| {
-            let edges = shape.polygons.iter().flat_map(rings).flat_map(|ring| ring.iter().zip(ring.iter().cycle().skip(1)));
+            let edges = shape
+                .polygons
+                .iter()
+                .flat_map(rings)
+                .flat_map(|ring| ring.iter().zip(ring.iter().cycle().skip(1)));
             edges
-                .map(|(&a, &b)| a + (b - a) * ((point - a).dot(b - a) / (b - a).length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0))
+                .map(|(&a, &b)| {
+                    a + (b - a)
+                        * ((point - a).dot(b - a) / (b - a).length_squared().max(f64::MIN_POSITIVE))
+                            .clamp(0.0, 1.0)
+                })
                 .map(|on_edge| on_edge.distance(point))
                 .fold(f64::INFINITY, f64::min)
         };
-        let inside = tries.filter(|&point| shape.polygons.iter().any(|polygon| contains(polygon, point)));
+        let inside =
+            tries.filter(|&point| shape.polygons.iter().any(|polygon| contains(polygon, point)));
         let mut places: Vec<(f64, DVec2)> = inside.map(|point| (room(point), point)).collect();
         places.sort_by(|a, b| b.0.total_cmp(&a.0));
         if let Some(&(_, point)) = places.iter().find(|(_, point)| !hidden(*point)) {

@@ -11,17 +11,18 @@ use super::{PlanarFace, boundary};
 use crate::geometry::polygon::{Moments, patch_moments};
 use crate::model::Frame;
 
-/// Distance of a corner from its face's plane, as a share of the part's diagonal: 1 um on 100 mm; the second value is
-/// for meshes that prove rougher.
+/// Distance of a corner from its face's plane, as a share of the part's diagonal: 1 um on 100 mm;
+/// the second value is for meshes that prove rougher.
 const DISTANCE: [f64; 2] = [1e-5, 3e-5];
 /// Uncertainty of a corner as a share of the diagonal, besides that of 32-bit floats; likewise.
 const JITTER: [f64; 2] = [1e-7, 1e-5];
-/// Width (twice area over half perimeter) below which a face is no place for a pad, as a share of the diagonal.
+/// Width (twice area over half perimeter) below which a face is no place for a pad, as a share of
+/// the diagonal.
 const NARROWEST: f64 = 5e-4;
 
-/// All planar faces of the part by falling area; facets of curved surfaces ([`Facets`]) and regions narrower than 5e-4 of
-/// the part's diagonal are left out. Says so in the part's warnings when faces had to be found with wider tolerances, and when noise has
-/// broken planes up.
+/// All planar faces of the part by falling area; facets of curved surfaces ([`Facets`]) and regions
+/// narrower than 5e-4 of the part's diagonal are left out. Says so in the part's warnings when
+/// faces had to be found with wider tolerances, and when noise has broken planes up.
 pub(super) fn planar_faces(part: &mut Repaired) -> Vec<PlanarFace> {
     let [fine, rough] = [0, 1].map(|level| {
         let factor = [1.0, 2.0][level];
@@ -62,12 +63,23 @@ fn outline(part: &Repaired, regions: &Regions, facets: &Facets) -> Vec<PlanarFac
     let tolerance = simplify_tolerance(part);
     let mut faces: Vec<PlanarFace> = Vec::new();
     for (index, region) in regions.all.iter().enumerate() {
-        if facets.is_facet[index] || 4.0 * region.area < NARROWEST * part.diagonal * facets.perimeter[index] {
+        if facets.is_facet[index]
+            || 4.0 * region.area < NARROWEST * part.diagonal * facets.perimeter[index]
+        {
             continue;
         }
         let triangles = regions.triangles(index);
         let mut frame = face_frame(region.plane.normal, region.centre);
-        let rings = |frame: &Frame| boundary::polygons(&part.mesh, &part.edges.twin, triangles, |t| regions.of[t as usize] == index as u32, frame, tolerance);
+        let rings = |frame: &Frame| {
+            boundary::polygons(
+                &part.mesh,
+                &part.edges.twin,
+                triangles,
+                |t| regions.of[t as usize] == index as u32,
+                frame,
+                tolerance,
+            )
+        };
         let mut polygons = rings(&frame);
         let Moments { area, centroid, .. } = patch_moments(&polygons);
         if area <= 0.0 {
@@ -95,10 +107,13 @@ fn outline(part: &Repaired, regions: &Regions, facets: &Facets) -> Vec<PlanarFac
             reachable: part.shells[shell as usize].role == Role::Body,
         });
     }
-    // Areas that agree to 1e-6 count as equal, so that rounding does not decide the order of a part's equal faces.
+    // Areas that agree to 1e-6 count as equal, so that rounding does not decide the order of a
+    // part's equal faces.
     let key = |face: &PlanarFace| (face.area.log2() * 1e5).round() as i64;
     let step = (part.diagonal * 1e-6).max(f64::MIN_POSITIVE);
-    let place = |face: &PlanarFace| [face.centroid.x, face.centroid.y, face.centroid.z].map(|x| (x / step).round() as i64);
+    let place = |face: &PlanarFace| {
+        [face.centroid.x, face.centroid.y, face.centroid.z].map(|x| (x / step).round() as i64)
+    };
     faces.sort_by_cached_key(|face| (std::cmp::Reverse(key(face)), place(face)));
     for (face, id) in faces.iter_mut().zip(0..) {
         face.id = id;
@@ -106,12 +121,14 @@ fn outline(part: &Repaired, regions: &Regions, facets: &Facets) -> Vec<PlanarFac
     faces
 }
 
-/// Collinear points are left out within this distance: the rounding of the coordinates, but never what a pad could feel.
+/// Collinear points are left out within this distance: the rounding of the coordinates, but never
+/// what a pad could feel.
 fn simplify_tolerance(part: &Repaired) -> f64 {
     (4.0 * part.noise).max(1e-8 * part.diagonal)
 }
 
-/// Frame of a face: `z` is the normal, `x` the part axis most nearly in the plane (the first of equals) projected into it.
+/// Frame of a face: `z` is the normal, `x` the part axis most nearly in the plane (the first of
+/// equals) projected into it.
 fn face_frame(normal: DVec3, origin: DVec3) -> Frame {
     let flat = normal.abs();
     // A margin lets rounding not choose between axes that lie equally in the plane.

@@ -24,7 +24,8 @@ pub struct Health {
     pub shells: usize,
     /// Shells that bound a hollow inside of another.
     pub voids: usize,
-    /// Shells of material wholly inside another shell's material; they count neither for volume nor for grips.
+    /// Shells of material wholly inside another shell's material; they count neither for volume nor
+    /// for grips.
     pub embedded: usize,
     /// Edges left with a triangle on one side only.
     pub open_edges: usize,
@@ -40,7 +41,8 @@ pub struct Health {
     pub crossing_shells: usize,
     /// Where two of them do [m].
     pub crossing_at: Option<DVec3>,
-    /// The surface bounds material everywhere: no open edge, windings agree. Otherwise mass properties are estimates.
+    /// The surface bounds material everywhere: no open edge, windings agree. Otherwise mass
+    /// properties are estimates.
     pub watertight: bool,
     /// Things a user should look at, in words.
     pub warnings: Vec<String>,
@@ -50,24 +52,80 @@ impl Health {
     /// The findings in words, one line each, lengths in millimetres. Clean meshes give one line.
     pub fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
-        let place = |at: Option<DVec3>| at.map_or(String::new(), |at| format!(" (the longest at {:.3}, {:.3}, {:.3} mm)", at.x * 1e3, at.y * 1e3, at.z * 1e3));
-        lines.push(if self.watertight { "watertight".to_string() } else { "NOT watertight: volume and centre of mass are estimates".to_string() });
+        let place = |at: Option<DVec3>| {
+            at.map_or(String::new(), |at| {
+                format!(
+                    " (the longest at {:.3}, {:.3}, {:.3} mm)",
+                    at.x * 1e3,
+                    at.y * 1e3,
+                    at.z * 1e3
+                )
+            })
+        };
+        lines.push(if self.watertight {
+            "watertight".to_string()
+        } else {
+            "NOT watertight: volume and centre of mass are estimates".to_string()
+        });
         let mut add = |count: usize, one: &str, many: &str, rest: String| {
             if count > 0 {
                 lines.push(format!("{count} {}{rest}", if count == 1 { one } else { many }));
             }
         };
         add(self.open_edges, "open edge", "open edges", place(self.open_edge_at));
-        add(self.tangled_edges, "edge shared by more than two triangles", "edges shared by more than two triangles", place(self.tangled_edge_at));
-        add(self.one_sided_edges, "edge at which windings cannot agree", "edges at which windings cannot agree", String::new());
-        add(self.degenerate_removed, "triangle without area removed", "triangles without area removed", String::new());
-        add(self.duplicates_removed, "duplicate triangle removed", "duplicate triangles removed", String::new());
-        add(self.vertices_joined, "vertex joined to close cracks", "vertices joined to close cracks", String::new());
-        add(self.edges_split, "edge cut at a T-junction", "edges cut at T-junctions", String::new());
-        add(self.windings_reversed, "triangle winding reversed", "triangle windings reversed", String::new());
-        add(self.shells_reversed, "inside-out shell reversed", "inside-out shells reversed", String::new());
+        add(
+            self.tangled_edges,
+            "edge shared by more than two triangles",
+            "edges shared by more than two triangles",
+            place(self.tangled_edge_at),
+        );
+        add(
+            self.one_sided_edges,
+            "edge at which windings cannot agree",
+            "edges at which windings cannot agree",
+            String::new(),
+        );
+        add(
+            self.degenerate_removed,
+            "triangle without area removed",
+            "triangles without area removed",
+            String::new(),
+        );
+        add(
+            self.duplicates_removed,
+            "duplicate triangle removed",
+            "duplicate triangles removed",
+            String::new(),
+        );
+        add(
+            self.vertices_joined,
+            "vertex joined to close cracks",
+            "vertices joined to close cracks",
+            String::new(),
+        );
+        add(
+            self.edges_split,
+            "edge cut at a T-junction",
+            "edges cut at T-junctions",
+            String::new(),
+        );
+        add(
+            self.windings_reversed,
+            "triangle winding reversed",
+            "triangle windings reversed",
+            String::new(),
+        );
+        add(
+            self.shells_reversed,
+            "inside-out shell reversed",
+            "inside-out shells reversed",
+            String::new(),
+        );
         if self.shells > 1 {
-            lines.push(format!("{} shells, of which {} hollow, {} inside the material of another", self.shells, self.voids, self.embedded));
+            lines.push(format!(
+                "{} shells, of which {} hollow, {} inside the material of another",
+                self.shells, self.voids, self.embedded
+            ));
         }
         if let Some(at) = self.crossing_at {
             let at = at * 1e3;

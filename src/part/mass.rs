@@ -24,7 +24,8 @@ impl Integrals {
         let sum = a + b + c;
         self.six_volume += six;
         self.first += six * sum;
-        // int x_i x_j over (0, a, b, c) = 6V/120 (sum_k v_ki v_kj + s_i s_j), s the sum of the corners.
+        // int x_i x_j over (0, a, b, c) = 6V/120 (sum_k v_ki v_kj + s_i s_j), s the sum of the
+        // corners.
         self.squares += six * (a * a + b * b + c * c + sum * sum);
         let cyclic = |p: DVec3| DVec3::new(p.y * p.z, p.z * p.x, p.x * p.y);
         self.products += six * (cyclic(a) + cyclic(b) + cyclic(c) + cyclic(sum));
@@ -50,12 +51,17 @@ impl Integrals {
         self.six_volume / 6.0
     }
 
-    /// Mass properties at density 1 with the apex at `apex`. Without a positive volume there is no centre of mass:
-    /// the apex stands for it.
+    /// Mass properties at density 1 with the apex at `apex`. Without a positive volume there is no
+    /// centre of mass: the apex stands for it.
     pub(super) fn properties(&self, apex: DVec3) -> MassProperties {
         let volume = self.volume();
         if volume <= 0.0 {
-            return MassProperties { volume, mass: volume, centre_of_mass: apex, inertia: DMat3::ZERO };
+            return MassProperties {
+                volume,
+                mass: volume,
+                centre_of_mass: apex,
+                inertia: DMat3::ZERO,
+            };
         }
         let centre = self.first / (24.0 * volume);
         let cyclic = DVec3::new(centre.y * centre.z, centre.z * centre.x, centre.x * centre.y);
@@ -72,7 +78,11 @@ impl Integrals {
 }
 
 /// Integrals over the given triangles about `apex`.
-pub(super) fn integrate(mesh: &Mesh, triangles: impl Iterator<Item = u32>, apex: DVec3) -> Integrals {
+pub(super) fn integrate(
+    mesh: &Mesh,
+    triangles: impl Iterator<Item = u32>,
+    apex: DVec3,
+) -> Integrals {
     let mut integrals = Integrals::default();
     for triangle in triangles {
         integrals.add(mesh.corners(triangle).map(|corner| corner - apex));
@@ -96,7 +106,19 @@ mod tests {
         near(mass.volume, 3e-5);
         near(mass.mass, 3e-2);
         assert!((mass.centre_of_mass - low - size / 2.0).length() < 1e-13);
-        let expected = DVec3::new(0.03_f64.powi(2) + 0.05_f64.powi(2), 0.02_f64.powi(2) + 0.05_f64.powi(2), 0.02_f64.powi(2) + 0.03_f64.powi(2)) * 3e-2 / 12.0;
-        assert!((mass.inertia - DMat3::from_diagonal(expected)).to_cols_array().iter().all(|&x| x.abs() < 1e-12 * expected.x), "{}", mass.inertia);
+        let expected = DVec3::new(
+            0.03_f64.powi(2) + 0.05_f64.powi(2),
+            0.02_f64.powi(2) + 0.05_f64.powi(2),
+            0.02_f64.powi(2) + 0.03_f64.powi(2),
+        ) * 3e-2
+            / 12.0;
+        assert!(
+            (mass.inertia - DMat3::from_diagonal(expected))
+                .to_cols_array()
+                .iter()
+                .all(|&x| x.abs() < 1e-12 * expected.x),
+            "{}",
+            mass.inertia
+        );
     }
 }

@@ -1,7 +1,8 @@
 //! A part: its mesh read, welded and checked, its mass properties and its planar faces.
 //!
-//! [`Part::read`] does it all: a reader per format gives triangles, [`repair`](health) makes one consistent outward
-//! surface of them and says what it did, and region growing finds the planar faces with exact boundaries.
+//! [`Part::read`] does it all: a reader per format gives triangles, [`repair`](health) makes one
+//! consistent outward surface of them and says what it did, and region growing finds the planar
+//! faces with exact boundaries.
 
 use std::path::{Path, PathBuf};
 
@@ -50,7 +51,9 @@ impl Mesh {
     /// Smallest and largest corner of the bounding box [m]; zeros for an empty mesh.
     pub fn bounding_box(&self) -> (DVec3, DVec3) {
         let Some(&first) = self.vertices.first() else { return (DVec3::ZERO, DVec3::ZERO) };
-        self.vertices.iter().fold((first, first), |(low, high), &vertex| (low.min(vertex), high.max(vertex)))
+        self.vertices
+            .iter()
+            .fold((first, first), |(low, high), &vertex| (low.min(vertex), high.max(vertex)))
     }
 }
 
@@ -70,7 +73,8 @@ pub struct MassProperties {
 /// One planar face of the part with its boundary.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanarFace {
-    /// Stable number: faces are sorted by falling area, then by position. Equal to the index in [`Part::faces`].
+    /// Stable number: faces are sorted by falling area, then by position. Equal to the index in
+    /// [`Part::faces`].
     pub id: u32,
     /// Unit normal pointing out of the material, part frame.
     pub normal: DVec3,
@@ -82,13 +86,15 @@ pub struct PlanarFace {
     pub centroid: DVec3,
     /// Face frame: `z` is the normal, the origin is the centroid.
     pub part_from_face: Frame,
-    /// The face in its own `(x, y)` [m]: disjoint polygons, outer rings counter-clockwise seen from outside.
+    /// The face in its own `(x, y)` [m]: disjoint polygons, outer rings counter-clockwise seen from
+    /// outside.
     pub polygons: Vec<Polygon>,
     /// Indices of its triangles in the mesh.
     pub triangles: Vec<u32>,
     /// Number of the shell (connected surface) that the face lies on.
     pub shell: u32,
-    /// False for the walls of an internal void, or of a body wholly inside another: no finger gets there.
+    /// False for the walls of an internal void, or of a body wholly inside another: no finger gets
+    /// there.
     pub reachable: bool,
 }
 
@@ -120,7 +126,8 @@ pub struct FacePair {
 /// How to read a part.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ReadOptions {
-    /// Unit of the file's numbers. `None`: the file's own where it states one (3MF, glTF), otherwise millimetres.
+    /// Unit of the file's numbers. `None`: the file's own where it states one (3MF, glTF),
+    /// otherwise millimetres.
     pub unit: Option<Unit>,
 }
 
@@ -146,11 +153,13 @@ pub struct Part {
 impl Part {
     /// Reads, welds, repairs and orients the mesh in `path`, and finds its planar faces.
     ///
-    /// STL (binary, ASCII), OBJ, PLY, OFF, 3MF, glTF and GLB, each also as `.gz`; STEP with the feature `step`.
+    /// STL (binary, ASCII), OBJ, PLY, OFF, 3MF, glTF and GLB, each also as `.gz`; STEP with the
+    /// feature `step`.
     ///
     /// # Errors
-    /// When the file cannot be read, is not what its suffix says, is damaged, holds no triangle, or holds more
-    /// triangles than can be indexed. An open or otherwise faulty surface is no error: see [`Part::health`].
+    /// When the file cannot be read, is not what its suffix says, is damaged, holds no triangle, or
+    /// holds more triangles than can be indexed. An open or otherwise faulty surface is no error:
+    /// see [`Part::health`].
     pub fn read(path: &Path, options: &ReadOptions) -> Result<Self> {
         let soup = read::read(path)?;
         let unit = options.unit.or(soup.unit);
@@ -170,17 +179,26 @@ impl Part {
     /// A part from triangles in memory [m]; the same repairs as for a file.
     ///
     /// # Errors
-    /// When a coordinate is not finite, an index points nowhere, or no triangle with an area is left.
+    /// When a coordinate is not finite, an index points nowhere, or no triangle with an area is
+    /// left.
     pub fn from_triangles(name: &str, vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<Self> {
         let mut welder = weld::Welder::default();
         for (number, triangle) in triangles.iter().enumerate() {
             let mut corners = [DVec3::ZERO; 3];
             for (corner, &index) in corners.iter_mut().zip(triangle) {
-                *corner = *vertices
-                    .get(index as usize)
-                    .ok_or_else(|| Error::input(format!("{name}, triangle {number}"), format!("vertex {index} does not exist"), "number vertices from 0"))?;
+                *corner = *vertices.get(index as usize).ok_or_else(|| {
+                    Error::input(
+                        format!("{name}, triangle {number}"),
+                        format!("vertex {index} does not exist"),
+                        "number vertices from 0",
+                    )
+                })?;
                 if !corner.is_finite() {
-                    return Err(Error::input(format!("{name}, triangle {number}"), format!("vertex {index} is not finite"), "correct the coordinates"));
+                    return Err(Error::input(
+                        format!("{name}, triangle {number}"),
+                        format!("vertex {index} is not finite"),
+                        "correct the coordinates",
+                    ));
                 }
             }
             welder.triangle(corners);
@@ -194,10 +212,19 @@ impl Part {
         let mut repaired = repair::repair(soup, unit.metres(), place)?;
         let faces = faces::planar_faces(&mut repaired);
         let unit_mass = repaired.mass();
-        Ok(Self { name: String::new(), file: PathBuf::new(), unit_m: unit.metres(), mesh: repaired.mesh, health: repaired.health, faces, unit_mass })
+        Ok(Self {
+            name: String::new(),
+            file: PathBuf::new(),
+            unit_m: unit.metres(),
+            mesh: repaired.mesh,
+            health: repaired.health,
+            faces,
+            unit_mass,
+        })
     }
 
-    /// Volume, mass, centre of mass and inertia at a uniform `density` [kg/m^3], by exact integrals over the polyhedron.
+    /// Volume, mass, centre of mass and inertia at a uniform `density` [kg/m^3], by exact integrals
+    /// over the polyhedron.
     ///
     /// For a surface that is not watertight they are an estimate only ([`Health::watertight`]).
     pub fn mass_properties(&self, density: f64) -> MassProperties {
@@ -205,15 +232,27 @@ impl Part {
         MassProperties { mass: unit.mass * density, inertia: unit.inertia * density, ..*unit }
     }
 
-    /// All reachable antiparallel face pairs that the jaws can close on, with widths in `min_width..=max_width` [m],
-    /// by falling overlap area. `face_i < face_ii`.
+    /// All reachable antiparallel face pairs that the jaws can close on, with widths in
+    /// `min_width..=max_width` [m], by falling overlap area. `face_i < face_ii`.
     pub fn pairs(&self, min_width: f64, max_width: f64) -> Vec<FacePair> {
-        pairs::pairs(&self.faces, PairKind::External, min_width, max_width, pairs::area_floor(&self.mesh))
+        pairs::pairs(
+            &self.faces,
+            PairKind::External,
+            min_width,
+            max_width,
+            pairs::area_floor(&self.mesh),
+        )
     }
 
     /// As [`Part::pairs`], for jaws that open against two faces of a slot or bore.
     pub fn internal_pairs(&self, min_width: f64, max_width: f64) -> Vec<FacePair> {
-        pairs::pairs(&self.faces, PairKind::Internal, min_width, max_width, pairs::area_floor(&self.mesh))
+        pairs::pairs(
+            &self.faces,
+            PairKind::Internal,
+            min_width,
+            max_width,
+            pairs::area_floor(&self.mesh),
+        )
     }
 }
 
@@ -223,8 +262,15 @@ pub(crate) mod tests {
 
     /// An axis-parallel box: corners and outward triangles.
     pub(crate) fn cuboid(low: DVec3, high: DVec3) -> (Vec<DVec3>, Vec<[u32; 3]>) {
-        let corner = |i: u32| DVec3::new([low.x, high.x][(i & 1) as usize], [low.y, high.y][(i >> 1 & 1) as usize], [low.z, high.z][(i >> 2) as usize]);
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let corner = |i: u32| {
+            DVec3::new(
+                [low.x, high.x][(i & 1) as usize],
+                [low.y, high.y][(i >> 1 & 1) as usize],
+                [low.z, high.z][(i >> 2) as usize],
+            )
+        };
+        let quads =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
         ((0..8).map(corner).collect(), triangles)
     }
@@ -236,13 +282,23 @@ pub(crate) mod tests {
         assert!(part.health.watertight, "{:?}", part.health.lines());
         assert_eq!(part.faces.len(), 6);
         for face in &part.faces {
-            assert_eq!((face.polygons.len(), face.polygons[0].outer.len(), face.polygons[0].holes.len()), (1, 4, 0));
+            assert_eq!(
+                (face.polygons.len(), face.polygons[0].outer.len(), face.polygons[0].holes.len()),
+                (1, 4, 0)
+            );
             assert!((face.normal.dot(face.centroid) - face.offset).abs() < 1e-15);
-            assert!(face.normal.dot(face.centroid - DVec3::new(0.01, 0.015, 0.025)) > 0.0, "outward");
+            assert!(
+                face.normal.dot(face.centroid - DVec3::new(0.01, 0.015, 0.025)) > 0.0,
+                "outward"
+            );
         }
         let pairs = part.pairs(0.0, 0.04);
         assert_eq!(pairs.len(), 2, "{pairs:?}");
-        assert!((pairs[0].width - 0.02).abs() < 1e-15 && (pairs[0].overlap_area - 1.5e-3).abs() < 1e-12, "{:?}", pairs[0]);
+        assert!(
+            (pairs[0].width - 0.02).abs() < 1e-15 && (pairs[0].overlap_area - 1.5e-3).abs() < 1e-12,
+            "{:?}",
+            pairs[0]
+        );
         assert_eq!(part.pairs(0.0, 1.0).len(), 3);
         assert!(part.internal_pairs(0.0, 1.0).is_empty());
     }

@@ -1,4 +1,5 @@
-//! Noise that breaks planes up: a scan, or coordinates rounded coarsely. It is measured and told, not smoothed away.
+//! Noise that breaks planes up: a scan, or coordinates rounded coarsely. It is measured and told,
+//! not smoothed away.
 
 use rustc_hash::FxHashMap;
 
@@ -6,11 +7,13 @@ use super::regions::{self, Flatness, Regions};
 use super::repair::Repaired;
 use super::topology::NONE;
 
-/// Distance from a plane within which triangles are gathered again, as a share of the part's diagonal; twice the uncertainty of a corner.
-/// Rougher surfaces crumble here too and are not told from freely curved ones.
+/// Distance from a plane within which triangles are gathered again, as a share of the part's
+/// diagonal; twice the uncertainty of a corner. Rougher surfaces crumble here too and are not told
+/// from freely curved ones.
 const WITHIN: f64 = 4e-3;
-/// Share of the surface that must have crumbled. Measured: 42 clean parts up to 0.33 (a thread; others 0.06); 13 with corners moved at random
-/// by 1e-3 of the diagonal 0.73 to 1.0. By 1e-5, for which faces are grown with wider tolerances: up to 0.51.
+/// Share of the surface that must have crumbled. Measured: 42 clean parts up to 0.33 (a thread;
+/// others 0.06); 13 with corners moved at random by 1e-3 of the diagonal 0.73 to 1.0. By 1e-5, for
+/// which faces are grown with wider tolerances: up to 0.51.
 const SHARE: f64 = 0.6;
 /// Angle up to which two triangles alone may be one broken plane: 2 degrees.
 const BEND: f64 = 2.0 * std::f64::consts::PI / 180.0;
@@ -20,26 +23,37 @@ const BEND: f64 = 2.0 * std::f64::consts::PI / 180.0;
 pub(super) struct Noise {
     /// Share of the surface that lies in broken planes.
     pub share: f64,
-    /// Root mean square distance of the surface's corners from those planes [m], the median over the area.
+    /// Root mean square distance of the surface's corners from those planes [m], the median over
+    /// the area.
     pub distance: f64,
 }
 
-/// Looks for planes that fell into single triangles when regions were grown as `fine` ones: patches that a wide tolerance gathers,
-/// most of whose area lies in single triangles, bent both ways. A tessellated cylinder falls into strips, and a sphere into triangles
-/// that are bent one way.
+/// Looks for planes that fell into single triangles when regions were grown as `fine` ones: patches
+/// that a wide tolerance gathers, most of whose area lies in single triangles, bent both ways. A
+/// tessellated cylinder falls into strips, and a sphere into triangles that are bent one way.
 pub(super) fn measure(part: &Repaired, fine: &Regions) -> Option<Noise> {
     let single = |region: u32| fine.triangles(region as usize).len() == 1;
     let total: f64 = fine.all.iter().map(|region| region.area).sum();
-    let alone: f64 = fine.all.iter().zip(0..).filter(|(_, index)| single(*index)).map(|(region, _)| region.area).sum();
+    let alone: f64 = fine
+        .all
+        .iter()
+        .zip(0..)
+        .filter(|(_, index)| single(*index))
+        .map(|(region, _)| region.area)
+        .sum();
     if alone < 0.5 * SHARE * total {
         return None;
     }
-    let coarse = regions::grow(part, Flatness { distance: WITHIN * part.diagonal, uncertainty: WITHIN / 2.0 * part.diagonal });
+    let coarse = regions::grow(
+        part,
+        Flatness { distance: WITHIN * part.diagonal, uncertainty: WITHIN / 2.0 * part.diagonal },
+    );
     // Area and mean square distance of each broken plane.
     let mut broken: Vec<(f64, f64)> = Vec::new();
     for (index, region) in coarse.all.iter().enumerate() {
         let triangles = coarse.triangles(index);
-        let (mut alone, mut squares, mut convex, mut concave, mut most) = (0.0, 0.0, 0.0, 0.0, 0.0_f64);
+        let (mut alone, mut squares, mut convex, mut concave, mut most) =
+            (0.0, 0.0, 0.0, 0.0, 0.0_f64);
         let mut fragments: FxHashMap<u32, ()> = FxHashMap::default();
         for &triangle in triangles {
             let own = fine.of[triangle as usize];
@@ -49,7 +63,12 @@ pub(super) fn measure(part: &Repaired, fine: &Regions) -> Option<Noise> {
             let normal = (b - a).cross(c - a);
             let area = normal.length() / 2.0;
             alone += if single(own) { area } else { 0.0 };
-            squares += area * corners.iter().map(|corner| (region.plane.normal.dot(*corner) - region.plane.offset).powi(2)).sum::<f64>() / 3.0;
+            squares += area
+                * corners
+                    .iter()
+                    .map(|corner| (region.plane.normal.dot(*corner) - region.plane.offset).powi(2))
+                    .sum::<f64>()
+                / 3.0;
             for k in 0..3 {
                 let twin = part.edges.twin[triangle as usize * 3 + k];
                 if twin == NONE {
@@ -57,11 +76,15 @@ pub(super) fn measure(part: &Repaired, fine: &Regions) -> Option<Noise> {
                 }
                 let other = twin / 3;
                 // Each inner edge once, and only where the plane is broken.
-                if other <= triangle || coarse.of[other as usize] != index as u32 || fine.of[other as usize] == own {
+                if other <= triangle
+                    || coarse.of[other as usize] != index as u32
+                    || fine.of[other as usize] == own
+                {
                     continue;
                 }
                 let theirs = part.mesh.corners(other);
-                let angle = normal.angle_between((theirs[1] - theirs[0]).cross(theirs[2] - theirs[0]));
+                let angle =
+                    normal.angle_between((theirs[1] - theirs[0]).cross(theirs[2] - theirs[0]));
                 let apex = theirs[(twin as usize % 3 + 2) % 3];
                 let side = if normal.dot(apex - a) > 0.0 { &mut concave } else { &mut convex };
                 *side += angle * corners[k].distance(corners[(k + 1) % 3]);

@@ -1,4 +1,5 @@
-//! Shells (connected surfaces): one winding in each, outward for bodies, and which shell lies inside which.
+//! Shells (connected surfaces): one winding in each, outward for bodies, and which shell lies
+//! inside which.
 
 use glam::DVec3;
 use robust::{Coord, orient2d};
@@ -40,12 +41,20 @@ struct Draft {
     loose: usize,
 }
 
-/// Labels the shells, makes their windings agree and turns them outward (hollows: out of the material, inward).
-/// Returns the shell of every triangle and the shells. Where anything was reversed `edges` must be found again.
-pub(super) fn orient(mesh: &mut Mesh, edges: &Edges, apex: DVec3, health: &mut Health) -> (Vec<u32>, Vec<Shell>) {
+/// Labels the shells, makes their windings agree and turns them outward (hollows: out of the
+/// material, inward). Returns the shell of every triangle and the shells. Where anything was
+/// reversed `edges` must be found again.
+pub(super) fn orient(
+    mesh: &mut Mesh,
+    edges: &Edges,
+    apex: DVec3,
+    health: &mut Health,
+) -> (Vec<u32>, Vec<Shell>) {
     let (shell_of, reversed, count) = label(mesh, edges, health);
     reverse_minority(mesh, &shell_of, &reversed, count, health);
-    let mut drafts: Vec<Draft> = (0..count).map(|_| Draft { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, triangles: 0, loose: 0 }).collect();
+    let mut drafts: Vec<Draft> = (0..count)
+        .map(|_| Draft { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, triangles: 0, loose: 0 })
+        .collect();
     for (triangle, &shell) in shell_of.iter().enumerate() {
         let draft = &mut drafts[shell as usize];
         draft.triangles += 1;
@@ -59,9 +68,16 @@ pub(super) fn orient(mesh: &mut Mesh, edges: &Edges, apex: DVec3, health: &mut H
     }
     let members = Members::new(&shell_of, drafts.len());
     let mut shells: Vec<Shell> = (0..drafts.len())
-        .map(|shell| Shell { role: Role::Body, integrals: mass::integrate(mesh, members.of(shell), apex), low: drafts[shell].low, high: drafts[shell].high })
+        .map(|shell| Shell {
+            role: Role::Body,
+            integrals: mass::integrate(mesh, members.of(shell), apex),
+            low: drafts[shell].low,
+            high: drafts[shell].high,
+        })
         .collect();
-    let inside_out: Vec<bool> = (0..drafts.len()).map(|shell| signed_volume(mesh, &members, &drafts[shell], &shells[shell], shell) < 0.0).collect();
+    let inside_out: Vec<bool> = (0..drafts.len())
+        .map(|shell| signed_volume(mesh, &members, &drafts[shell], &shells[shell], shell) < 0.0)
+        .collect();
     assign_roles(mesh, &members, &drafts, &inside_out, &mut shells);
     let mut reverse = vec![false; shells.len()];
     for (index, shell) in shells.iter().enumerate() {
@@ -88,11 +104,12 @@ pub(super) fn orient(mesh: &mut Mesh, edges: &Edges, apex: DVec3, health: &mut H
     (shell_of, shells)
 }
 
-/// Walks over the neighbours: the shell of each triangle, whether its winding disagrees with that of its shell's first
-/// triangle (empty when none does), and the number of shells.
+/// Walks over the neighbours: the shell of each triangle, whether its winding disagrees with that
+/// of its shell's first triangle (empty when none does), and the number of shells.
 fn label(mesh: &Mesh, edges: &Edges, health: &mut Health) -> (Vec<u32>, Vec<bool>, usize) {
     let count = mesh.triangles.len();
-    let disagree = |half: u32, twin: u32| ends(&mesh.triangles, half).0 == ends(&mesh.triangles, twin).0;
+    let disagree =
+        |half: u32, twin: u32| ends(&mesh.triangles, half).0 == ends(&mesh.triangles, twin).0;
     let consistent = (0..3 * count as u32).all(|half| {
         let twin = edges.twin[half as usize];
         twin == NONE || twin < half || !disagree(half, twin)
@@ -132,7 +149,13 @@ fn label(mesh: &Mesh, edges: &Edges, health: &mut Health) -> (Vec<u32>, Vec<bool
 }
 
 /// Makes the windings of each shell agree: that of most of its area is taken for the file's.
-fn reverse_minority(mesh: &mut Mesh, shell_of: &[u32], reversed: &[bool], shells: usize, health: &mut Health) {
+fn reverse_minority(
+    mesh: &mut Mesh,
+    shell_of: &[u32],
+    reversed: &[bool],
+    shells: usize,
+    health: &mut Health,
+) {
     if reversed.is_empty() {
         return;
     }
@@ -150,9 +173,16 @@ fn reverse_minority(mesh: &mut Mesh, shell_of: &[u32], reversed: &[bool], shells
     }
 }
 
-/// Volume whose sign tells the sense of a shell. An open one has no volume of its own: about the middle of its box the
-/// sign is right for whatever is nearly a body; a nearly flat one keeps the file's winding.
-fn signed_volume(mesh: &Mesh, members: &Members, draft: &Draft, shell: &Shell, index: usize) -> f64 {
+/// Volume whose sign tells the sense of a shell. An open one has no volume of its own: about the
+/// middle of its box the sign is right for whatever is nearly a body; a nearly flat one keeps the
+/// file's winding.
+fn signed_volume(
+    mesh: &Mesh,
+    members: &Members,
+    draft: &Draft,
+    shell: &Shell,
+    index: usize,
+) -> f64 {
     if draft.loose == 0 {
         return shell.integrals.volume();
     }
@@ -165,11 +195,19 @@ fn signed_volume(mesh: &Mesh, members: &Members, draft: &Draft, shell: &Shell, i
     if volume.abs() > 1e-3 * size.x * size.y * size.z { volume } else { 0.0 }
 }
 
-/// Finds which closed shells lie inside which others, and from that and their senses what they bound.
-fn assign_roles(mesh: &Mesh, members: &Members, drafts: &[Draft], inside_out: &[bool], shells: &mut [Shell]) {
+/// Finds which closed shells lie inside which others, and from that and their senses what they
+/// bound.
+fn assign_roles(
+    mesh: &Mesh,
+    members: &Members,
+    drafts: &[Draft],
+    inside_out: &[bool],
+    shells: &mut [Shell],
+) {
     // Larger boxes first: a container comes before what it contains.
     let extent = |shell: usize| (drafts[shell].high - drafts[shell].low).length_squared();
-    let mut order: Vec<usize> = (0..shells.len()).filter(|&shell| drafts[shell].loose == 0).collect();
+    let mut order: Vec<usize> =
+        (0..shells.len()).filter(|&shell| drafts[shell].loose == 0).collect();
     order.sort_by(|&a, &b| extent(b).total_cmp(&extent(a)).then(a.cmp(&b)));
     for (position, &inner) in order.iter().enumerate() {
         let draft = &drafts[inner];
@@ -178,7 +216,9 @@ fn assign_roles(mesh: &Mesh, members: &Members, drafts: &[Draft], inside_out: &[
         // The smallest container decides: it is the last one found in this order.
         let parent = order[..position].iter().rev().copied().find(|&outer| {
             let container = &drafts[outer];
-            container.low.cmplt(draft.low).all() && container.high.cmpgt(draft.high).all() && inside(mesh, members.of(outer), point)
+            container.low.cmplt(draft.low).all()
+                && container.high.cmpgt(draft.high).all()
+                && inside(mesh, members.of(outer), point)
         });
         let Some(parent) = parent else { continue };
         let opposite = inside_out[inner] != inside_out[parent];
@@ -190,8 +230,9 @@ fn assign_roles(mesh: &Mesh, members: &Members, drafts: &[Draft], inside_out: &[
     }
 }
 
-/// Whether `point` (not on the surface) lies inside a closed surface: parity of the triangles hit along `+x`. A ray
-/// through an edge or vertex counts once, by the half-open rule with exact orientation tests.
+/// Whether `point` (not on the surface) lies inside a closed surface: parity of the triangles hit
+/// along `+x`. A ray through an edge or vertex counts once, by the half-open rule with exact
+/// orientation tests.
 fn inside(mesh: &Mesh, triangles: impl Iterator<Item = u32>, point: DVec3) -> bool {
     let flat = |p: DVec3| Coord { x: p.y, y: p.z };
     let mut odd = false;
@@ -208,7 +249,10 @@ fn inside(mesh: &Mesh, triangles: impl Iterator<Item = u32>, point: DVec3) -> bo
         let mut hit = false;
         for (a, b) in [(0, 1), (1, 2), (2, 0)].map(|(a, b)| (corners[a], corners[b])) {
             let (low, high) = if a.z <= b.z { (a, b) } else { (b, a) };
-            if low.z <= point.z && point.z < high.z && orient2d(flat(low), flat(high), flat(point)) > 0.0 {
+            if low.z <= point.z
+                && point.z < high.z
+                && orient2d(flat(low), flat(high), flat(point)) > 0.0
+            {
                 hit = !hit;
             }
         }
@@ -248,7 +292,8 @@ impl Members {
         Self { starts, triangles }
     }
 
-    /// The triangles of `shell`; with a single shell the numbers themselves, so that no list is kept.
+    /// The triangles of `shell`; with a single shell the numbers themselves, so that no list is
+    /// kept.
     fn of(&self, shell: usize) -> impl Iterator<Item = u32> + '_ {
         let range = self.starts[shell]..self.starts[shell + 1];
         range.map(|index| self.triangles.get(index as usize).copied().unwrap_or(index))

@@ -9,8 +9,8 @@ use crate::geometry::polygon::{self, Moments, patch_moments, rings_moments};
 use crate::geometry::{clip_ring_convex, intersect, is_convex};
 use crate::model::{Polygon, Ring};
 
-/// Angle between one face and the reverse of the other up to which they count as antiparallel: 0.5 degrees, what the
-/// rubber of a pad takes up (0.2 mm over 20 mm).
+/// Angle between one face and the reverse of the other up to which they count as antiparallel: 0.5
+/// degrees, what the rubber of a pad takes up (0.2 mm over 20 mm).
 const ANTIPARALLEL: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
 /// Overlaps smaller than this are rounding, not contact [m^2].
@@ -19,11 +19,21 @@ pub(super) fn area_floor(mesh: &Mesh) -> f64 {
     1e-9 * (high - low).length_squared()
 }
 
-/// Pairs of the given kind with widths in `min_width..=max_width` and an overlap above `floor`, by falling overlap.
-pub(super) fn pairs(faces: &[PlanarFace], kind: PairKind, min_width: f64, max_width: f64, floor: f64) -> Vec<FacePair> {
+/// Pairs of the given kind with widths in `min_width..=max_width` and an overlap above `floor`, by
+/// falling overlap.
+pub(super) fn pairs(
+    faces: &[PlanarFace],
+    kind: PairKind,
+    min_width: f64,
+    max_width: f64,
+    floor: f64,
+) -> Vec<FacePair> {
     let boxes: Vec<Aabb> = faces.iter().map(bounding_box).collect();
-    let Some(whole) = boxes.iter().copied().reduce(|sum, next| sum.merged(&next)) else { return Vec::new() };
-    let (min_width, max_width) = (min_width.max(0.0), max_width.min(2.0 * whole.half_extents().length()));
+    let Some(whole) = boxes.iter().copied().reduce(|sum, next| sum.merged(&next)) else {
+        return Vec::new();
+    };
+    let (min_width, max_width) =
+        (min_width.max(0.0), max_width.min(2.0 * whole.half_extents().length()));
     if min_width > max_width {
         return Vec::new();
     }
@@ -33,14 +43,19 @@ pub(super) fn pairs(faces: &[PlanarFace], kind: PairKind, min_width: f64, max_wi
     let antiparallel = ANTIPARALLEL.cos();
     let mut found = Vec::new();
     for face in faces.iter().filter(|face| face.reachable) {
-        // Where a partner must lie: the face moved against its normal by the widths asked for, and the tilt allowed for.
+        // Where a partner must lie: the face moved against its normal by the widths asked for, and
+        // the tilt allowed for.
         let own = &boxes[face.id as usize];
-        let slack = ANTIPARALLEL * (2.0 * own.half_extents().length() + max_width) + max_width * 1e-9;
+        let slack =
+            ANTIPARALLEL * (2.0 * own.half_extents().length() + max_width) + max_width * 1e-9;
         let (near, far) = (-sign * min_width * face.normal, -sign * max_width * face.normal);
         let reach = Aabb::new(own.mins + near.min(far) - slack, own.maxs + near.max(far) + slack);
         for other in tree.intersect_aabb(&reach) {
             let other = &faces[other as usize];
-            if other.id <= face.id || !other.reachable || -face.normal.dot(other.normal) < antiparallel {
+            if other.id <= face.id
+                || !other.reachable
+                || -face.normal.dot(other.normal) < antiparallel
+            {
                 continue;
             }
             let axis = (face.normal - other.normal).normalize();
@@ -49,34 +64,67 @@ pub(super) fn pairs(faces: &[PlanarFace], kind: PairKind, min_width: f64, max_wi
                 && sign * width > 0.0
                 && (min_width..=max_width).contains(&(sign * width))
             {
-                found.push(FacePair { face_i: face.id, face_ii: other.id, width: sign * width, overlap_area, kind });
+                found.push(FacePair {
+                    face_i: face.id,
+                    face_ii: other.id,
+                    width: sign * width,
+                    overlap_area,
+                    kind,
+                });
             }
         }
     }
-    found.sort_by(|a, b| b.overlap_area.total_cmp(&a.overlap_area).then((a.face_i, a.face_ii).cmp(&(b.face_i, b.face_ii))));
+    found.sort_by(|a, b| {
+        b.overlap_area
+            .total_cmp(&a.overlap_area)
+            .then((a.face_i, a.face_ii).cmp(&(b.face_i, b.face_ii)))
+    });
     found
 }
 
 fn bounding_box(face: &PlanarFace) -> Aabb {
-    let points = face.polygons.iter().flat_map(|polygon| &polygon.outer).map(|point| face.part_from_face.point(point.extend(0.0)));
-    points.fold(Aabb::new_invalid(), |sum, point| Aabb::new(sum.mins.min(point), sum.maxs.max(point)))
+    let points = face
+        .polygons
+        .iter()
+        .flat_map(|polygon| &polygon.outer)
+        .map(|point| face.part_from_face.point(point.extend(0.0)));
+    points
+        .fold(Aabb::new_invalid(), |sum, point| Aabb::new(sum.mins.min(point), sum.maxs.max(point)))
 }
 
-/// Signed distance of the faces along `axis` at the middle of their overlap (positive: material between), and its area.
-fn overlap(face: &PlanarFace, other: &PlanarFace, axis: DVec3, convex: &[bool]) -> Option<(f64, f64)> {
+/// Signed distance of the faces along `axis` at the middle of their overlap (positive: material
+/// between), and its area.
+fn overlap(
+    face: &PlanarFace,
+    other: &PlanarFace,
+    axis: DVec3,
+    convex: &[bool],
+) -> Option<(f64, f64)> {
     let frame = face.part_from_face;
-    let place = |point: &DVec2| frame.point_inverse(other.part_from_face.point(point.extend(0.0))).truncate();
+    let place = |point: &DVec2| {
+        frame.point_inverse(other.part_from_face.point(point.extend(0.0))).truncate()
+    };
     let ring = |ring: &Ring| ring.iter().map(place).collect::<Ring>();
     // Seen from the first face the second one's rings run the other way.
-    let theirs: Vec<Polygon> =
-        other.polygons.iter().map(|polygon| Polygon { outer: ring(&polygon.outer), holes: polygon.holes.iter().map(ring).collect() }).collect();
+    let theirs: Vec<Polygon> = other
+        .polygons
+        .iter()
+        .map(|polygon| Polygon {
+            outer: ring(&polygon.outer),
+            holes: polygon.holes.iter().map(ring).collect(),
+        })
+        .collect();
     let (own_box, their_box) = (polygon::bounds(&face.polygons), polygon::bounds(&theirs));
     if !own_box.meets(their_box) {
         return None;
     }
     // Clipping against a convex face is exact for integrals and far cheaper than the general case.
     let clipped = |rings: &[Polygon], window: &Ring| {
-        let rings: Vec<Ring> = rings.iter().flat_map(polygon::rings).map(|ring| clip_ring_convex(ring, window)).collect();
+        let rings: Vec<Ring> = rings
+            .iter()
+            .flat_map(polygon::rings)
+            .map(|ring| clip_ring_convex(ring, window))
+            .collect();
         rings_moments(&rings.iter().map(Vec::as_slice).collect::<Vec<_>>())
     };
     let common = if convex[face.id as usize] {
@@ -93,6 +141,7 @@ fn overlap(face: &PlanarFace, other: &PlanarFace, axis: DVec3, convex: &[bool]) 
         return None;
     }
     let middle = frame.point(common.centroid.extend(0.0));
-    let on_plane = |plane: &PlanarFace| (plane.offset - plane.normal.dot(middle)) / plane.normal.dot(axis);
+    let on_plane =
+        |plane: &PlanarFace| (plane.offset - plane.normal.dot(middle)) / plane.normal.dot(axis);
     Some((on_plane(face) - on_plane(other), common.area))
 }

@@ -1,9 +1,10 @@
 //! Planar regions by growing.
 //!
-//! A region starts at the largest triangle left and takes in neighbours whose corners lie within a distance of the
-//! region's plane and whose normals agree within an angle; both tests are needed. The distance is scaled to the part.
-//! The angle is widened for a narrow triangle by what the uncertainty of its corners can tilt it: refining a plane in
-//! 32-bit floats leaves slivers whose normals point anywhere. The plane is refitted each time the region has doubled.
+//! A region starts at the largest triangle left and takes in neighbours whose corners lie within a
+//! distance of the region's plane and whose normals agree within an angle; both tests are needed.
+//! The distance is scaled to the part. The angle is widened for a narrow triangle by what the
+//! uncertainty of its corners can tilt it: refining a plane in 32-bit floats leaves slivers whose
+//! normals point anywhere. The plane is refitted each time the region has doubled.
 
 use glam::DVec3;
 use nalgebra::Matrix3;
@@ -38,7 +39,8 @@ impl Plane {
     }
 }
 
-/// Area-weighted sums over triangles: area, normal, first and second moments about a reference near the region.
+/// Area-weighted sums over triangles: area, normal, first and second moments about a reference near
+/// the region.
 #[derive(Debug, Clone, Copy)]
 struct Sums {
     reference: DVec3,
@@ -56,7 +58,14 @@ fn cyclic(v: DVec3) -> DVec3 {
 
 impl Sums {
     fn new(reference: DVec3) -> Self {
-        Self { reference, area: 0.0, vector: DVec3::ZERO, first: DVec3::ZERO, squares: DVec3::ZERO, products: DVec3::ZERO }
+        Self {
+            reference,
+            area: 0.0,
+            vector: DVec3::ZERO,
+            first: DVec3::ZERO,
+            squares: DVec3::ZERO,
+            products: DVec3::ZERO,
+        }
     }
 
     fn add(&mut self, corners: [DVec3; 3], twice_normal: DVec3, area: f64) {
@@ -81,18 +90,26 @@ impl Sums {
         let mean = self.first / self.area;
         let squares = self.squares / self.area - mean * mean;
         let products = self.products / self.area - cyclic(mean);
-        let covariance = Matrix3::new(squares.x, products.z, products.y, products.z, squares.y, products.x, products.y, products.x, squares.z);
+        let covariance = Matrix3::new(
+            squares.x, products.z, products.y, products.z, squares.y, products.x, products.y,
+            products.x, squares.z,
+        );
         let eigen = covariance.symmetric_eigen();
         let mut order = [0, 1, 2];
         order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
         let axis = eigen.eigenvectors.column(order[0]);
         let fitted = DVec3::new(axis[0], axis[1], axis[2]).normalize();
         let fitted = if fitted.dot(outward) < 0.0 { -fitted } else { fitted };
-        // For a needle the third axis is as thin as the second: there the sum of the triangles' normals is better.
+        // For a needle the third axis is as thin as the second: there the sum of the triangles'
+        // normals is better.
         let normal = if fitted.dot(outward) > 0.99 { fitted } else { outward };
         // A rectangle of width w has variance w^2/12 across.
         let width = (12.0 * eigen.eigenvalues[order[1]].max(0.0)).sqrt();
-        Some(Plane { normal, offset: normal.dot(self.centre()), tilt: 2.0 * uncertainty / width.max(uncertainty) })
+        Some(Plane {
+            normal,
+            offset: normal.dot(self.centre()),
+            tilt: 2.0 * uncertainty / width.max(uncertainty),
+        })
     }
 }
 
@@ -179,7 +196,8 @@ pub(super) fn grow(part: &Repaired, flatness: Flatness) -> Regions {
                     plane = sums.fit(uncertainty).unwrap_or(plane);
                 }
             }
-            // With the final plane the triangles refused by an earlier, poorer one get another chance.
+            // With the final plane the triangles refused by an earlier, poorer one get another
+            // chance.
             plane = sums.fit(uncertainty).unwrap_or(plane);
             let before = order.len();
             refused.retain(|&other| {
@@ -197,23 +215,38 @@ pub(super) fn grow(part: &Repaired, flatness: Flatness) -> Regions {
                 break;
             }
         }
-        regions.push(Region { begin, end: order.len(), plane, area: sums.area, centre: sums.centre() });
+        regions.push(Region {
+            begin,
+            end: order.len(),
+            plane,
+            area: sums.area,
+            centre: sums.centre(),
+        });
     }
     Regions { all: regions, order, of: region_of }
 }
 
 /// Adds a triangle to the sums if it lies in the plane.
-fn take(mesh: &Mesh, triangle: u32, plane: &Plane, distance: f64, uncertainty: f64, sums: &mut Sums) -> bool {
+fn take(
+    mesh: &Mesh,
+    triangle: u32,
+    plane: &Plane,
+    distance: f64,
+    uncertainty: f64,
+    sums: &mut Sums,
+) -> bool {
     let corners = mesh.corners(triangle);
     if corners.iter().any(|&corner| plane.distance(corner) > distance) {
         return false;
     }
     let cross = twice_normal(corners);
     let [a, b, c] = corners;
-    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared()).sqrt();
+    let longest =
+        (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared()).sqrt();
     let twice_area = cross.length();
     // Altitude over the longest edge: corners off by u tilt the triangle by up to 2 u / altitude.
-    let allowed = ANGLE + plane.tilt + 2.0 * uncertainty * longest / twice_area.max(f64::MIN_POSITIVE);
+    let allowed =
+        ANGLE + plane.tilt + 2.0 * uncertainty * longest / twice_area.max(f64::MIN_POSITIVE);
     // A sliver narrower than the uncertainty has no direction: the distance alone decides.
     // 1 - x^2/2 is below the cosine by less than x^4/24: nothing at the angles in question.
     if allowed < 1.0 && cross.dot(plane.normal) < (1.0 - allowed * allowed / 2.0) * twice_area {
@@ -223,7 +256,8 @@ fn take(mesh: &Mesh, triangle: u32, plane: &Plane, distance: f64, uncertainty: f
     true
 }
 
-/// Triangles by falling area, in steps of a factor of two: a counting sort by the exponent, file order within a step.
+/// Triangles by falling area, in steps of a factor of two: a counting sort by the exponent, file
+/// order within a step.
 fn seeds(mesh: &Mesh) -> Vec<u32> {
     let exponents: Vec<u16> = (0..mesh.triangles.len() as u32)
         .map(|triangle| {

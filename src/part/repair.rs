@@ -1,5 +1,5 @@
-//! From joined triangles to one consistent, outward-oriented surface. Only what is broken is touched: a clean mesh
-//! passes unchanged, and each repair is counted.
+//! From joined triangles to one consistent, outward-oriented surface. Only what is broken is
+//! touched: a clean mesh passes unchanged, and each repair is counted.
 
 use glam::DVec3;
 
@@ -12,7 +12,8 @@ use super::weld::Soup;
 use super::{Health, MassProperties, Mesh};
 use crate::error::{Error, Result};
 
-/// Distance within which corners at an opening are taken for one, as a share of the bounding box's diagonal: 1 um on 100 mm.
+/// Distance within which corners at an opening are taken for one, as a share of the bounding box's
+/// diagonal: 1 um on 100 mm.
 const JOIN: f64 = 1e-5;
 /// Width of a needle as a share of that distance.
 const NEEDLE: f64 = 0.1;
@@ -50,7 +51,12 @@ impl Repaired {
 /// # Errors
 /// When no triangle with an area is left.
 pub(super) fn repair(soup: Soup, scale: f64, place: &str) -> Result<Repaired> {
-    let mut health = Health { triangles_read: soup.read, degenerate_removed: soup.read - soup.triangles.len(), warnings: soup.warnings, ..Health::default() };
+    let mut health = Health {
+        triangles_read: soup.read,
+        degenerate_removed: soup.read - soup.triangles.len(),
+        warnings: soup.warnings,
+        ..Health::default()
+    };
     let mut mesh = Mesh { vertices: soup.vertices, triangles: soup.triangles };
     if scale != 1.0 {
         for vertex in &mut mesh.vertices {
@@ -66,8 +72,11 @@ pub(super) fn repair(soup: Soup, scale: f64, place: &str) -> Result<Repaired> {
             "export the part as a surface mesh; check that its coordinates were not all rounded to the same value",
         ));
     }
-    // Half a unit in the last place of the largest coordinate (in the file's unit, but the ratio is much the same).
-    let noise = low.abs().max(high.abs()).max_element().log2().floor().exp2() * f64::from(f32::EPSILON) / 2.0;
+    // Half a unit in the last place of the largest coordinate (in the file's unit, but the ratio is
+    // much the same).
+    let noise = low.abs().max(high.abs()).max_element().log2().floor().exp2()
+        * f64::from(f32::EPSILON)
+        / 2.0;
     if noise > JOIN * diagonal {
         health
             .warnings
@@ -77,7 +86,11 @@ pub(super) fn repair(soup: Soup, scale: f64, place: &str) -> Result<Repaired> {
     let mut edges = topology::edges(&mesh);
     mend(&mut mesh, &mut edges, tolerance, &mut health);
     if mesh.triangles.is_empty() {
-        return Err(Error::input(place, "no triangle has an area above rounding", "export the part as a surface mesh"));
+        return Err(Error::input(
+            place,
+            "no triangle has an area above rounding",
+            "export the part as a surface mesh",
+        ));
     }
     let apex = (low + high) / 2.0;
     let (shell_of, shells) = orient::orient(&mut mesh, &edges, apex, &mut health);
@@ -94,12 +107,16 @@ pub(super) fn repair(soup: Soup, scale: f64, place: &str) -> Result<Repaired> {
             health.crossing_shells = count;
             health.crossing_at = Some(place);
         }
-        Crossing::Unchecked => health.warnings.push("whether the shells pass through each other was not checked (too many triangles)".to_string()),
+        Crossing::Unchecked => health.warnings.push(
+            "whether the shells pass through each other was not checked (too many triangles)"
+                .to_string(),
+        ),
     }
     Ok(Repaired { mesh, health, edges, shell_of, shells, diagonal, noise, apex })
 }
 
-/// Parts neighbours whose windings still disagree, so that walks over the surface never change sides.
+/// Parts neighbours whose windings still disagree, so that walks over the surface never change
+/// sides.
 fn separate_disagreeing(mesh: &Mesh, edges: &mut Edges) {
     for half in 0..edges.twin.len() as u32 {
         let twin = edges.twin[half as usize];
@@ -110,7 +127,8 @@ fn separate_disagreeing(mesh: &Mesh, edges: &mut Edges) {
     }
 }
 
-/// Removes duplicates and needles, joins vertices and cuts edges until nothing open or tangled can be mended any more.
+/// Removes duplicates and needles, joins vertices and cuts edges until nothing open or tangled can
+/// be mended any more.
 fn mend(mesh: &mut Mesh, edges: &mut Edges, tolerance: f64, health: &mut Health) {
     // Each round may make the next one's work possible; real files need one or two.
     for _ in 0..ROUNDS {
@@ -149,18 +167,23 @@ fn report_edges(mesh: &Mesh, edges: &Edges, health: &mut Health) {
             let (from, to) = ends(&mesh.triangles, half);
             (mesh.vertices[from as usize], mesh.vertices[to as usize])
         };
-        halves.iter().map(|&half| span(half)).max_by(|a, b| a.0.distance(a.1).total_cmp(&b.0.distance(b.1))).map(|(a, b)| (a + b) / 2.0)
+        halves
+            .iter()
+            .map(|&half| span(half))
+            .max_by(|a, b| a.0.distance(a.1).total_cmp(&b.0.distance(b.1)))
+            .map(|(a, b)| (a + b) / 2.0)
     };
     health.open_edges = edges.open.len();
     health.open_edge_at = longest(&edges.open);
     health.tangled_edges = edges.tangled.len();
     health.tangled_edge_at = longest(&edges.tangled);
-    health.watertight = edges.open.is_empty() && edges.unpaired.is_empty() && health.one_sided_edges == 0;
+    health.watertight =
+        edges.open.is_empty() && edges.unpaired.is_empty() && health.one_sided_edges == 0;
 }
 
-/// Removes repeated triangles, in whatever order and sense their corners are listed. Two of opposite senses in a mesh
-/// that is not two-sided throughout are the wall between two bodies glued together: both go, so that one body is left.
-/// Returns how many went.
+/// Removes repeated triangles, in whatever order and sense their corners are listed. Two of
+/// opposite senses in a mesh that is not two-sided throughout are the wall between two bodies glued
+/// together: both go, so that one body is left. Returns how many went.
 fn remove_duplicates(mesh: &mut Mesh) -> usize {
     let even = |[a, b, c]: [u32; 3]| (a < b) ^ (b < c) ^ (a < c); // sense of the corners against ascending order
     let mut keys: Vec<([u32; 3], u32)> = mesh
@@ -185,7 +208,8 @@ fn remove_duplicates(mesh: &mut Mesh) -> usize {
             walls.push(group[0].1);
         }
     }
-    // Every triangle of a two-sided mesh is such a pair; walls between bodies are the smaller part of one.
+    // Every triangle of a two-sided mesh is such a pair; walls between bodies are the smaller part
+    // of one.
     if walls.len() * 4 < mesh.triangles.len() {
         for wall in walls {
             drop[wall as usize] = true;

@@ -24,8 +24,8 @@ pub(super) fn next(half: u32) -> u32 {
 /// Neighbours across edges.
 #[derive(Debug, Default)]
 pub(super) struct Edges {
-    /// Per half-edge its neighbour across the edge, else [`NONE`]. At an edge of two the neighbours may run the same way
-    /// (windings disagree).
+    /// Per half-edge its neighbour across the edge, else [`NONE`]. At an edge of two the neighbours
+    /// may run the same way (windings disagree).
     pub twin: Vec<u32>,
     /// Half-edges that are alone on their edge.
     pub open: Vec<u32>,
@@ -35,7 +35,8 @@ pub(super) struct Edges {
     pub unpaired: Vec<u32>,
 }
 
-/// Finds the neighbours by sorting the half-edges by their lower vertex (counting sort), then within a vertex.
+/// Finds the neighbours by sorting the half-edges by their lower vertex (counting sort), then
+/// within a vertex.
 pub(super) fn edges(mesh: &Mesh) -> Edges {
     let triangles = &mesh.triangles;
     let halves = triangles.len() * 3;
@@ -86,8 +87,9 @@ pub(super) fn edges(mesh: &Mesh) -> Edges {
     found
 }
 
-/// Pairs the half-edges of an edge that bounds several bodies: going round the edge, each that runs up bounds the material
-/// before it, and so does the one before it, which must run down. Otherwise all stay unpaired.
+/// Pairs the half-edges of an edge that bounds several bodies: going round the edge, each that runs
+/// up bounds the material before it, and so does the one before it, which must run down. Otherwise
+/// all stay unpaired.
 fn pair_around(mesh: &Mesh, group: &[(u32, u32)], found: &mut Edges) {
     let (upper, first) = group[0];
     let (from, to) = ends(&mesh.triangles, first);
@@ -98,7 +100,9 @@ fn pair_around(mesh: &Mesh, group: &[(u32, u32)], found: &mut Edges) {
     let mut round: Vec<(f64, u32, bool)> = group
         .iter()
         .map(|&(_, half)| {
-            let apex = mesh.vertices[mesh.triangles[(half / 3) as usize][((half + 2) % 3) as usize] as usize] - base;
+            let apex = mesh.vertices
+                [mesh.triangles[(half / 3) as usize][((half + 2) % 3) as usize] as usize]
+                - base;
             let up = ends(&mesh.triangles, half).1 == upper;
             (apex.dot(v).atan2(apex.dot(u)), half, up)
         })
@@ -138,7 +142,8 @@ mod tests {
 
     #[test]
     fn open_and_tangled_edges_are_listed() {
-        let edges = edges(&Mesh { vertices: corners(), triangles: vec![[0, 1, 2], [1, 0, 3], [0, 1, 4]] });
+        let edges =
+            edges(&Mesh { vertices: corners(), triangles: vec![[0, 1, 2], [1, 0, 3], [0, 1, 4]] });
         assert_eq!((edges.open.len(), edges.tangled.len(), edges.unpaired.len()), (6, 1, 3));
     }
 
@@ -150,7 +155,10 @@ mod tests {
         triangles.extend(others.iter().map(|triangle| triangle.map(|vertex| vertex + 8)));
         vertices.extend(more);
         let part = crate::part::Part::from_triangles("cubes", &vertices, &triangles).unwrap();
-        assert_eq!((part.health.tangled_edges, part.health.shells, part.health.watertight), (1, 2, true));
+        assert_eq!(
+            (part.health.tangled_edges, part.health.shells, part.health.watertight),
+            (1, 2, true)
+        );
         assert_eq!(part.faces.len(), 12);
     }
 }

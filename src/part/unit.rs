@@ -25,7 +25,8 @@ pub enum Unit {
 
 impl Unit {
     /// All units, the commonest in mesh files first.
-    pub const ALL: [Self; 6] = [Self::Millimetre, Self::Metre, Self::Inch, Self::Centimetre, Self::Micrometre, Self::Foot];
+    pub const ALL: [Self; 6] =
+        [Self::Millimetre, Self::Metre, Self::Inch, Self::Centimetre, Self::Micrometre, Self::Foot];
 
     /// Length of the unit [m].
     pub fn metres(self) -> f64 {
@@ -56,10 +57,13 @@ impl FromStr for Unit {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
-        Self::ALL
-            .into_iter()
-            .find(|unit| unit.symbol() == text)
-            .ok_or_else(|| Error::input("--unit", format!("unknown unit '{text}'"), "use one of: mm, cm, m, um, in, ft"))
+        Self::ALL.into_iter().find(|unit| unit.symbol() == text).ok_or_else(|| {
+            Error::input(
+                "--unit",
+                format!("unknown unit '{text}'"),
+                "use one of: mm, cm, m, um, in, ft",
+            )
+        })
     }
 }
 
@@ -72,21 +76,32 @@ impl std::fmt::Display for Unit {
 /// Largest extents [m] between which a part is taken for what a two-finger gripper might handle.
 const PLAUSIBLE: (f64, f64) = (1e-3, 5.0);
 
-/// A warning when the largest of `extents` [m], read in `unit`, is implausible, with the unit that would fit.
+/// A warning when the largest of `extents` [m], read in `unit`, is implausible, with the unit that
+/// would fit.
 pub(super) fn implausible_size(extents: DVec3, unit: Unit, stated: bool) -> Option<String> {
     let largest = extents.max_element();
     if largest <= 0.0 || (PLAUSIBLE.0..=PLAUSIBLE.1).contains(&largest) {
         return None;
     }
-    // The part that would come nearest to 100 mm, a typical part for a gripper, in its largest extent.
+    // The part that would come nearest to 100 mm, a typical part for a gripper, in its largest
+    // extent.
     let distance = |other: &Unit| (largest / unit.metres() * other.metres() / 0.1).ln().abs();
-    let likely = Unit::ALL.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).filter(|&likely| likely != unit);
+    let likely = Unit::ALL
+        .into_iter()
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .filter(|&likely| likely != unit);
     let size = extents * 1e3;
     let source = if stated { "stated" } else { "assumed" };
-    let mut text = format!("implausible size: {:.4} x {:.4} x {:.4} mm with the {source} unit {unit}", size.x, size.y, size.z);
+    let mut text = format!(
+        "implausible size: {:.4} x {:.4} x {:.4} mm with the {source} unit {unit}",
+        size.x, size.y, size.z
+    );
     if let Some(likely) = likely {
         let size = extents / unit.metres() * likely.metres() * 1e3;
-        text += &format!("; --unit {likely} would give {:.4} x {:.4} x {:.4} mm", size.x, size.y, size.z);
+        text += &format!(
+            "; --unit {likely} would give {:.4} x {:.4} x {:.4} mm",
+            size.x, size.y, size.z
+        );
     }
     Some(text)
 }

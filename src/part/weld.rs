@@ -17,20 +17,21 @@ pub(super) struct Soup {
     pub warnings: Vec<String>,
 }
 
-/// Most triangles that are taken: half-edge numbers (three a triangle) must fit 32 bits with room for repairs.
+/// Most triangles that are taken: half-edge numbers (three a triangle) must fit 32 bits with room
+/// for repairs.
 pub(super) const MAX_TRIANGLES: usize = 1 << 30;
 
 /// Joins corners with equal coordinates (`-0.0` equals `0.0`) while triangles stream in.
 ///
-/// An open-addressing table of vertex numbers: one probe costs one cache line of it and one of the vertices, and
-/// neighbouring triangles hit the same ones.
+/// An open-addressing table of vertex numbers: one probe costs one cache line of it and one of the
+/// vertices, and neighbouring triangles hit the same ones.
 pub(super) struct Welder {
     vertices: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     /// Vertex number plus one; 0 is free. The length is a power of two, at most half full.
     table: Vec<u32>,
-    /// Corners of the last triangles, oldest overwritten: files list neighbours one after the other, so that more than
-    /// half of all corners are found here without a probe of the table.
+    /// Corners of the last triangles, oldest overwritten: files list neighbours one after the
+    /// other, so that more than half of all corners are found here without a probe of the table.
     recent: [(DVec3, u32); 6],
     next_recent: usize,
     read: usize,
@@ -39,7 +40,14 @@ pub(super) struct Welder {
 impl Default for Welder {
     fn default() -> Self {
         // A vertex number that does not exist yet marks an empty place among the recent corners.
-        Self { vertices: Vec::new(), triangles: Vec::new(), table: Vec::new(), recent: [(DVec3::ZERO, u32::MAX); 6], next_recent: 0, read: 0 }
+        Self {
+            vertices: Vec::new(),
+            triangles: Vec::new(),
+            table: Vec::new(),
+            recent: [(DVec3::ZERO, u32::MAX); 6],
+            next_recent: 0,
+            read: 0,
+        }
     }
 }
 
@@ -63,7 +71,9 @@ impl Welder {
     fn vertex(&mut self, position: DVec3) -> u32 {
         // Adding +0.0 turns -0.0 into 0.0, so equal values have equal bits.
         let position = position + DVec3::ZERO;
-        if let Some(&(_, vertex)) = self.recent.iter().find(|(recent, vertex)| *recent == position && (*vertex as usize) < self.vertices.len()) {
+        if let Some(&(_, vertex)) = self.recent.iter().find(|(recent, vertex)| {
+            *recent == position && (*vertex as usize) < self.vertices.len()
+        }) {
             return vertex;
         }
         let vertex = self.probe(position);
@@ -111,8 +121,8 @@ impl Welder {
     }
 }
 
-/// Mixes the bits of the coordinates. Values from 32-bit floats leave the low mantissa bits zero, so the multiply must
-/// carry high bits down: the upper half of the products is folded in.
+/// Mixes the bits of the coordinates. Values from 32-bit floats leave the low mantissa bits zero,
+/// so the multiply must carry high bits down: the upper half of the products is folded in.
 #[inline]
 fn hash(position: DVec3) -> u64 {
     const K: u64 = 0x9e37_79b9_7f4a_7c15;

@@ -1,4 +1,5 @@
-//! The scene file: where the part lies, what stands around it, and what the robot can do. TOML with units.
+//! The scene file: where the part lies, what stands around it, and what the robot can do. TOML with
+//! units.
 
 use std::path::Path;
 
@@ -172,7 +173,8 @@ impl Scene {
     /// Reads a scene file and the meshes that it names, which are sought beside it.
     ///
     /// # Errors
-    /// When the file or a mesh cannot be read, a field is unknown, or a value has no unit or makes no sense; the message names the place.
+    /// When the file or a mesh cannot be read, a field is unknown, or a value has no unit or makes
+    /// no sense; the message names the place.
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, "read", error))?;
         Self::parse(&path.display().to_string(), &text, path.parent().unwrap_or(Path::new("")))
@@ -184,8 +186,14 @@ impl Scene {
     /// As [`Self::read`].
     pub fn parse(place: &str, text: &str, folder: &Path) -> Result<Self> {
         let file: File = toml::from_str(text).map_err(|error| {
-            let line = error.span().map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
-            Error::input(format!("{place}:{line}"), error.message().to_owned(), "docs/formats.md shows a scene file with all its fields")
+            let line = error
+                .span()
+                .map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
+            Error::input(
+                format!("{place}:{line}"),
+                error.message().to_owned(),
+                "docs/formats.md shows a scene file with all its fields",
+            )
         })?;
         let standard = Self::default();
         let field = |name: &str| format!("{place}, {name}");
@@ -197,23 +205,36 @@ impl Scene {
         let opening = match gripper.opening.as_deref() {
             None => standard.opening,
             Some("full") => Opening::Full,
-            Some(text) => Opening::Jaw(positive(&field("gripper.opening"), Quantity::Length, text)?),
+            Some(text) => {
+                Opening::Jaw(positive(&field("gripper.opening"), Quantity::Length, text)?)
+            }
         };
         let approach = distance("gripper.approach", &gripper.approach, standard.approach)?;
         let back = distance("gripper.retreat", &gripper.retreat, approach)?;
         let retreat = match gripper.retreat_direction {
             None => Retreat::Back(back),
-            Some(direction) => Retreat::Along(unit(&field("gripper.retreat_direction"), direction)? * back),
+            Some(direction) => {
+                Retreat::Along(unit(&field("gripper.retreat_direction"), direction)? * back)
+            }
         };
         let cone = match &gripper.cone {
             None => None,
-            Some(cone) => Some((unit(&field("gripper.cone.axis"), cone.axis)?, positive(&field("gripper.cone.angle"), Quantity::Angle, &cone.angle)?)),
+            Some(cone) => Some((
+                unit(&field("gripper.cone.axis"), cone.axis)?,
+                positive(&field("gripper.cone.angle"), Quantity::Angle, &cone.angle)?,
+            )),
         };
         let reach = match &file.robot {
             None => None,
             Some(robot) => {
-                let [least, most] = [0, 1].map(|index| positive(&field("robot.reach"), Quantity::Length, &robot.reach[index]));
-                let reach = Reach { base: vector(&field("robot.base"), &robot.base)?, least: least?, most: most? };
+                let [least, most] = [0, 1].map(|index| {
+                    positive(&field("robot.reach"), Quantity::Length, &robot.reach[index])
+                });
+                let reach = Reach {
+                    base: vector(&field("robot.base"), &robot.base)?,
+                    least: least?,
+                    most: most?,
+                };
                 if reach.least > reach.most {
                     return Err(Error::input(
                         field("robot.reach"),
@@ -224,9 +245,19 @@ impl Scene {
                 Some(reach)
             }
         };
-        let obstacles = file.obstacle.iter().enumerate().map(|(index, table)| obstacle(place, index, table, folder)).collect::<Result<_>>()?;
+        let obstacles = file
+            .obstacle
+            .iter()
+            .enumerate()
+            .map(|(index, table)| obstacle(place, index, table, folder))
+            .collect::<Result<_>>()?;
         Ok(Self {
-            world_from_part: pose(&field("part"), file.part.position.as_ref(), file.part.rpy.as_ref(), file.part.quaternion)?,
+            world_from_part: pose(
+                &field("part"),
+                file.part.position.as_ref(),
+                file.part.rpy.as_ref(),
+                file.part.quaternion,
+            )?,
             obstacles,
             opening,
             approach,
@@ -241,7 +272,8 @@ impl Scene {
 fn obstacle(place: &str, index: usize, table: &ObstacleTable, folder: &Path) -> Result<Obstacle> {
     let name = table.name.clone().unwrap_or_else(|| format!("obstacle {}", index + 1));
     let place = format!("{place}, obstacle '{name}'");
-    let mut world_from_obstacle = pose(&place, table.position.as_ref(), table.rpy.as_ref(), table.quaternion)?;
+    let mut world_from_obstacle =
+        pose(&place, table.position.as_ref(), table.rpy.as_ref(), table.quaternion)?;
     let solid = match (&table.mesh, &table.size, &table.plane) {
         (Some(mesh), None, None) => {
             let unit = table.unit.as_deref().map(str::parse::<Unit>).transpose()?;
@@ -251,20 +283,34 @@ fn obstacle(place: &str, index: usize, table: &ObstacleTable, folder: &Path) -> 
         (None, Some(size), None) => {
             let size = vector(&place, size)?;
             if size.min_element() <= 0.0 {
-                return Err(Error::input(place, format!("a box of {size} m"), "give three positive sizes"));
+                return Err(Error::input(
+                    place,
+                    format!("a box of {size} m"),
+                    "give three positive sizes",
+                ));
             }
             Solid::Box { half: size / 2.0 }
         }
         (None, None, Some(normal)) => {
             if table.rpy.is_some() || table.quaternion.is_some() {
-                return Err(Error::input(place, "a plane is turned by its normal", "leave out rpy and quaternion"));
+                return Err(Error::input(
+                    place,
+                    "a plane is turned by its normal",
+                    "leave out rpy and quaternion",
+                ));
             }
             let normal = unit(&place, *normal)?;
             let (side, other) = normal.any_orthonormal_pair();
             world_from_obstacle.rotation = DMat3::from_cols(side, other, normal);
             Solid::HalfSpace
         }
-        _ => return Err(Error::input(place, "an obstacle needs one shape", "give one of mesh = \"FILE\", box = [sizes], plane = [normal]")),
+        _ => {
+            return Err(Error::input(
+                place,
+                "an obstacle needs one shape",
+                "give one of mesh = \"FILE\", box = [sizes], plane = [normal]",
+            ));
+        }
     };
     if table.unit.is_some() && table.mesh.is_none() {
         return Err(Error::input(place, "unit is for meshes only", "leave it out"));
@@ -272,14 +318,23 @@ fn obstacle(place: &str, index: usize, table: &ObstacleTable, folder: &Path) -> 
     Ok(Obstacle { name, solid, world_from_obstacle })
 }
 
-fn pose(place: &str, position: Option<&[String; 3]>, rpy: Option<&[String; 3]>, quaternion: Option<[f64; 4]>) -> Result<Frame> {
-    let origin = position.map_or(Ok(DVec3::ZERO), |position| vector(&format!("{place}, position"), position))?;
+fn pose(
+    place: &str,
+    position: Option<&[String; 3]>,
+    rpy: Option<&[String; 3]>,
+    quaternion: Option<[f64; 4]>,
+) -> Result<Frame> {
+    let origin = position
+        .map_or(Ok(DVec3::ZERO), |position| vector(&format!("{place}, position"), position))?;
     let rotation = match (rpy, quaternion) {
         (None, None) => DMat3::IDENTITY,
         (Some(rpy), None) => {
             let place = format!("{place}, rpy");
-            let [roll, pitch, yaw] = [0, 1, 2].map(|index| Quantity::Angle.parse(&place, &rpy[index]));
-            DMat3::from_rotation_z(yaw?) * DMat3::from_rotation_y(pitch?) * DMat3::from_rotation_x(roll?)
+            let [roll, pitch, yaw] =
+                [0, 1, 2].map(|index| Quantity::Angle.parse(&place, &rpy[index]));
+            DMat3::from_rotation_z(yaw?)
+                * DMat3::from_rotation_y(pitch?)
+                * DMat3::from_rotation_x(roll?)
         }
         (None, Some(quaternion)) => {
             let quaternion = DQuat::from_array(quaternion);
@@ -292,7 +347,13 @@ fn pose(place: &str, position: Option<&[String; 3]>, rpy: Option<&[String; 3]>, 
             }
             DMat3::from_quat(quaternion.normalize())
         }
-        (Some(_), Some(_)) => return Err(Error::input(place, "both rpy and quaternion are given", "give one of them")),
+        (Some(_), Some(_)) => {
+            return Err(Error::input(
+                place,
+                "both rpy and quaternion are given",
+                "give one of them",
+            ));
+        }
     };
     Ok(Frame { rotation, origin })
 }
@@ -306,7 +367,11 @@ fn unit(place: &str, direction: [f64; 3]) -> Result<DVec3> {
     let direction = DVec3::from_array(direction);
     let length = direction.length();
     if !(length.is_finite() && length > 0.0) {
-        return Err(Error::input(place, format!("{direction} is not a direction"), "give three finite numbers, not all zero"));
+        return Err(Error::input(
+            place,
+            format!("{direction} is not a direction"),
+            "give three finite numbers, not all zero",
+        ));
     }
     Ok(direction / length)
 }
@@ -314,7 +379,11 @@ fn unit(place: &str, direction: [f64; 3]) -> Result<DVec3> {
 fn positive(place: &str, quantity: Quantity, text: &str) -> Result<f64> {
     let value = quantity.parse(place, text)?;
     if value < 0.0 {
-        return Err(Error::input(place, format!("'{text}' is negative"), "give a value of zero or more"));
+        return Err(Error::input(
+            place,
+            format!("'{text}' is negative"),
+            "give a value of zero or more",
+        ));
     }
     Ok(value)
 }

@@ -38,7 +38,12 @@ pub struct Checkpoint<'a> {
 
 impl<'a> Checkpoint<'a> {
     /// The state of a run, borrowed.
-    pub fn new(inputs: &'a BTreeMap<String, Value>, backend: &'a str, progress: &'a Progress, collector: &'a Collector) -> Self {
+    pub fn new(
+        inputs: &'a BTreeMap<String, Value>,
+        backend: &'a str,
+        progress: &'a Progress,
+        collector: &'a Collector,
+    ) -> Self {
         Self {
             format: FORMAT.into(),
             version: VERSION,
@@ -63,7 +68,8 @@ impl<'a> Checkpoint<'a> {
     /// Reads a state and makes sure that it answers the question that is asked now.
     ///
     /// # Errors
-    /// When the file cannot be read or is no state of this version, or the inputs differ; the message names those that do.
+    /// When the file cannot be read or is no state of this version, or the inputs differ; the
+    /// message names those that do.
     pub fn read(path: &Path, inputs: &BTreeMap<String, Value>) -> Result<Checkpoint<'static>> {
         let place = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
@@ -74,22 +80,32 @@ impl<'a> Checkpoint<'a> {
             format: String,
             version: u32,
         }
-        let marks: Marks = serde_json::from_slice(&bytes).map_err(|error| wrong(format!("is no unfinished run: {error}")))?;
+        let marks: Marks = serde_json::from_slice(&bytes)
+            .map_err(|error| wrong(format!("is no unfinished run: {error}")))?;
         if (marks.format.as_str(), marks.version) != (FORMAT, VERSION) {
-            return Err(wrong(format!("is '{}', version {}, not an unfinished run of version {VERSION}", marks.format, marks.version)));
+            return Err(wrong(format!(
+                "is '{}', version {}, not an unfinished run of version {VERSION}",
+                marks.format, marks.version
+            )));
         }
-        let read: Checkpoint<'static> = serde_json::from_slice(&bytes).map_err(|error| wrong(format!("cannot be read: {error}")))?;
+        let read: Checkpoint<'static> = serde_json::from_slice(&bytes)
+            .map_err(|error| wrong(format!("cannot be read: {error}")))?;
         let differences = differences(&read.inputs, inputs);
         if differences.is_empty() {
             return Ok(read);
         }
-        let problem = format!("belongs to another question; these differ: {}", differences.join("; "));
-        Err(Error::input(place, problem, "repeat the command of the unfinished run with --resume, or start anew without it"))
+        let problem =
+            format!("belongs to another question; these differ: {}", differences.join("; "));
+        Err(Error::input(
+            place,
+            problem,
+            "repeat the command of the unfinished run with --resume, or start anew without it",
+        ))
     }
 }
 
-/// Everything that decides which grips are found and how they are ranked, by name. `settings` are those that no other argument
-/// holds. Mesh and loads stand as checksums.
+/// Everything that decides which grips are found and how they are ranked, by name. `settings` are
+/// those that no other argument holds. Mesh and loads stand as checksums.
 pub fn inputs(
     part: &Part,
     mass: &MassProperties,
@@ -112,7 +128,10 @@ pub fn inputs(
     }
     all.extend([
         ("gripfast version".to_owned(), env!("CARGO_PKG_VERSION").into()),
-        ("part".to_owned(), json!(format!("{} triangles, checksum {:08x}", part.mesh.triangles.len(), mesh.sum()))),
+        (
+            "part".to_owned(),
+            json!(format!("{} triangles, checksum {:08x}", part.mesh.triangles.len(), mesh.sum())),
+        ),
         ("mass".to_owned(), json!(mass)),
         ("gripper".to_owned(), json!(gripper)),
         ("loads".to_owned(), json!(format!("{} cases, checksum {:08x}", loads.len(), cases.sum()))),
@@ -124,10 +143,18 @@ pub fn inputs(
 fn differences(there: &BTreeMap<String, Value>, here: &BTreeMap<String, Value>) -> Vec<String> {
     let names: std::collections::BTreeSet<&String> = there.keys().chain(here.keys()).collect();
     let differs = names.into_iter().filter(|name| there.get(*name) != here.get(*name));
-    let text = |value: Option<&Value>| value.map_or("nothing".to_owned(), |value| value.as_str().map_or_else(|| value.to_string(), str::to_owned));
+    let text = |value: Option<&Value>| {
+        value.map_or("nothing".to_owned(), |value| {
+            value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+        })
+    };
     let describe = |name: &String| {
         let (there, here) = (text(there.get(name)), text(here.get(name)));
-        if there.len().max(here.len()) > 60 { name.clone() } else { format!("{name} ({there} there, {here} here)") }
+        if there.len().max(here.len()) > 60 {
+            name.clone()
+        } else {
+            format!("{name} ({there} there, {here} here)")
+        }
     };
     differs.map(describe).collect()
 }
@@ -138,10 +165,33 @@ mod tests {
 
     #[test]
     fn what_differs_is_named() {
-        let map = |values: &[(&str, Value)]| values.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect::<BTreeMap<_, _>>();
-        let there = map(&[("k1", json!(1.0)), ("part", json!("12 triangles")), ("old", json!(null)), ("gripper", json!("x".repeat(100)))]);
-        let here = map(&[("k1", json!(2.0)), ("part", json!("12 triangles")), ("new", json!(true)), ("gripper", json!("y"))]);
+        let map = |values: &[(&str, Value)]| {
+            values
+                .iter()
+                .map(|(name, value)| ((*name).to_owned(), value.clone()))
+                .collect::<BTreeMap<_, _>>()
+        };
+        let there = map(&[
+            ("k1", json!(1.0)),
+            ("part", json!("12 triangles")),
+            ("old", json!(null)),
+            ("gripper", json!("x".repeat(100))),
+        ]);
+        let here = map(&[
+            ("k1", json!(2.0)),
+            ("part", json!("12 triangles")),
+            ("new", json!(true)),
+            ("gripper", json!("y")),
+        ]);
         assert!(differences(&there, &there).is_empty());
-        assert_eq!(differences(&there, &here), ["gripper", "k1 (1.0 there, 2.0 here)", "new (nothing there, true here)", "old (null there, nothing here)"]);
+        assert_eq!(
+            differences(&there, &here),
+            [
+                "gripper",
+                "k1 (1.0 there, 2.0 here)",
+                "new (nothing there, true here)",
+                "old (null there, nothing here)"
+            ]
+        );
     }
 }

@@ -18,11 +18,13 @@ pub struct Displacement {
 }
 
 impl Proposer<'_> {
-    /// `grip`, one of this part and gripper, at each of the displaced poses: frame, faces and contact areas are those of the
-    /// new pose; a pad that touches nothing has an empty area. Interference and the smallest contact area are not tested.
+    /// `grip`, one of this part and gripper, at each of the displaced poses: frame, faces and
+    /// contact areas are those of the new pose; a pad that touches nothing has an empty area.
+    /// Interference and the smallest contact area are not tested.
     ///
     /// # Errors
-    /// When the part has no such face pair for this gripper, or the frame's closing axis is not its normal.
+    /// When the part has no such face pair for this gripper, or the frame's closing axis is not its
+    /// normal.
     pub fn displaced(&self, grip: &Grip, by: &[Displacement]) -> Result<Vec<Grip>> {
         let (index, _) = self.site_of(grip.face_i, grip.face_ii, &grip.part_from_grip)?;
         let site = &self.sites[index];
@@ -31,19 +33,41 @@ impl Proposer<'_> {
         let patches = site.patches(self.part, &axes, reach);
         let (mut scratch, mut known) = ([Scratch::default(), Scratch::default()], Known::default());
         let displaced = by.iter().map(|by| {
-            let grip_from_displaced = Frame { rotation: DMat3::from_rotation_z(by.turn), origin: by.shift.extend(0.0) };
+            let grip_from_displaced =
+                Frame { rotation: DMat3::from_rotation_z(by.turn), origin: by.shift.extend(0.0) };
             let part_from_grip = grip.part_from_grip.compose(&grip_from_displaced);
             let local = site.part_from_site.inverse().compose(&part_from_grip);
-            let (place, angle) = (local.origin.truncate(), local.rotation.x_axis.truncate().to_angle());
+            let (place, angle) =
+                (local.origin.truncate(), local.rotation.x_axis.truncate().to_angle());
             let flipped = local.rotation.z_axis.z < 0.0;
             let pad = TurnedPad::new(&work::oriented(&self.gripper.pad, flipped), angle);
-            let whole = [0, 1].map(|side: usize| patches.get(side).is_none_or(|patch| patch.touch(&pad, place, &mut scratch[side]) == Touch::Whole));
-            let contact = self.contact(&patches, &pad, place, angle, flipped, whole, &mut scratch, &mut known);
+            let whole = [0, 1].map(|side: usize| {
+                patches.get(side).is_none_or(|patch| {
+                    patch.touch(&pad, place, &mut scratch[side]) == Touch::Whole
+                })
+            });
+            let contact = self.contact(
+                &patches,
+                &pad,
+                place,
+                angle,
+                flipped,
+                whole,
+                &mut scratch,
+                &mut known,
+            );
             let mut faces = [0, 1].map(|side| site.face_at(side, self.part, place));
             if flipped {
                 faces.reverse();
             }
-            Grip { part_from_grip, face_i: faces[0], face_ii: faces[1], angle: grip.angle + by.turn, contact, ..grip.clone() }
+            Grip {
+                part_from_grip,
+                face_i: faces[0],
+                face_ii: faces[1],
+                angle: grip.angle + by.turn,
+                contact,
+                ..grip.clone()
+            }
         });
         Ok(displaced.collect())
     }

@@ -18,7 +18,9 @@ impl Environment {
     pub(super) fn new(options: &ProposeOptions) -> Self {
         Self {
             cone: options.approach_cone.map(|cone| Cone { axis: cone.axis.normalize(), ..cone }),
-            ground: options.ground.map(|ground| Ground { normal: ground.normal.normalize(), ..ground }),
+            ground: options
+                .ground
+                .map(|ground| Ground { normal: ground.normal.normalize(), ..ground }),
             keep_out: options.keep_out.clone(),
         }
     }
@@ -48,10 +50,16 @@ impl Environment {
     }
 
     /// The first sweep in a keep-out box, and the box's number.
-    pub(super) fn kept_out(&self, sweeps: &[Sweep], part_from_grip: &Frame) -> Option<(usize, usize)> {
-        self.keep_out
-            .iter()
-            .enumerate()
-            .find_map(|(number, [low, high])| sweeps.iter().position(|sweep| sweep.meets_box(part_from_grip, *low, *high)).map(|sweep| (sweep, number)))
+    pub(super) fn kept_out(
+        &self,
+        sweeps: &[Sweep],
+        part_from_grip: &Frame,
+    ) -> Option<(usize, usize)> {
+        self.keep_out.iter().enumerate().find_map(|(number, [low, high])| {
+            sweeps
+                .iter()
+                .position(|sweep| sweep.meets_box(part_from_grip, *low, *high))
+                .map(|sweep| (sweep, number))
+        })
     }
 }

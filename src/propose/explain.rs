@@ -25,10 +25,11 @@ pub struct SiteInfo {
     pub width: f64,
     /// Gripped from outside or from inside.
     pub kind: PairKind,
-    /// How deep finger bodies may lie in the gripped planes without counting as interference [m]: what the planes' tilt
-    /// and roughness take, which the pads take up.
+    /// How deep finger bodies may lie in the gripped planes without counting as interference [m]:
+    /// what the planes' tilt and roughness take, which the pads take up.
     pub touch: f64,
-    /// Site frame in the part frame: `z` is the closing axis, positions lie in `(x, y)`, angles count from `x`.
+    /// Site frame in the part frame: `z` is the closing axis, positions lie in `(x, y)`, angles
+    /// count from `x`.
     pub part_from_site: Frame,
     /// Grip origins in the site's `(x, y)` [m].
     pub positions: Vec<DVec2>,
@@ -87,26 +88,43 @@ impl Proposer<'_> {
     ///
     /// # Errors
     /// When no site holds these faces, or the frame's closing axis is not theirs.
-    pub fn explain_pose(&self, face_i: u32, face_ii: u32, part_from_grip: &Frame) -> Result<Explanation> {
+    pub fn explain_pose(
+        &self,
+        face_i: u32,
+        face_ii: u32,
+        part_from_grip: &Frame,
+    ) -> Result<Explanation> {
         let (index, local) = self.site_of(face_i, face_ii, part_from_grip)?;
-        self.explain(index, local.origin.truncate(), local.rotation.x_axis.truncate().to_angle(), local.rotation.z_axis.z < 0.0)
+        self.explain(
+            index,
+            local.origin.truncate(),
+            local.rotation.x_axis.truncate().to_angle(),
+            local.rotation.z_axis.z < 0.0,
+        )
     }
 
     /// The nearest site with these faces, and the grip frame in its frame.
-    pub(super) fn site_of(&self, face_i: u32, face_ii: u32, part_from_grip: &Frame) -> Result<(usize, Frame)> {
+    pub(super) fn site_of(
+        &self,
+        face_i: u32,
+        face_ii: u32,
+        part_from_grip: &Frame,
+    ) -> Result<(usize, Frame)> {
         let place = || format!("faces {face_i} and {face_ii}");
         let holds = |site: &Site| {
             let has = |side: usize, face: u32| site.faces[side].contains(&face);
             (has(0, face_i) && has(1, face_ii)) || (has(0, face_ii) && has(1, face_i))
         };
         let local = |site: &Site| site.part_from_site.point_inverse(part_from_grip.origin);
-        let nearest = self.sites.iter().enumerate().filter(|(_, site)| holds(site)).min_by(|(_, a), (_, b)| {
-            let outside = |site: &Site| {
-                let point = local(site).truncate();
-                (point - point.clamp(site.bounds.min, site.bounds.max)).length()
-            };
-            outside(a).total_cmp(&outside(b))
-        });
+        let nearest = self.sites.iter().enumerate().filter(|(_, site)| holds(site)).min_by(
+            |(_, a), (_, b)| {
+                let outside = |site: &Site| {
+                    let point = local(site).truncate();
+                    (point - point.clamp(site.bounds.min, site.bounds.max)).length()
+                };
+                outside(a).total_cmp(&outside(b))
+            },
+        );
         let Some((index, site)) = nearest else {
             return Err(Error::input(
                 place(),
@@ -116,21 +134,40 @@ impl Proposer<'_> {
         };
         let site_from_grip = site.part_from_site.inverse().compose(part_from_grip);
         if site_from_grip.rotation.z_axis.z.abs() < 1.0 - 1e-6 {
-            return Err(Error::input(place(), "the closing axis of the frame is not their normal", "take frame and faces from one grip"));
+            return Err(Error::input(
+                place(),
+                "the closing axis of the frame is not their normal",
+                "take frame and faces from one grip",
+            ));
         }
         Ok((index, site_from_grip))
     }
 
-    /// Explains the pose at `position` [m] of a site's plane, approaching at `angle` [rad]; `flipped`: jaws exchanged.
+    /// Explains the pose at `position` [m] of a site's plane, approaching at `angle` [rad];
+    /// `flipped`: jaws exchanged.
     ///
     /// # Errors
     /// When there is no such site or the numbers are not finite.
-    pub fn explain(&self, site: usize, position: DVec2, angle: f64, flipped: bool) -> Result<Explanation> {
+    pub fn explain(
+        &self,
+        site: usize,
+        position: DVec2,
+        angle: f64,
+        flipped: bool,
+    ) -> Result<Explanation> {
         let Some(found) = self.sites.get(site) else {
-            return Err(Error::input(format!("site {site}"), format!("the part has {} sites for this gripper", self.sites.len()), "count from 0"));
+            return Err(Error::input(
+                format!("site {site}"),
+                format!("the part has {} sites for this gripper", self.sites.len()),
+                "count from 0",
+            ));
         };
         if !position.is_finite() || !angle.is_finite() {
-            return Err(Error::input("position and angle", format!("{position}, {angle}"), "give finite values"));
+            return Err(Error::input(
+                "position and angle",
+                format!("{position}, {angle}"),
+                "give finite values",
+            ));
         }
         // A symmetric gripper looks the same with exchanged jaws.
         let turned = flipped && !self.symmetric;
@@ -145,24 +182,45 @@ impl Proposer<'_> {
             frame.rotation *= crate::gripper::half_turn();
         }
         let Verdict { checks, rejection, place } = verdict;
-        Ok(Explanation { site, part_from_grip: frame, width: found.width, contact, checks, rejection, place })
+        Ok(Explanation {
+            site,
+            part_from_grip: frame,
+            width: found.width,
+            contact,
+            checks,
+            rejection,
+            place,
+        })
     }
 
     fn explain_place(&self, frame: &Frame, verdict: &mut Verdict) {
         if self.options.approach_cone.is_some() {
             let direction = work::approach(frame);
             let passed = self.environment.allows(direction);
-            verdict
-                .add("approach direction", passed, format!("({:.3}, {:.3}, {:.3})", direction.x, direction.y, direction.z), || Rejection::ApproachOutsideCone);
+            verdict.add(
+                "approach direction",
+                passed,
+                format!("({:.3}, {:.3}, {:.3})", direction.x, direction.y, direction.z),
+                || Rejection::ApproachOutsideCone,
+            );
         }
         if let Some(most) = self.options.max_offset {
             let distance = frame.origin.distance(self.part.mass_properties(1.0).centre_of_mass);
             let detail = format!("{:.2} mm, at most {:.2} mm", distance * 1e3, most * 1e3);
-            verdict.add("distance from the centre of mass", distance <= most, detail, || Rejection::TooFarFromCentreOfMass);
+            verdict.add("distance from the centre of mass", distance <= most, detail, || {
+                Rejection::TooFarFromCentreOfMass
+            });
         }
     }
 
-    fn explain_contact(&self, prepared: &Prepared<'_>, position: DVec2, angle: f64, turned: bool, verdict: &mut Verdict) -> Contact {
+    fn explain_contact(
+        &self,
+        prepared: &Prepared<'_>,
+        position: DVec2,
+        angle: f64,
+        turned: bool,
+        verdict: &mut Verdict,
+    ) -> Contact {
         let outline_of_pad = work::oriented(&self.gripper.pad, turned);
         let pad = TurnedPad::new(&outline_of_pad, angle);
         let mut patches: [Patch; 2] = [Patch::new(), Patch::new()];
@@ -172,7 +230,8 @@ impl Proposer<'_> {
             let area = match patch.touch(&pad, position, &mut scratch) {
                 Touch::Empty => 0.0,
                 Touch::Whole => {
-                    patches[side] = vec![Polygon { outer: outline_of_pad.clone(), holes: Vec::new() }];
+                    patches[side] =
+                        vec![Polygon { outer: outline_of_pad.clone(), holes: Vec::new() }];
                     pad.area()
                 }
                 Touch::Part(area) => {
@@ -181,34 +240,62 @@ impl Proposer<'_> {
                 }
             };
             let floor = self.contact_floor(prepared.site, pad.area());
-            let detail = format!("{:.2} mm^2, {:.1} % of the pad; at least {:.2} mm^2", area * 1e6, area / pad.area() * 100.0, floor * 1e6);
+            let detail = format!(
+                "{:.2} mm^2, {:.1} % of the pad; at least {:.2} mm^2",
+                area * 1e6,
+                area / pad.area() * 100.0,
+                floor * 1e6
+            );
             verdict.add(name, area > 0.0 && area >= floor, detail, || Rejection::ContactTooSmall);
         }
         let [face_i, face_ii] = patches;
         Contact { face_i, face_ii }
     }
 
-    fn explain_environment(&self, prepared: &Prepared<'_>, frame: &Frame, turned: bool, verdict: &mut Verdict) {
+    fn explain_environment(
+        &self,
+        prepared: &Prepared<'_>,
+        frame: &Frame,
+        turned: bool,
+        verdict: &mut Verdict,
+    ) {
         let sweeps = &prepared.outer_sweeps[usize::from(turned)];
         if self.options.ground.is_some() {
             let depths = self.environment.depths(sweeps, frame);
             let hit = self.environment.grounded(&depths, frame.origin);
-            let detail = hit.map_or("above it".to_string(), |sweep| format!("{} would go below it", title(&sweeps[sweep])));
-            verdict.add("ground", hit.is_none(), detail, || Rejection::Ground { body: hit.map_or(String::new(), |sweep| sweeps[sweep].body.clone()) });
+            let detail = hit.map_or("above it".to_string(), |sweep| {
+                format!("{} would go below it", title(&sweeps[sweep]))
+            });
+            verdict.add("ground", hit.is_none(), detail, || Rejection::Ground {
+                body: hit.map_or(String::new(), |sweep| sweeps[sweep].body.clone()),
+            });
         }
         if !self.options.keep_out.is_empty() {
             let hit = self.environment.kept_out(sweeps, frame);
-            let detail = hit.map_or("outside all".to_string(), |(sweep, number)| format!("{} would enter box {number}", title(&sweeps[sweep])));
+            let detail = hit.map_or("outside all".to_string(), |(sweep, number)| {
+                format!("{} would enter box {number}", title(&sweeps[sweep]))
+            });
             verdict.add("keep-out boxes", hit.is_none(), detail, || Rejection::KeepOut {
                 body: hit.map_or(String::new(), |(sweep, _)| sweeps[sweep].body.clone()),
             });
         }
     }
 
-    fn explain_interference(&self, prepared: &Prepared<'_>, position: DVec2, angle: f64, turned: bool, frame: &Frame, verdict: &mut Verdict) {
+    fn explain_interference(
+        &self,
+        prepared: &Prepared<'_>,
+        position: DVec2,
+        angle: f64,
+        turned: bool,
+        frame: &Frame,
+        verdict: &mut Verdict,
+    ) {
         let site = prepared.site;
         let kept = self.tree.as_ref().filter(|(direction, _)| *direction == site.direction);
-        let tree = kept.map_or_else(|| std::sync::Arc::new(self.new_tree(site.direction)), |(_, tree)| std::sync::Arc::clone(tree));
+        let tree = kept.map_or_else(
+            || std::sync::Arc::new(self.new_tree(site.direction)),
+            |(_, tree)| std::sync::Arc::clone(tree),
+        );
         let view = self.view(site, &tree, angle);
         let place = self.place(site, &view, position);
         for sweep in &prepared.sweeps[usize::from(turned)] {
@@ -222,12 +309,17 @@ impl Proposer<'_> {
             let detail = match (met, at) {
                 (Some((triangle, _)), Some(at)) => {
                     let at = at * 1e3;
-                    format!("meets the part at ({:.2}, {:.2}, {:.2}) mm, triangle {triangle}", at.x, at.y, at.z)
+                    format!(
+                        "meets the part at ({:.2}, {:.2}, {:.2}) mm, triangle {triangle}",
+                        at.x, at.y, at.z
+                    )
                 }
                 _ => "free".to_string(),
             };
             verdict.place = verdict.place.or(at);
-            verdict.add(&format!("{} {stage}", title(sweep)), met.is_none(), detail, || work::reason(sweep));
+            verdict.add(&format!("{} {stage}", title(sweep)), met.is_none(), detail, || {
+                work::reason(sweep)
+            });
         }
     }
 }
@@ -239,7 +331,13 @@ struct Verdict {
 }
 
 impl Verdict {
-    fn add(&mut self, name: &str, passed: bool, detail: String, reason: impl FnOnce() -> Rejection) {
+    fn add(
+        &mut self,
+        name: &str,
+        passed: bool,
+        detail: String,
+        reason: impl FnOnce() -> Rejection,
+    ) {
         if !passed && self.rejection.is_none() {
             self.rejection = Some(reason());
         }
@@ -248,7 +346,11 @@ impl Verdict {
 }
 
 fn title(sweep: &Sweep) -> String {
-    if sweep.jaw.is_empty() { format!("palm body '{}'", sweep.body) } else { format!("finger {} body '{}'", sweep.jaw, sweep.body) }
+    if sweep.jaw.is_empty() {
+        format!("palm body '{}'", sweep.body)
+    } else {
+        format!("finger {} body '{}'", sweep.jaw, sweep.body)
+    }
 }
 
 /// A point of the triangle within the sweep's box: the middle of what the box cuts out of it.

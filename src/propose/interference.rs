@@ -1,17 +1,20 @@
 //! Which of many positions of a gripper, at one angle, are free of the part.
 //!
-//! Positions of one face pair at one angle differ by a shift in the pad plane only. They are split into blocks, and a
-//! sweep is tested against the part for a whole block at once: where the union of its shifted boxes holds nothing, all
-//! are free; where a vertex of the part lies in all of them, all are blocked. Only blocks across the border between the
-//! two are split further, down to single positions with exact tests, and each block hands its halves the few tree nodes
-//! that are near. The cost follows the border, not the number of positions, and hardly the number of triangles.
+//! Positions of one face pair at one angle differ by a shift in the pad plane only. They are split
+//! into blocks, and a sweep is tested against the part for a whole block at once: where the union
+//! of its shifted boxes holds nothing, all are free; where a vertex of the part lies in all of
+//! them, all are blocked. Only blocks across the border between the two are split further, down to
+//! single positions with exact tests, and each block hands its halves the few tree nodes that are
+//! near. The cost follows the border, not the number of positions, and hardly the number of
+//! triangles.
 
 use glam::{DVec2, DVec3};
 
 use super::sweep::Sweep;
 use super::tree::Tree;
 
-/// The part as seen from the grip axes at one angle: tree axes turned by the angle about the closing axis.
+/// The part as seen from the grip axes at one angle: tree axes turned by the angle about the
+/// closing axis.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct View<'a> {
     tree: &'a Tree,
@@ -21,7 +24,8 @@ pub(super) struct View<'a> {
     height: f64,
 }
 
-/// Shape of a query: a box in grip axes that all positions of a block lie in, and one that lies in all.
+/// Shape of a query: a box in grip axes that all positions of a block lie in, and one that lies in
+/// all.
 struct Window {
     middle: DVec3,
     half: DVec3,
@@ -51,9 +55,15 @@ impl<'a> View<'a> {
         self.turned(point.truncate()).extend(point.z - self.height)
     }
 
-    /// Marks in `blocked` the positions, given in grip axes, at which the sweep meets the part. `chosen` lists the
-    /// positions in question; it is reordered.
-    pub(super) fn test(&self, sweep: &Sweep, positions: &[DVec2], chosen: &mut [u32], blocked: &mut [bool]) {
+    /// Marks in `blocked` the positions, given in grip axes, at which the sweep meets the part.
+    /// `chosen` lists the positions in question; it is reordered.
+    pub(super) fn test(
+        &self,
+        sweep: &Sweep,
+        positions: &[DVec2],
+        chosen: &mut [u32],
+        blocked: &mut [bool],
+    ) {
         if chosen.is_empty() || self.tree.is_empty() {
             return;
         }
@@ -61,16 +71,26 @@ impl<'a> View<'a> {
         self.block(sweep, positions, chosen, blocked, &mut front, 0);
     }
 
-    fn block(&self, sweep: &Sweep, positions: &[DVec2], chosen: &mut [u32], blocked: &mut [bool], front: &mut Vec<u32>, start: usize) {
-        let (low, high) = chosen.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), &index| {
-            let position = positions[index as usize];
-            (low.min(position), high.max(position))
-        });
+    fn block(
+        &self,
+        sweep: &Sweep,
+        positions: &[DVec2],
+        chosen: &mut [u32],
+        blocked: &mut [bool],
+        front: &mut Vec<u32>,
+        start: usize,
+    ) {
+        let (low, high) =
+            chosen.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), &index| {
+                let position = positions[index as usize];
+                (low.min(position), high.max(position))
+            });
         let end = front.len();
         if let [index] = chosen {
             let position = positions[*index as usize];
             let window = window(sweep, position, position);
-            blocked[*index as usize] = (start..end).any(|node| self.meets(sweep, position, &window, front[node]));
+            blocked[*index as usize] =
+                (start..end).any(|node| self.meets(sweep, position, &window, front[node]));
             return;
         }
         let found = self.narrow(sweep, &window(sweep, low, high), front, start);
@@ -80,7 +100,11 @@ impl<'a> View<'a> {
             Found::Near(count) => {
                 let axis = usize::from(high.y - low.y > high.x - low.x);
                 let half = chosen.len() / 2;
-                chosen.select_nth_unstable_by(half, |&a, &b| positions[a as usize][axis].total_cmp(&positions[b as usize][axis]).then(a.cmp(&b)));
+                chosen.select_nth_unstable_by(half, |&a, &b| {
+                    positions[a as usize][axis]
+                        .total_cmp(&positions[b as usize][axis])
+                        .then(a.cmp(&b))
+                });
                 let (left, right) = chosen.split_at_mut(half);
                 debug_assert_eq!(front.len(), end + count);
                 self.block(sweep, positions, left, blocked, front, end);
@@ -90,7 +114,8 @@ impl<'a> View<'a> {
         front.truncate(end);
     }
 
-    /// Appends to `front` the nodes under `front[start..]` that the outer box meets, split down to a size that suits it.
+    /// Appends to `front` the nodes under `front[start..]` that the outer box meets, split down to
+    /// a size that suits it.
     fn narrow(&self, sweep: &Sweep, window: &Window, front: &mut Vec<u32>, start: usize) -> Found {
         let end = front.len();
         // Nodes much smaller than the window tell the halves nothing more.
@@ -133,8 +158,14 @@ impl<'a> View<'a> {
             return true;
         }
         match self.tree.children(node) {
-            Some([left, right]) => self.meets(sweep, position, window, left) || self.meets(sweep, position, window, right),
-            None => self.tree.triangles(node).any(|(_, corners)| sweep.meets(self.local(corners, position))),
+            Some([left, right]) => {
+                self.meets(sweep, position, window, left)
+                    || self.meets(sweep, position, window, right)
+            }
+            None => self
+                .tree
+                .triangles(node)
+                .any(|(_, corners)| sweep.meets(self.local(corners, position))),
         }
     }
 
@@ -143,7 +174,8 @@ impl<'a> View<'a> {
         corners.map(|corner| self.grip_axes(corner) - position.extend(0.0))
     }
 
-    /// The first triangle, by mesh index, that the sweep meets at `position`, with its corners in the grip frame.
+    /// The first triangle, by mesh index, that the sweep meets at `position`, with its corners in
+    /// the grip frame.
     pub(super) fn first_met(&self, sweep: &Sweep, position: DVec2) -> Option<(u32, [DVec3; 3])> {
         let window = window(sweep, position, position);
         let mut stack = if self.tree.is_empty() { Vec::new() } else { vec![0] };
@@ -168,8 +200,8 @@ impl<'a> View<'a> {
         first
     }
 
-    /// Separating axes of a node's box (tree axes) and the window's outer box (grip axes); both share the third axis,
-    /// so that these five are all there are.
+    /// Separating axes of a node's box (tree axes) and the window's outer box (grip axes); both
+    /// share the third axis, so that these five are all there are.
     fn overlaps(&self, window: &Window, middle: DVec3, half: DVec3) -> bool {
         let height = middle.z - self.height - window.middle.z;
         if height.abs() > half.z + window.half.z {
@@ -177,12 +209,18 @@ impl<'a> View<'a> {
         }
         let (c, s) = (self.direction.x.abs(), self.direction.y.abs());
         let apart = self.turned(middle.truncate()) - window.middle.truncate();
-        if apart.x.abs() > window.half.x + c * half.x + s * half.y || apart.y.abs() > window.half.y + s * half.x + c * half.y {
+        if apart.x.abs() > window.half.x + c * half.x + s * half.y
+            || apart.y.abs() > window.half.y + s * half.x + c * half.y
+        {
             return false;
         }
         // The same difference in tree axes.
-        let apart = DVec2::new(self.direction.x * apart.x - self.direction.y * apart.y, self.direction.y * apart.x + self.direction.x * apart.y);
-        apart.x.abs() <= half.x + c * window.half.x + s * window.half.y && apart.y.abs() <= half.y + s * window.half.x + c * window.half.y
+        let apart = DVec2::new(
+            self.direction.x * apart.x - self.direction.y * apart.y,
+            self.direction.y * apart.x + self.direction.x * apart.y,
+        );
+        apart.x.abs() <= half.x + c * window.half.x + s * window.half.y
+            && apart.y.abs() <= half.y + s * window.half.x + c * window.half.y
     }
 }
 

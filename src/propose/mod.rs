@@ -1,9 +1,11 @@
-//! From a part and a gripper to candidate grips free of interference, with a reason for every rejection.
+//! From a part and a gripper to candidate grips free of interference, with a reason for every
+//! rejection.
 //!
-//! Antiparallel face pairs within the stroke become sites; each site gets a grid of positions and a set of approach
-//! angles; each candidate is clipped to its contact polygons and tested for interference of fingers and palm with the
-//! part, in the grip, while the jaws close, and along the straight approach. Candidates flow in chunks, so that memory
-//! stays bounded whatever their number; their order and numbers depend on the input and the options alone.
+//! Antiparallel face pairs within the stroke become sites; each site gets a grid of positions and a
+//! set of approach angles; each candidate is clipped to its contact polygons and tested for
+//! interference of fingers and palm with the part, in the grip, while the jaws close, and along the
+//! straight approach. Candidates flow in chunks, so that memory stays bounded whatever their
+//! number; their order and numbers depend on the input and the options alone.
 
 mod displace;
 mod environment;
@@ -41,11 +43,12 @@ use site::Site;
 use sweep::{Motion, Sweep, sweeps};
 use tree::{Topology, Tree};
 
-/// Positions per work item: large enough to share what an angle determines, small enough to spread over the threads.
-/// Fixed, because contacts are shared within an item: results must not depend on the chunk size.
+/// Positions per work item: large enough to share what an angle determines, small enough to spread
+/// over the threads. Fixed, because contacts are shared within an item: results must not depend on
+/// the chunk size.
 const ITEM: usize = 2048;
-/// Corners of contact polygons that a chunk may hold, about (16 bytes each): where pads cover finely tessellated outlines,
-/// chunks have fewer candidates.
+/// Corners of contact polygons that a chunk may hold, about (16 bytes each): where pads cover
+/// finely tessellated outlines, chunks have fewer candidates.
 const MOST_CORNERS: usize = 4_000_000;
 
 /// Counts of a run so far.
@@ -110,7 +113,8 @@ struct Item {
 /// What the items of one site share.
 struct Prepared<'a> {
     site: &'a Site,
-    /// Faces of side I and II; one entry where both are the same in the site's plane, as in every prism.
+    /// Faces of side I and II; one entry where both are the same in the site's plane, as in every
+    /// prism.
     patches: Vec<PatchIndex>,
     /// Against the part; the second set with exchanged jaws, for grippers where that matters.
     sweeps: Vec<Vec<Sweep>>,
@@ -122,27 +126,50 @@ impl<'a> Proposer<'a> {
     /// Finds the sites of `part` for `gripper`.
     ///
     /// # Errors
-    /// When an option is out of its range or names a face that is not there, the grid is too fine, the gripper has no pad with area, or inside grips are asked of a gripper
-    /// without outer pads.
+    /// When an option is out of its range or names a face that is not there, the grid is too fine,
+    /// the gripper has no pad with area, or inside grips are asked of a gripper without outer pads.
     pub fn new(part: &'a Part, gripper: &'a Gripper, options: &ProposeOptions) -> Result<Self> {
         options.validate()?;
         if !crate::geometry::is_convex(&gripper.pad) {
-            return Err(Error::input(&gripper.name, "the pad is not a convex counter-clockwise polygon", "correct the gripper"));
+            return Err(Error::input(
+                &gripper.name,
+                "the pad is not a convex counter-clockwise polygon",
+                "correct the gripper",
+            ));
         }
         let mut tally = Tally::default();
         let mut pairs = Vec::new();
         let chosen = chosen_faces(part, options)?;
         if options.outside {
             let reach = [gripper.stroke[0], gripper.stroke[1] - 2.0 * options.min_opening];
-            choose(part.pairs(0.0, f64::INFINITY), reach, chosen.as_deref(), &mut pairs, &mut tally);
+            choose(
+                part.pairs(0.0, f64::INFINITY),
+                reach,
+                chosen.as_deref(),
+                &mut pairs,
+                &mut tally,
+            );
         }
         if options.inside {
             let Some(outer) = gripper.outer_pad else {
                 let remedy = "state pad.outer_face in the gripper file: the distance from the pad face to the finger's outer gripping face";
-                return Err(Error::input(&gripper.name, "inside grips need outer pads, and this gripper states none", remedy));
+                return Err(Error::input(
+                    &gripper.name,
+                    "inside grips need outer pads, and this gripper states none",
+                    remedy,
+                ));
             };
-            let reach = [gripper.stroke[0] + 2.0 * (outer + options.min_opening), gripper.stroke[1] + 2.0 * outer];
-            choose(part.internal_pairs(0.0, f64::INFINITY), reach, chosen.as_deref(), &mut pairs, &mut tally);
+            let reach = [
+                gripper.stroke[0] + 2.0 * (outer + options.min_opening),
+                gripper.stroke[1] + 2.0 * outer,
+            ];
+            choose(
+                part.internal_pairs(0.0, f64::INFINITY),
+                reach,
+                chosen.as_deref(),
+                &mut pairs,
+                &mut tally,
+            );
         }
         tally.pairs = pairs.len() as u64;
         let (sites, directions) = site::sites(part, gripper, options, &pairs)?;
@@ -166,7 +193,10 @@ impl<'a> Proposer<'a> {
 
     /// Number of candidates in all.
     pub fn candidates(&self) -> u64 {
-        self.sites.iter().map(|site| (site.positions.len() * site.angles.len()) as u64 * self.orientations()).sum()
+        self.sites
+            .iter()
+            .map(|site| (site.positions.len() * site.angles.len()) as u64 * self.orientations())
+            .sum()
     }
 
     /// Counts so far.
@@ -207,12 +237,24 @@ impl<'a> Proposer<'a> {
         let reach = self.gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
         let (low, high) = self.part.mesh.bounding_box();
         let bodies = self.gripper.fingers.iter().chain(&self.gripper.palm);
-        let extent = bodies.flat_map(crate::gripper::Body::bounds).map(|corner| corner.length()).fold(0.0, f64::max);
-        // Longer than the part and the gripper together: beyond it the gripper is clear of the part.
+        let extent = bodies
+            .flat_map(crate::gripper::Body::bounds)
+            .map(|corner| corner.length())
+            .fold(0.0, f64::max);
+        // Longer than the part and the gripper together: beyond it the gripper is clear of the
+        // part.
         let clear = (high - low).length() + 2.0 * extent + self.gripper.stroke[1];
-        let each =
-            |approach: f64| -> Vec<Vec<Sweep>> { (0..self.orientations()).map(|flip| sweeps(self.gripper, &self.motion(site, approach, flip == 1))).collect() };
-        Prepared { site, patches: site.patches(self.part, &axes, reach), sweeps: each(clear), outer_sweeps: each(self.options.approach) }
+        let each = |approach: f64| -> Vec<Vec<Sweep>> {
+            (0..self.orientations())
+                .map(|flip| sweeps(self.gripper, &self.motion(site, approach, flip == 1)))
+                .collect()
+        };
+        Prepared {
+            site,
+            patches: site.patches(self.part, &axes, reach),
+            sweeps: each(clear),
+            outer_sweeps: each(self.options.approach),
+        }
     }
 
     /// The tree in the axes of a direction; the last one is kept.
@@ -244,7 +286,8 @@ impl<'a> Proposer<'a> {
                 self.next = Cursor { site: self.next.site + 1, angle: 0, position: 0, ..self.next };
                 continue;
             }
-            if items.first().is_some_and(|first| self.sites[first.site].direction != site.direction) {
+            if items.first().is_some_and(|first| self.sites[first.site].direction != site.direction)
+            {
                 break;
             }
             let end = (self.next.position + ITEM).min(site.positions.len());
@@ -272,7 +315,8 @@ impl Iterator for Proposer<'_> {
         let this = &*self;
         let mut wanted: Vec<usize> = items.iter().map(|item| item.site).collect();
         wanted.dedup();
-        let prepared: Vec<Prepared<'_>> = wanted.par_iter().map(|&site| this.prepare(&this.sites[site])).collect();
+        let prepared: Vec<Prepared<'_>> =
+            wanted.par_iter().map(|&site| this.prepare(&this.sites[site])).collect();
         let results: Vec<work::Outcome> = items
             .par_iter()
             .map_init(work::Buffers::default, |buffers, item| {
@@ -284,7 +328,8 @@ impl Iterator for Proposer<'_> {
         let mut chunk = Chunk::default();
         for outcome in results {
             chunk.candidates += outcome.candidates;
-            self.tally.grips += outcome.grips.iter().filter(|grip| grip.flip_of.is_none()).count() as u64;
+            self.tally.grips +=
+                outcome.grips.iter().filter(|grip| grip.flip_of.is_none()).count() as u64;
             chunk.grips.extend(outcome.grips);
             for (reason, count) in outcome.rejections {
                 *self.tally.rejections.entry(reason.name()).or_default() += count;
@@ -292,9 +337,19 @@ impl Iterator for Proposer<'_> {
         }
         self.tally.candidates += chunk.candidates;
         let corners = |contact: &Contact| {
-            [&contact.face_i, &contact.face_ii].into_iter().flatten().flat_map(crate::geometry::polygon::rings).map(<[_]>::len).sum::<usize>()
+            [&contact.face_i, &contact.face_ii]
+                .into_iter()
+                .flatten()
+                .flat_map(crate::geometry::polygon::rings)
+                .map(<[_]>::len)
+                .sum::<usize>()
         };
-        let total: usize = chunk.grips.iter().filter(|grip| !Arc::ptr_eq(&grip.contact, &self.whole)).map(|grip| corners(&grip.contact)).sum();
+        let total: usize = chunk
+            .grips
+            .iter()
+            .filter(|grip| !Arc::ptr_eq(&grip.contact, &self.whole))
+            .map(|grip| corners(&grip.contact))
+            .sum();
         self.corners = (total as f64 / chunk.candidates.max(1) as f64).max(1.0);
         Some(chunk)
     }
@@ -318,7 +373,9 @@ fn chosen_faces(part: &Part, options: &ProposeOptions) -> Result<Option<Vec<bool
         let (low, high) = (*low - 1e-6, *high + 1e-6);
         let within = |face: &crate::part::PlanarFace| {
             let points = face.polygons.iter().flat_map(|polygon| &polygon.outer);
-            points.map(|point| face.part_from_face.point(point.extend(0.0))).all(|point| point.cmpge(low).all() && point.cmple(high).all())
+            points
+                .map(|point| face.part_from_face.point(point.extend(0.0)))
+                .all(|point| point.cmpge(low).all() && point.cmple(high).all())
         };
         let mut any = false;
         for face in part.faces.iter().filter(|face| within(face)) {
@@ -327,14 +384,27 @@ fn chosen_faces(part: &Part, options: &ProposeOptions) -> Result<Option<Vec<bool
         }
         if !any {
             let [a, b] = [low, high].map(|corner| (corner * 1e3).to_array());
-            let problem = format!("no planar face lies wholly between ({:.2}, {:.2}, {:.2}) and ({:.2}, {:.2}, {:.2}) mm", a[0], a[1], a[2], b[0], b[1], b[2]);
-            return Err(Error::input("box of faces", problem, "make it larger; `gripfast part --faces` lists where the faces lie"));
+            let problem = format!(
+                "no planar face lies wholly between ({:.2}, {:.2}, {:.2}) and ({:.2}, {:.2}, {:.2}) mm",
+                a[0], a[1], a[2], b[0], b[1], b[2]
+            );
+            return Err(Error::input(
+                "box of faces",
+                problem,
+                "make it larger; `gripfast part --faces` lists where the faces lie",
+            ));
         }
     }
     Ok(Some(chosen))
 }
 
-fn choose(all: Vec<FacePair>, reach: [f64; 2], chosen: Option<&[bool]>, pairs: &mut Vec<FacePair>, tally: &mut Tally) {
+fn choose(
+    all: Vec<FacePair>,
+    reach: [f64; 2],
+    chosen: Option<&[bool]>,
+    pairs: &mut Vec<FacePair>,
+    tally: &mut Tally,
+) {
     for pair in all {
         let chosen = |face: u32| chosen.is_none_or(|chosen| chosen[face as usize]);
         let reason = if !(reach[0]..=reach[1]).contains(&pair.width) {

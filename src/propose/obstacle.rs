@@ -1,8 +1,10 @@
-//! A gripper among the obstacles of a scene: the volumes that its bodies sweep, tested against meshes, boxes and half-spaces.
+//! A gripper among the obstacles of a scene: the volumes that its bodies sweep, tested against
+//! meshes, boxes and half-spaces.
 //!
-//! The same swept bodies and the same tree of triangles as for the part, but for any pose: a swept body is a box in the grip
-//! frame, a node of the tree a box in the world, and six of their fifteen separating axes decide which nodes to open. Boxes are compared
-//! in single precision with slack; bodies and triangles meet in double precision.
+//! The same swept bodies and the same tree of triangles as for the part, but for any pose: a swept
+//! body is a box in the grip frame, a node of the tree a box in the world, and six of their fifteen
+//! separating axes decide which nodes to open. Boxes are compared in single precision with slack;
+//! bodies and triangles meet in double precision.
 
 use std::sync::Arc;
 
@@ -15,12 +17,15 @@ use crate::gripper::{Body, Gripper, half_turn};
 use crate::model::Frame;
 use crate::part::Mesh;
 
-/// Nodes smaller than this share of a query's smallest half size are handed on to the single bodies unopened.
+/// Nodes smaller than this share of a query's smallest half size are handed on to the single bodies
+/// unopened.
 const FINE: f32 = 0.5;
 /// Steps of [`Volumes::guess`] for each volume.
 const STEPS: usize = 4;
-/// Direction of the rays of [`MeshObstacle::contains`]: along no edge or face that a person would draw.
-const RAY: DVec3 = DVec3::new(0.267_261_241_912_424_4, 0.534_522_483_824_848_8, 0.801_783_725_737_273_2);
+/// Direction of the rays of [`MeshObstacle::contains`]: along no edge or face that a person would
+/// draw.
+const RAY: DVec3 =
+    DVec3::new(0.267_261_241_912_424_4, 0.534_522_483_824_848_8, 0.801_783_725_737_273_2);
 
 /// How a gripper moves on to a grip and away from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,53 +97,81 @@ impl Volumes {
             fingers(Phase::Retreat, course.gap / 2.0, &|_| course.retreat);
         }
         // Straight back the palm passes where it came from.
-        let known = course.retreat.y == 0.0 && course.retreat.z == 0.0 && course.retreat.x <= 0.0 && -course.retreat.x <= course.approach;
+        let known = course.retreat.y == 0.0
+            && course.retreat.z == 0.0
+            && course.retreat.x <= 0.0
+            && -course.retreat.x <= course.approach;
         for (index, body) in gripper.palm.iter().enumerate() {
             add(Phase::Approach, index, body.clone(), "", back);
             if !known {
                 add(Phase::Retreat, index, body.clone(), "", course.retreat);
             }
         }
-        // The palm's place in the grip is a part of its approach; it is listed so that messages tell the two apart.
+        // The palm's place in the grip is a part of its approach; it is listed so that messages
+        // tell the two apart.
         for (index, body) in gripper.palm.iter().enumerate() {
             add(Phase::Grip, index, body.clone(), "", DVec3::ZERO);
         }
         list.sort_by_key(|volume| (volume.phase, volume.sweep.jaw.is_empty()));
-        let bounds = list.iter().fold([Vec3A::INFINITY, Vec3A::NEG_INFINITY], |[low, high], Volume { bounds, .. }| [low.min(bounds[0]), high.max(bounds[1])]);
+        let bounds = list
+            .iter()
+            .fold([Vec3A::INFINITY, Vec3A::NEG_INFINITY], |[low, high], Volume { bounds, .. }| {
+                [low.min(bounds[0]), high.max(bounds[1])]
+            });
         Self { list, bounds }
     }
 
-    /// Phase, jaw (`I`, `II`, or nothing for the palm) and the body's index among the gripper's fingers or palm bodies.
+    /// Phase, jaw (`I`, `II`, or nothing for the palm) and the body's index among the gripper's
+    /// fingers or palm bodies.
     pub(crate) fn name(&self, volume: usize) -> (Phase, &'static str, usize) {
         let volume = &self.list[volume];
         (volume.phase, volume.sweep.jaw, volume.body)
     }
 
     /// The first volume that reaches below the plane `normal . x = offset` (world).
-    pub(crate) fn below(&self, world_from_grip: &Frame, normal: DVec3, offset: f64) -> Option<usize> {
+    pub(crate) fn below(
+        &self,
+        world_from_grip: &Frame,
+        normal: DVec3,
+        offset: f64,
+    ) -> Option<usize> {
         let height = normal.dot(world_from_grip.origin) - offset;
         let down = world_from_grip.rotation.transpose() * -normal;
         // The box around all of them first, with slack for its rounding to single precision.
         let [low, high] = self.bounds.map(|corner| corner.as_dvec3());
-        if height - DVec3::select(down.cmpge(DVec3::ZERO), high, low).dot(down) > 1e-6 * low.abs().max(high.abs()).element_sum() {
+        if height - DVec3::select(down.cmpge(DVec3::ZERO), high, low).dot(down)
+            > 1e-6 * low.abs().max(high.abs()).element_sum()
+        {
             return None;
         }
-        self.list.iter().position(|volume| height - volume.sweep.support_point(down).dot(down) < 0.0)
+        self.list
+            .iter()
+            .position(|volume| height - volume.sweep.support_point(down).dot(down) < 0.0)
     }
 
-    /// The first volume that meets the box of these half sizes about the origin of `world_from_box`.
-    pub(crate) fn meets_box(&self, world_from_grip: &Frame, world_from_box: &Frame, half: DVec3) -> Option<usize> {
+    /// The first volume that meets the box of these half sizes about the origin of
+    /// `world_from_box`.
+    pub(crate) fn meets_box(
+        &self,
+        world_from_grip: &Frame,
+        world_from_box: &Frame,
+        half: DVec3,
+    ) -> Option<usize> {
         let box_from_grip = world_from_box.inverse().compose(world_from_grip);
         let pose = Pose::new(&box_from_grip);
         let (extent, solid) = (half.max_element() as f32, [-half.as_vec3a(), half.as_vec3a()]);
         if self.list.is_empty() || !pose.query(self.bounds, extent).overlaps(solid) {
             return None;
         }
-        self.list.iter().position(|Volume { sweep, bounds, .. }| pose.query(*bounds, extent).overlaps(solid) && sweep.meets_box(&box_from_grip, -half, half))
+        self.list.iter().position(|Volume { sweep, bounds, .. }| {
+            pose.query(*bounds, extent).overlaps(solid)
+                && sweep.meets_box(&box_from_grip, -half, half)
+        })
     }
 
-    /// A volume that meets a triangle among those of `nearby`, `triangle` giving their corners in the world: most of those that
-    /// meet are found, and what is found is true. Returns the triangle's surface and the volume.
+    /// A volume that meets a triangle among those of `nearby`, `triangle` giving their corners in
+    /// the world: most of those that meet are found, and what is found is true. Returns the
+    /// triangle's surface and the volume.
     pub(crate) fn guess(
         &self,
         nearby: &Nearby,
@@ -150,7 +183,13 @@ impl Volumes {
         let close = nearby.fineness().powi(2);
         // What met last meets next.
         let first = room.last.min(self.list.len());
-        for volume in self.list.get(first).map(|_| first).into_iter().chain((0..self.list.len()).filter(|volume| *volume != first)) {
+        for volume in self
+            .list
+            .get(first)
+            .map(|_| first)
+            .into_iter()
+            .chain((0..self.list.len()).filter(|volume| *volume != first))
+        {
             let [low, high] = self.list[volume].bounds;
             let mut at = (low + high) * 0.5;
             let mut tested = None;
@@ -168,7 +207,10 @@ impl Volumes {
                     if self.list[volume].sweep.meets(corners) {
                         room.last = volume;
                         // The same triangle may stop an earlier motion.
-                        let volume = self.list[..volume].iter().position(|volume| volume.sweep.meets(corners)).unwrap_or(volume);
+                        let volume = self.list[..volume]
+                            .iter()
+                            .position(|volume| volume.sweep.meets(corners))
+                            .unwrap_or(volume);
                         return Some((seed.surface as usize, volume));
                     }
                 }
@@ -189,10 +231,17 @@ struct Pose {
 
 impl Pose {
     fn new(world_from_grip: &Frame) -> Self {
-        let rotation = Mat3A::from_cols_array(&world_from_grip.rotation.to_cols_array().map(|value| value as f32));
+        let rotation = Mat3A::from_cols_array(
+            &world_from_grip.rotation.to_cols_array().map(|value| value as f32),
+        );
         let turn = rotation.transpose();
         let absolute = Mat3A::from_cols(turn.x_axis.abs(), turn.y_axis.abs(), turn.z_axis.abs());
-        Self { world_from_grip: rotation, grip_from_world: turn, absolute, origin: world_from_grip.origin.as_vec3a() }
+        Self {
+            world_from_grip: rotation,
+            grip_from_world: turn,
+            absolute,
+            origin: world_from_grip.origin.as_vec3a(),
+        }
     }
 
     fn to_world(&self, point: Vec3A) -> Vec3A {
@@ -206,12 +255,22 @@ impl Pose {
     /// A box of the grip frame among boxes that reach `extent` from the world's origin.
     fn query(&self, [low, high]: [Vec3A; 2], extent: f32) -> Query {
         let (middle, half) = ((low + high) * 0.5, (high - low) * 0.5);
-        // Coordinates, products and sums are rounded to 2^-24 of their size, about twenty times in a row.
-        let size = self.origin.abs().max_element() + middle.abs().max_element() + half.max_element() + extent;
+        // Coordinates, products and sums are rounded to 2^-24 of their size, about twenty times in
+        // a row.
+        let size = self.origin.abs().max_element()
+            + middle.abs().max_element()
+            + half.max_element()
+            + extent;
         let slack = Vec3A::splat(size * 2.0_f32.powi(-18));
         // Absolute values of the inverse: rows and columns exchanged.
         let reach = self.absolute.transpose() * half;
-        Query { turn: self.grip_from_world, absolute: self.absolute, middle: self.to_world(middle), half: half + slack, reach: reach + slack }
+        Query {
+            turn: self.grip_from_world,
+            absolute: self.absolute,
+            middle: self.to_world(middle),
+            half: half + slack,
+            reach: reach + slack,
+        }
     }
 }
 
@@ -226,11 +285,13 @@ struct Query {
 }
 
 impl Query {
-    /// Whether no face direction of either box separates them, or hardly does; the nine edge directions are left to the exact tests.
+    /// Whether no face direction of either box separates them, or hardly does; the nine edge
+    /// directions are left to the exact tests.
     fn overlaps(&self, [low, high]: [Vec3A; 2]) -> bool {
         let half = (high - low) * 0.5;
         let apart = (low + high) * 0.5 - self.middle;
-        apart.abs().cmple(self.reach + half).all() && (self.turn * apart).abs().cmple(self.half + self.absolute * half).all()
+        apart.abs().cmple(self.reach + half).all()
+            && (self.turn * apart).abs().cmple(self.half + self.absolute * half).all()
     }
 }
 
@@ -253,7 +314,11 @@ pub(crate) struct MeshObstacle {
 impl MeshObstacle {
     pub(crate) fn new(mesh: &Mesh) -> Self {
         let tree = Tree::new(&Arc::new(Topology::new(mesh)), DMat3::IDENTITY);
-        let extent = if tree.is_empty() { 0.0 } else { tree.corners(0).map(|corner| corner.abs().max_element()).into_iter().fold(0.0, f32::max) };
+        let extent = if tree.is_empty() {
+            0.0
+        } else {
+            tree.corners(0).map(|corner| corner.abs().max_element()).into_iter().fold(0.0, f32::max)
+        };
         Self { tree, extent }
     }
 
@@ -268,7 +333,12 @@ impl MeshObstacle {
     }
 
     /// The first volume that meets the surface.
-    pub(crate) fn first_met(&self, volumes: &Volumes, world_from_grip: &Frame, room: &mut Room) -> Option<usize> {
+    pub(crate) fn first_met(
+        &self,
+        volumes: &Volumes,
+        world_from_grip: &Frame,
+        room: &mut Room,
+    ) -> Option<usize> {
         let Room { near, stack, last } = room;
         near.clear();
         stack.clear();
@@ -286,7 +356,9 @@ impl MeshObstacle {
                 continue;
             }
             match self.tree.children(node) {
-                Some(children) if (bounds[1] - bounds[0]).max_element() > 2.0 * fine => stack.extend(children),
+                Some(children) if (bounds[1] - bounds[0]).max_element() > 2.0 * fine => {
+                    stack.extend(children)
+                }
                 _ => near.push(node),
             }
         }
@@ -305,7 +377,9 @@ impl MeshObstacle {
                     Some(children) => stack.extend(children),
                     None => {
                         let mut triangles = self.tree.triangles(node).map(|(_, corners)| corners);
-                        if triangles.any(|corners| sweep.meets(corners.map(|corner| world_from_grip.point_inverse(corner)))) {
+                        if triangles.any(|corners| {
+                            sweep.meets(corners.map(|corner| world_from_grip.point_inverse(corner)))
+                        }) {
                             *last = volume;
                             return Some(volume);
                         }
@@ -316,13 +390,13 @@ impl MeshObstacle {
         })
     }
 
-    /// The first volume of the grip itself whose middle lies inside the closed surface: a body that meets no triangle is either
-    /// wholly outside or wholly inside.
+    /// The first volume of the grip itself whose middle lies inside the closed surface: a body that
+    /// meets no triangle is either wholly outside or wholly inside.
     pub(crate) fn contains(&self, volumes: &Volumes, world_from_grip: &Frame) -> Option<usize> {
-        volumes
-            .list
-            .iter()
-            .position(|Volume { phase, sweep, .. }| *phase == Phase::Grip && self.crossings(world_from_grip.point((sweep.low + sweep.high) / 2.0)) % 2 == 1)
+        volumes.list.iter().position(|Volume { phase, sweep, .. }| {
+            *phase == Phase::Grip
+                && self.crossings(world_from_grip.point((sweep.low + sweep.high) / 2.0)) % 2 == 1
+        })
     }
 
     /// Triangles that a ray from `start` crosses.
@@ -337,14 +411,21 @@ impl MeshObstacle {
             }
             match self.tree.children(node) {
                 Some(children) => stack.extend(children),
-                None => count += self.tree.triangles(node).filter(|(_, corners)| crosses(start, *corners)).count(),
+                None => {
+                    count += self
+                        .tree
+                        .triangles(node)
+                        .filter(|(_, corners)| crosses(start, *corners))
+                        .count()
+                }
             }
         }
         count
     }
 }
 
-/// Whether the ray crosses the triangle (Moeller and Trumbore 1997). A ray through an edge counts for one side of it only.
+/// Whether the ray crosses the triangle (Moeller and Trumbore 1997). A ray through an edge counts
+/// for one side of it only.
 fn crosses(start: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
     let (ab, ac) = (b - a, c - a);
     let side = RAY.cross(ac);

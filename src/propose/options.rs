@@ -16,8 +16,8 @@ pub struct ProposeOptions {
     pub angle_step: f64,
     /// Approach along and across the edges of the gripped faces as well.
     pub edge_angles: bool,
-    /// Smallest contact area on either face, as a share of the largest possible there: the pad's area, or the area in
-    /// which the two faces overlap, whichever is smaller.
+    /// Smallest contact area on either face, as a share of the largest possible there: the pad's
+    /// area, or the area in which the two faces overlap, whichever is smaller.
     pub min_contact: f64,
     /// Smallest contact area on either face, as a share of the pad's area.
     pub min_pad_share: f64,
@@ -31,23 +31,25 @@ pub struct ProposeOptions {
     pub ground: Option<Ground>,
     /// Only these planar faces may be touched, and those of `faces_in`.
     pub faces: Option<Vec<u32>>,
-    /// Only planar faces that lie wholly in one of these boxes may be touched (part frame, smallest and largest corner [m]),
-    /// and those of `faces`; no box: no such limit.
+    /// Only planar faces that lie wholly in one of these boxes may be touched (part frame, smallest
+    /// and largest corner [m]), and those of `faces`; no box: no such limit.
     pub faces_in: Vec<[DVec3; 2]>,
     /// Propose grips that close on faces from outside.
     pub outside: bool,
     /// Propose grips that open into a slot; needs a gripper with outer pads.
     pub inside: bool,
-    /// List the same pose with exchanged jaws as a grip of its own, marked with what it is a flip of.
+    /// List the same pose with exchanged jaws as a grip of its own, marked with what it is a flip
+    /// of.
     pub flips: bool,
-    /// Way by which each jaw is opened for the approach beyond contact [m]; less where the stroke ends.
+    /// Way by which each jaw is opened for the approach beyond contact [m]; less where the stroke
+    /// ends.
     pub opening: f64,
     /// Way by which each jaw must at least be openable [m]: else the pair is outside the stroke.
     pub min_opening: f64,
     /// Distance kept between gripper and part, but for the pads [m].
     pub clearance: f64,
-    /// Length of the straight approach that must be clear of ground and keep-out boxes [m]; of the part it must be clear
-    /// all the way.
+    /// Length of the straight approach that must be clear of ground and keep-out boxes [m]; of the
+    /// part it must be clear all the way.
     pub approach: f64,
     /// Candidates per chunk, about.
     pub chunk: usize,
@@ -107,19 +109,34 @@ impl ProposeOptions {
     /// When a value is not finite or out of its range.
     pub(super) fn validate(&self) -> Result<()> {
         let positive = |name: &str, value: f64| {
-            if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Error::input(name, format!("is {value}"), "give a finite value above zero")) }
+            if value > 0.0 && value.is_finite() {
+                Ok(())
+            } else {
+                Err(Error::input(name, format!("is {value}"), "give a finite value above zero"))
+            }
         };
         let not_negative = |name: &str, value: f64| {
-            if value >= 0.0 && value.is_finite() { Ok(()) } else { Err(Error::input(name, format!("is {value}"), "give a finite value, zero or more")) }
+            if value >= 0.0 && value.is_finite() {
+                Ok(())
+            } else {
+                Err(Error::input(name, format!("is {value}"), "give a finite value, zero or more"))
+            }
         };
         if let Some(spacing) = self.spacing {
             positive("spacing", spacing)?;
         }
         positive("angle step", self.angle_step)?;
         if self.angle_step < 1e-4 {
-            return Err(Error::input("angle step", format!("is {} rad", self.angle_step), "give at least 0.01 degrees"));
+            return Err(Error::input(
+                "angle step",
+                format!("is {} rad", self.angle_step),
+                "give at least 0.01 degrees",
+            ));
         }
-        for (name, share) in [("smallest contact", self.min_contact), ("smallest share of the pad", self.min_pad_share)] {
+        for (name, share) in [
+            ("smallest contact", self.min_contact),
+            ("smallest share of the pad", self.min_pad_share),
+        ] {
             if !(0.0..=1.0).contains(&share) {
                 return Err(Error::input(name, format!("is {share}"), "give a share, 0 to 1"));
             }
@@ -138,12 +155,20 @@ impl ProposeOptions {
         for (name, boxes) in [("keep-out box", &self.keep_out), ("box of faces", &self.faces_in)] {
             for [low, high] in boxes {
                 if !low.is_finite() || !high.is_finite() || !low.cmple(*high).all() {
-                    return Err(Error::input(name, format!("from {low} to {high} m"), "give its smallest, then its largest coordinates"));
+                    return Err(Error::input(
+                        name,
+                        format!("from {low} to {high} m"),
+                        "give its smallest, then its largest coordinates",
+                    ));
                 }
             }
         }
         if !self.outside && !self.inside {
-            return Err(Error::input("grips", "neither outside nor inside ones are asked for", "ask for one of them or both"));
+            return Err(Error::input(
+                "grips",
+                "neither outside nor inside ones are asked for",
+                "ask for one of them or both",
+            ));
         }
         not_negative("opening", self.opening)?;
         not_negative("smallest opening", self.min_opening)?;
@@ -191,7 +216,8 @@ pub enum Rejection {
 impl Rejection {
     /// Name for summaries: snake case, the body after a colon.
     pub fn name(&self) -> String {
-        let with = |kind: &str, body: &str| format!("{kind}:{}", body.replace(char::is_whitespace, "_"));
+        let with =
+            |kind: &str, body: &str| format!("{kind}:{}", body.replace(char::is_whitespace, "_"));
         match self {
             Self::Stroke => "face_pair_outside_stroke".into(),
             Self::FaceNotChosen => "face_pair_not_chosen".into(),

@@ -1,9 +1,11 @@
-//! Where a pad touches a face: classification and exact clipping of a convex pad against the face's boundary.
+//! Where a pad touches a face: classification and exact clipping of a convex pad against the face's
+//! boundary.
 //!
-//! Most pads of a dense set lie wholly inside a face or wholly beside it. A grid over the boundary answers those with
-//! four look-ups, so that only pads over an edge are clipped, and those against the few edges near them. The clipping
-//! follows the boundary in and out of the pad (Weiler and Atherton 1977, for a convex window), which gives proper
-//! polygons with holes; where the geometry is too nearly degenerate for that, the boolean operation of the library.
+//! Most pads of a dense set lie wholly inside a face or wholly beside it. A grid over the boundary
+//! answers those with four look-ups, so that only pads over an edge are clipped, and those against
+//! the few edges near them. The clipping follows the boundary in and out of the pad (Weiler and
+//! Atherton 1977, for a convex window), which gives proper polygons with holes; where the geometry
+//! is too nearly degenerate for that, the boolean operation of the library.
 
 mod pad;
 mod walk;
@@ -97,7 +99,10 @@ impl Grid {
     }
 
     fn bounds(&self) -> Bounds2 {
-        Bounds2 { min: self.origin, max: self.origin + self.cell * DVec2::new(self.nx as f64, self.ny as f64) }
+        Bounds2 {
+            min: self.origin,
+            max: self.origin + self.cell * DVec2::new(self.nx as f64, self.ny as f64),
+        }
     }
 
     /// Whether anything within `bounds` may lie in the grid.
@@ -130,7 +135,10 @@ impl PatchIndex {
         for (edge, (&a, &next)) in start.iter().zip(&next).enumerate() {
             let b = start[next as usize];
             let bounds = Bounds2 { min: a.min(b), max: a.max(b) };
-            let height = Bounds2 { min: DVec2::new(grid.origin.x, bounds.min.y), max: DVec2::new(grid.origin.x + cell, bounds.max.y) };
+            let height = Bounds2 {
+                min: DVec2::new(grid.origin.x, bounds.min.y),
+                max: DVec2::new(grid.origin.x + cell, bounds.max.y),
+            };
             if !grid.covers(height) {
                 continue;
             }
@@ -140,15 +148,28 @@ impl PatchIndex {
                 continue;
             }
             for row in low..=high {
-                // The stretch of the edge within this row (with a hair of slack) bounds its columns.
+                // The stretch of the edge within this row (with a hair of slack) bounds its
+                // columns.
                 let slack = 1e-6 * cell;
-                let (y0, y1) = (grid.origin.y + row as f64 * cell - slack, grid.origin.y + (row + 1) as f64 * cell + slack);
-                let at = |y: f64| if (b.y - a.y).abs() < slack { None } else { Some(a.x + (b.x - a.x) * ((y - a.y) / (b.y - a.y)).clamp(0.0, 1.0)) };
+                let (y0, y1) = (
+                    grid.origin.y + row as f64 * cell - slack,
+                    grid.origin.y + (row + 1) as f64 * cell + slack,
+                );
+                let at = |y: f64| {
+                    if (b.y - a.y).abs() < slack {
+                        None
+                    } else {
+                        Some(a.x + (b.x - a.x) * ((y - a.y) / (b.y - a.y)).clamp(0.0, 1.0))
+                    }
+                };
                 let (x0, x1) = match (at(y0), at(y1)) {
                     (Some(x0), Some(x1)) => (x0.min(x1), x0.max(x1)),
                     _ => (bounds.min.x, bounds.max.x),
                 };
-                by_cell.extend((grid.column(x0 - slack)..=grid.column(x1 + slack)).map(|column| ((row * grid.nx + column) as u32, edge as u32)));
+                by_cell.extend(
+                    (grid.column(x0 - slack)..=grid.column(x1 + slack))
+                        .map(|column| ((row * grid.nx + column) as u32, edge as u32)),
+                );
             }
         }
         let (first, edges) = bucket(by_cell, grid.nx * grid.ny);
@@ -162,7 +183,18 @@ impl PatchIndex {
                 sums[(y + 1) * (grid.nx + 1) + x + 1] = sums[y * (grid.nx + 1) + x + 1] + run;
             }
         }
-        let mut index = Self { polygons, start, next, grid, first, edges, sums, inside: Vec::new(), row_first, row_edges };
+        let mut index = Self {
+            polygons,
+            start,
+            next,
+            grid,
+            first,
+            edges,
+            sums,
+            inside: Vec::new(),
+            row_first,
+            row_edges,
+        };
         index.inside = index.fill();
         index
     }
@@ -183,7 +215,8 @@ impl PatchIndex {
             crossings.sort_by(f64::total_cmp);
             for column in 0..self.grid.nx {
                 let x = self.grid.origin.x + (column as f64 + 0.5) * self.grid.cell;
-                inside[row * self.grid.nx + column] = crossings.partition_point(|&crossing| crossing < x) % 2 == 1;
+                inside[row * self.grid.nx + column] =
+                    crossings.partition_point(|&crossing| crossing < x) % 2 == 1;
             }
         }
         inside
@@ -197,7 +230,8 @@ impl PatchIndex {
         (self.start[edge as usize], self.start[self.next[edge as usize] as usize])
     }
 
-    /// Even-odd membership with exact predicates, by the edges of one row. `point` must lie in the region.
+    /// Even-odd membership with exact predicates, by the edges of one row. `point` must lie in the
+    /// region.
     pub(super) fn contains(&self, point: DVec2) -> bool {
         self.row(self.grid.row(point.y)).iter().fold(false, |inside, &edge| {
             let (a, b) = self.ends(edge);
@@ -212,7 +246,12 @@ impl PatchIndex {
     }
 
     fn cells(&self, bounds: Bounds2) -> [usize; 4] {
-        [self.grid.column(bounds.min.x), self.grid.column(bounds.max.x), self.grid.row(bounds.min.y), self.grid.row(bounds.max.y)]
+        [
+            self.grid.column(bounds.min.x),
+            self.grid.column(bounds.max.x),
+            self.grid.row(bounds.min.y),
+            self.grid.row(bounds.max.y),
+        ]
     }
 
     fn edges_in(&self, x0: usize, x1: usize, y0: usize, y1: usize) -> u32 {
@@ -244,16 +283,24 @@ impl PatchIndex {
         if area <= SLIVER * pad.area { Touch::Empty } else { Touch::Part(area) }
     }
 
-    /// The shape of the contact after [`Touch::Part`] with the same pad, place and scratch, as proper polygons relative to the pad's
-    /// origin and turned by `-angle`, that is in the grip frame.
-    pub(super) fn outline(&self, pad: &TurnedPad, place: DVec2, scratch: &mut Scratch, angle: f64) -> Patch {
+    /// The shape of the contact after [`Touch::Part`] with the same pad, place and scratch, as
+    /// proper polygons relative to the pad's origin and turned by `-angle`, that is in the grip
+    /// frame.
+    pub(super) fn outline(
+        &self,
+        pad: &TurnedPad,
+        place: DVec2,
+        scratch: &mut Scratch,
+        angle: f64,
+    ) -> Patch {
         if scratch.fallback.is_none() && !self.walk(pad, place, scratch) {
             scratch.fallback = Some(self.clipped_by_library(&pad.window, place));
         }
         outline(scratch, angle)
     }
 
-    /// The answer for a pad that reaches out of the region: a user's question, not one of a dense set.
+    /// The answer for a pad that reaches out of the region: a user's question, not one of a dense
+    /// set.
     fn touch_outside(&self, pad: &TurnedPad, place: DVec2, scratch: &mut Scratch) -> Touch {
         let patch = self.clipped_by_library(&pad.ring, place);
         let area = polygon::patch_area(&patch);
@@ -271,11 +318,20 @@ impl PatchIndex {
     fn clipped_by_library(&self, window: &[DVec2], place: DVec2) -> Patch {
         let ring: Ring = window.iter().map(|&point| point + place).collect();
         let back = glam::DAffine2::from_translation(-place);
-        overlay::intersect_convex(&ring, &self.polygons).iter().map(|polygon| polygon::transform(polygon, &back)).collect()
+        overlay::intersect_convex(&ring, &self.polygons)
+            .iter()
+            .map(|polygon| polygon::transform(polygon, &back))
+            .collect()
     }
 
     /// Edges near the pad, each clipped to the window (Cyrus and Beck 1978), relative to `place`.
-    fn collect_pieces(&self, pad: &TurnedPad, place: DVec2, [x0, x1, y0, y1]: [usize; 4], scratch: &mut Scratch) {
+    fn collect_pieces(
+        &self,
+        pad: &TurnedPad,
+        place: DVec2,
+        [x0, x1, y0, y1]: [usize; 4],
+        scratch: &mut Scratch,
+    ) {
         if scratch.seen.len() < self.start.len() {
             scratch.seen.resize(self.start.len(), 0);
             scratch.piece_of_edge.resize(self.start.len(), 0);
@@ -341,14 +397,17 @@ mod tests {
         let mut scratch = Scratch::default();
         match index.touch(pad, place, &mut scratch) {
             Touch::Empty => (0.0, Patch::new()),
-            Touch::Whole => (pad.area(), vec![Polygon { outer: pad.ring.clone(), holes: Vec::new() }]),
+            Touch::Whole => {
+                (pad.area(), vec![Polygon { outer: pad.ring.clone(), holes: Vec::new() }])
+            }
             Touch::Part(area) => (area, index.outline(pad, place, &mut scratch, 0.0)),
         }
     }
 
     #[test]
     fn flush_pads_touch_wholly() {
-        let face = index(vec![Polygon { outer: rectangle(DVec2::new(4.0, 1.0)), holes: Vec::new() }]);
+        let face =
+            index(vec![Polygon { outer: rectangle(DVec2::new(4.0, 1.0)), holes: Vec::new() }]);
         let pad = TurnedPad::new(&rectangle(DVec2::new(1.0, 1.0)), 0.0);
         let mut scratch = Scratch::default();
         for x in [-1.5, -0.3, 0.0, 1.5] {
@@ -356,7 +415,10 @@ mod tests {
         }
         assert_eq!(face.touch(&pad, DVec2::new(0.0, 1.0), &mut scratch), Touch::Empty);
         let (area, patch) = touch(&face, &pad, DVec2::new(1.75, 0.25));
-        assert!((area - 0.75 * 0.75).abs() < 1e-8 && patch.len() == 1 && patch[0].outer.len() == 4, "{patch:?}");
+        assert!(
+            (area - 0.75 * 0.75).abs() < 1e-8 && patch.len() == 1 && patch[0].outer.len() == 4,
+            "{patch:?}"
+        );
     }
 
     #[test]
@@ -377,20 +439,35 @@ mod tests {
 
     #[test]
     fn a_pad_out_of_the_region_is_answered_too() {
-        let face =
-            PatchIndex::new(vec![Polygon { outer: rectangle(DVec2::splat(9.0)), holes: Vec::new() }], Bounds2 { min: DVec2::ZERO, max: DVec2::ONE }, 0.1);
+        let face = PatchIndex::new(
+            vec![Polygon { outer: rectangle(DVec2::splat(9.0)), holes: Vec::new() }],
+            Bounds2 { min: DVec2::ZERO, max: DVec2::ONE },
+            0.1,
+        );
         let pad = TurnedPad::new(&rectangle(DVec2::ONE), 0.0);
         let mut scratch = Scratch::default();
         assert_eq!(face.touch(&pad, DVec2::splat(3.0), &mut scratch), Touch::Whole);
         assert_eq!(face.touch(&pad, DVec2::splat(30.0), &mut scratch), Touch::Empty);
-        let Touch::Part(area) = face.touch(&pad, DVec2::new(-4.5, 0.0), &mut scratch) else { panic!("half of the pad") };
-        assert!((area - 0.5).abs() < 1e-12 && (patch_area(&face.outline(&pad, DVec2::new(-4.5, 0.0), &mut scratch, 1.0)) - 0.5).abs() < 1e-12);
+        let Touch::Part(area) = face.touch(&pad, DVec2::new(-4.5, 0.0), &mut scratch) else {
+            panic!("half of the pad")
+        };
+        assert!(
+            (area - 0.5).abs() < 1e-12
+                && (patch_area(&face.outline(&pad, DVec2::new(-4.5, 0.0), &mut scratch, 1.0))
+                    - 0.5)
+                    .abs()
+                    < 1e-12
+        );
     }
 
     fn star(count: std::ops::Range<usize>, low: f64, high: f64) -> impl Strategy<Value = Ring> {
         proptest::collection::vec(low..high, count).prop_map(|radii| {
             let step = std::f64::consts::TAU / radii.len() as f64;
-            radii.iter().enumerate().map(|(index, radius)| DVec2::from_angle(index as f64 * step) * *radius).collect()
+            radii
+                .iter()
+                .enumerate()
+                .map(|(index, radius)| DVec2::from_angle(index as f64 * step) * *radius)
+                .collect()
         })
     }
 
@@ -425,7 +502,8 @@ mod tests {
         #[test]
         fn clipping_agrees_with_the_library(outer in star(3..30, 1.0, 2.0), hole in star(3..12, 0.1, 0.9), angle in 0.0..6.3f64, x in -2.0..2.0f64, y in -2.0..2.0f64, w in 0.05..2.0f64) {
             let mut polygon = Polygon { outer, holes: vec![hole] };
-            // The star's chords may cut below the hole's radius: the common part of both is what even-odd makes of them.
+            // The star's chords may cut below the hole's radius: the common part of both is what
+            // even-odd makes of them.
             let mended = overlay::even_odd(&[std::mem::take(&mut polygon.outer), polygon.holes.remove(0)]);
             let face = index(mended.clone());
             let pad = TurnedPad::new(&rectangle(DVec2::new(w, 0.7)), angle);

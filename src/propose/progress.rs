@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::{Cursor, Proposer, Tally};
 use crate::error::{Error, Result};
 
-/// Where the next chunk starts and what was counted so far. It fits the same part, gripper and options only.
+/// Where the next chunk starts and what was counted so far. It fits the same part, gripper and
+/// options only.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
     next: Cursor,
@@ -26,7 +27,8 @@ impl Proposer<'_> {
         Progress { next: self.next, corners: self.corners, tally: self.tally.clone() }
     }
 
-    /// Goes on where a run with the same part, gripper and options had come to: the chunks that follow are the same as there.
+    /// Goes on where a run with the same part, gripper and options had come to: the chunks that
+    /// follow are the same as there.
     ///
     /// # Errors
     /// When there is no such place among the candidates.
@@ -36,8 +38,15 @@ impl Proposer<'_> {
             Some(site) => next.angle <= site.angles.len() && next.position <= site.positions.len(),
             None => next.site == self.sites.len(),
         };
-        if !(there && corners.is_finite() && *corners >= 1.0 && tally.candidates <= self.candidates()) {
-            let problem = format!("the place at which it stopped (face pair {}, angle {}, position {}) is not there", next.site, next.angle, next.position);
+        if !(there
+            && corners.is_finite()
+            && *corners >= 1.0
+            && tally.candidates <= self.candidates())
+        {
+            let problem = format!(
+                "the place at which it stopped (face pair {}, angle {}, position {}) is not there",
+                next.site, next.angle, next.position
+            );
             return Err(Error::input("unfinished run", problem, "start anew without --resume"));
         }
         (self.next, self.corners, self.tally) = (*next, *corners, tally.clone());

@@ -1,8 +1,8 @@
-//! From antiparallel face pairs to sites: a stretch of two facing planes where pads can be put, with its own frame,
-//! positions and approach angles.
+//! From antiparallel face pairs to sites: a stretch of two facing planes where pads can be put,
+//! with its own frame, positions and approach angles.
 //!
-//! One pad may touch several faces that lie in one plane, so pairs whose planes coincide are joined first, and split
-//! again into stretches too far apart for one pad.
+//! One pad may touch several faces that lie in one plane, so pairs whose planes coincide are joined
+//! first, and split again into stretches too far apart for one pad.
 
 mod places;
 
@@ -19,10 +19,11 @@ use crate::gripper::Gripper;
 use crate::model::{Frame, Patch, Polygon};
 use crate::part::{FacePair, PairKind, Part, PlanarFace};
 
-/// Planes whose directions differ by less count as one direction, which saves a tree [rad]: 0.1 um on 100 mm.
+/// Planes whose directions differ by less count as one direction, which saves a tree [rad]: 0.1 um
+/// on 100 mm.
 const SAME_DIRECTION: f64 = 1e-6;
-/// Faces within this distance of one plane, as a share of the part's diagonal, lie in one plane: twice the tolerance of
-/// the planes themselves.
+/// Faces within this distance of one plane, as a share of the part's diagonal, lie in one plane:
+/// twice the tolerance of the planes themselves.
 const SAME_PLANE: f64 = 2e-5;
 /// At most this many positions on one site; more is a slip of the unit.
 const MOST_POSITIONS: f64 = 2e7;
@@ -31,7 +32,8 @@ const MOST_POSITIONS: f64 = 2e7;
 #[derive(Debug)]
 pub(super) struct Site {
     pub(super) kind: PairKind,
-    /// Site frame in the part frame: `z` the closing axis (outward normal of face I), the origin midway between the planes.
+    /// Site frame in the part frame: `z` the closing axis (outward normal of face I), the origin
+    /// midway between the planes.
     pub(super) part_from_site: Frame,
     /// Distance of the planes [m].
     pub(super) width: f64,
@@ -57,7 +59,8 @@ pub(super) struct Site {
     pub(super) bounds: Bounds2,
 }
 
-/// Axes of a closing direction: rows of the matrix are the axes in the part frame, the third is the direction.
+/// Axes of a closing direction: rows of the matrix are the axes in the part frame, the third is the
+/// direction.
 pub(super) fn axes(direction: DVec3) -> DMat3 {
     let side = if direction.x.abs() < 0.9 { DVec3::X } else { DVec3::Y };
     let x = (side - direction * direction.dot(side)).normalize();
@@ -65,7 +68,12 @@ pub(super) fn axes(direction: DVec3) -> DMat3 {
 }
 
 /// Sites and their directions, in a stable order: by falling overlap of their largest pair.
-pub(super) fn sites(part: &Part, gripper: &Gripper, options: &ProposeOptions, pairs: &[FacePair]) -> Result<(Vec<Site>, Vec<DVec3>)> {
+pub(super) fn sites(
+    part: &Part,
+    gripper: &Gripper,
+    options: &ProposeOptions,
+    pairs: &[FacePair],
+) -> Result<(Vec<Site>, Vec<DVec3>)> {
     let (low, high) = part.mesh.bounding_box();
     let size = (high - low).length();
     let planes = Planes::new(&part.faces, SAME_PLANE * size);
@@ -97,7 +105,8 @@ struct Planes {
 impl Planes {
     fn new(faces: &[PlanarFace], tolerance: f64) -> Self {
         let reach = faces.iter().map(|face| face.centroid.length()).fold(0.0, f64::max);
-        // Sorted by offset, only a window can match: tilts of 1e-3 move the offset by that much of the reach.
+        // Sorted by offset, only a window can match: tilts of 1e-3 move the offset by that much of
+        // the reach.
         let mut sorted: Vec<&PlanarFace> = faces.iter().collect();
         sorted.sort_by(|a, b| a.offset.total_cmp(&b.offset).then(a.id.cmp(&b.id)));
         let offsets: Vec<f64> = sorted.iter().map(|face| face.offset).collect();
@@ -108,9 +117,11 @@ impl Planes {
             }
             of[face.id as usize] = face.id as usize;
             let slack = tolerance + 1e-3 * reach;
-            let window = offsets.partition_point(|&offset| offset < face.offset - slack)..offsets.partition_point(|&offset| offset <= face.offset + slack);
+            let window = offsets.partition_point(|&offset| offset < face.offset - slack)
+                ..offsets.partition_point(|&offset| offset <= face.offset + slack);
             for other in &sorted[window] {
-                let same = other.normal.dot(face.normal) > 1.0 - 5e-7 && (face.normal.dot(other.centroid) - face.offset).abs() < tolerance;
+                let same = other.normal.dot(face.normal) > 1.0 - 5e-7
+                    && (face.normal.dot(other.centroid) - face.offset).abs() < tolerance;
                 if of[other.id as usize] == usize::MAX && same {
                     of[other.id as usize] = face.id as usize;
                 }
@@ -132,14 +143,18 @@ fn group_sites(
     let face = |id: u32| &part.faces[id as usize];
     let first = pairs[0];
     let mut axis = (face(first.face_i).normal - face(first.face_ii).normal).normalize();
-    // Which of the two is face I is free: one sign per direction keeps the number of directions down.
+    // Which of the two is face I is free: one sign per direction keeps the number of directions
+    // down.
     if axis[axis.abs().max_position()] < 0.0 {
         axis = -axis;
     }
-    let direction = directions.iter().position(|known| known.dot(axis) > 0.0 && known.cross(axis).length() < SAME_DIRECTION).unwrap_or_else(|| {
-        directions.push(axis);
-        directions.len() - 1
-    });
+    let direction = directions
+        .iter()
+        .position(|known| known.dot(axis) > 0.0 && known.cross(axis).length() < SAME_DIRECTION)
+        .unwrap_or_else(|| {
+            directions.push(axis);
+            directions.len() - 1
+        });
     let axis = directions[direction];
     let axes_from_part = axes(axis);
     // Sides by the sign of the normal: pairs of one group may list their faces in either order.
@@ -151,7 +166,8 @@ fn group_sites(
         side.sort_unstable();
         side.dedup();
     }
-    let patches = [0, 1].map(|side| project(sides[side].iter().map(|&id| face(id)), &axes_from_part));
+    let patches =
+        [0, 1].map(|side| project(sides[side].iter().map(|&id| face(id)), &axes_from_part));
     let overlap = overlay::intersect(&patches[0], &patches[1]);
     let bounds = Bounds2::of(&gripper.pad);
     let reach = gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
@@ -162,8 +178,13 @@ fn group_sites(
     for overlap in stretches(overlap, 2.0 * reach) {
         let turn = main_direction(&overlap);
         let middle = {
-            let turned =
-                Bounds2::of(&overlap.iter().flat_map(|polygon| &polygon.outer).map(|&point| DVec2::from_angle(-turn).rotate(point)).collect::<Vec<_>>());
+            let turned = Bounds2::of(
+                &overlap
+                    .iter()
+                    .flat_map(|polygon| &polygon.outer)
+                    .map(|&point| DVec2::from_angle(-turn).rotate(point))
+                    .collect::<Vec<_>>(),
+            );
             DVec2::from_angle(turn).rotate(turned.centre())
         };
         let heights = heights(face(sides[0][0]), face(sides[1][0]), &axes_from_part, middle);
@@ -171,15 +192,22 @@ fn group_sites(
         let origin = middle.extend(mid_height);
         let cells = polygon::bounds(&overlap).size() / spacing;
         if cells.element_product() > MOST_POSITIONS {
-            let problem = format!("{spacing} m makes {:.0} positions on one face pair", cells.element_product());
+            let problem = format!(
+                "{spacing} m makes {:.0} positions on one face pair",
+                cells.element_product()
+            );
             return Err(Error::input("spacing", problem, "choose a larger step"));
         }
         let local: Patch = overlap.iter().map(|polygon| to_site(polygon, middle, turn)).collect();
         let rise = rise(&sides, part, &axes_from_part, axis, &overlap, heights) + SAME_PLANE * size;
         let centre_of_mass = DVec2::from_angle(-turn).rotate(centre.truncate() - middle);
-        let positions = positions(&local, spacing, bounds.size().max_element() / 2.0, centre_of_mass);
+        let positions =
+            positions(&local, spacing, bounds.size().max_element() / 2.0, centre_of_mass);
         let angles = angles(&local, options, bounds.size().min_element());
-        let frame = Frame { rotation: axes_from_part.transpose() * DMat3::from_rotation_z(turn), origin: axes_from_part.transpose() * origin };
+        let frame = Frame {
+            rotation: axes_from_part.transpose() * DMat3::from_rotation_z(turn),
+            origin: axes_from_part.transpose() * origin,
+        };
         found.push(Site {
             kind,
             part_from_site: frame,
@@ -200,15 +228,24 @@ fn group_sites(
 }
 
 impl Site {
-    /// The two gripped planes' faces, indexed in the site's `(x, y)` for pads that reach `reach` from their origin; only
-    /// one when both are the same.
-    pub(super) fn patches(&self, part: &Part, axes_from_part: &DMat3, reach: f64) -> Vec<PatchIndex> {
+    /// The two gripped planes' faces, indexed in the site's `(x, y)` for pads that reach `reach`
+    /// from their origin; only one when both are the same.
+    pub(super) fn patches(
+        &self,
+        part: &Part,
+        axes_from_part: &DMat3,
+        reach: f64,
+    ) -> Vec<PatchIndex> {
         let [side_i, side_ii] = [0, 1].map(|side| -> Patch {
             let faces = self.faces[side].iter().map(|&id| &part.faces[id as usize]);
-            project(faces, axes_from_part).iter().map(|polygon| to_site(polygon, self.origin.truncate(), self.turn)).collect()
+            project(faces, axes_from_part)
+                .iter()
+                .map(|polygon| to_site(polygon, self.origin.truncate(), self.turn))
+                .collect()
         });
         let same = same_shape(&side_i, &side_ii, 1e-9 * reach);
-        let index = |patch: Patch| PatchIndex::new(patch, self.bounds.grown(1.01 * reach), reach / 4.0);
+        let index =
+            |patch: Patch| PatchIndex::new(patch, self.bounds.grown(1.01 * reach), reach / 4.0);
         if same { vec![index(side_i)] } else { vec![index(side_i), index(side_ii)] }
     }
 
@@ -229,7 +266,12 @@ impl Site {
 }
 
 /// Heights of the planes of side I and II above `point` of the axes' `(x, y)`.
-fn heights(face_i: &PlanarFace, face_ii: &PlanarFace, axes_from_part: &DMat3, point: DVec2) -> [f64; 2] {
+fn heights(
+    face_i: &PlanarFace,
+    face_ii: &PlanarFace,
+    axes_from_part: &DMat3,
+    point: DVec2,
+) -> [f64; 2] {
     [face_i, face_ii].map(|face| {
         let normal = *axes_from_part * face.normal;
         (face.offset - normal.truncate().dot(point)) / normal.z
@@ -237,7 +279,14 @@ fn heights(face_i: &PlanarFace, face_ii: &PlanarFace, axes_from_part: &DMat3, po
 }
 
 /// How far any of the faces rises above its pad's plane within the overlap.
-fn rise(sides: &[Vec<u32>; 2], part: &Part, axes_from_part: &DMat3, axis: DVec3, overlap: &[Polygon], heights: [f64; 2]) -> f64 {
+fn rise(
+    sides: &[Vec<u32>; 2],
+    part: &Part,
+    axes_from_part: &DMat3,
+    axis: DVec3,
+    overlap: &[Polygon],
+    heights: [f64; 2],
+) -> f64 {
     let mut most = 0.0_f64;
     for side in 0..2 {
         for &id in &sides[side] {
@@ -257,10 +306,14 @@ fn rise(sides: &[Vec<u32>; 2], part: &Part, axes_from_part: &DMat3, axis: DVec3,
 fn project<'a>(faces: impl Iterator<Item = &'a PlanarFace>, axes_from_part: &DMat3) -> Patch {
     let mut patch = Patch::new();
     for face in faces {
-        let place = |&point: &DVec2| (*axes_from_part * face.part_from_face.point(point.extend(0.0))).truncate();
+        let place = |&point: &DVec2| {
+            (*axes_from_part * face.part_from_face.point(point.extend(0.0))).truncate()
+        };
         for shape in &face.polygons {
-            let mut polygon =
-                Polygon { outer: shape.outer.iter().map(place).collect(), holes: shape.holes.iter().map(|hole| hole.iter().map(place).collect()).collect() };
+            let mut polygon = Polygon {
+                outer: shape.outer.iter().map(place).collect(),
+                holes: shape.holes.iter().map(|hole| hole.iter().map(place).collect()).collect(),
+            };
             polygon::normalise(&mut polygon);
             patch.push(polygon);
         }
@@ -278,20 +331,31 @@ fn to_site(shape: &Polygon, origin: DVec2, turn: f64) -> Polygon {
 fn same_shape(a: &[Polygon], b: &[Polygon], tolerance: f64) -> bool {
     let same_ring = |a: &[DVec2], b: &[DVec2]| {
         let start = b.iter().position(|point| point.distance(a[0]) <= tolerance);
-        a.len() == b.len() && start.is_some_and(|start| (0..a.len()).all(|index| a[index].distance(b[(start + index) % b.len()]) <= tolerance))
+        a.len() == b.len()
+            && start.is_some_and(|start| {
+                (0..a.len())
+                    .all(|index| a[index].distance(b[(start + index) % b.len()]) <= tolerance)
+            })
     };
-    let (rings_a, rings_b): (Vec<&[DVec2]>, Vec<&[DVec2]>) = (a.iter().flat_map(rings).collect(), b.iter().flat_map(rings).collect());
+    let (rings_a, rings_b): (Vec<&[DVec2]>, Vec<&[DVec2]>) =
+        (a.iter().flat_map(rings).collect(), b.iter().flat_map(rings).collect());
     let mut free = vec![true; rings_b.len()];
     rings_a.len() == rings_b.len()
         && rings_a.iter().all(|ring| {
-            let found = (0..rings_b.len()).find(|&index| free[index] && same_ring(ring, rings_b[index]));
+            let found =
+                (0..rings_b.len()).find(|&index| free[index] && same_ring(ring, rings_b[index]));
             found.is_some_and(|index| std::mem::replace(&mut free[index], false))
         })
 }
 
-/// Splits a patch where its pieces are farther apart than `gap`, so that no pad touches two of them.
+/// Splits a patch where its pieces are farther apart than `gap`, so that no pad touches two of
+/// them.
 fn stretches(patch: Patch, gap: f64) -> Vec<Patch> {
-    let mut boxes: Vec<(Bounds2, usize)> = patch.iter().enumerate().map(|(index, polygon)| (Bounds2::of(&polygon.outer).grown(gap / 2.0), index)).collect();
+    let mut boxes: Vec<(Bounds2, usize)> = patch
+        .iter()
+        .enumerate()
+        .map(|(index, polygon)| (Bounds2::of(&polygon.outer).grown(gap / 2.0), index))
+        .collect();
     boxes.sort_by(|a, b| a.0.min.x.total_cmp(&b.0.min.x).then(a.1.cmp(&b.1)));
     let mut parent: Vec<usize> = (0..patch.len()).collect();
     fn root(parent: &mut [usize], mut index: usize) -> usize {
@@ -302,7 +366,9 @@ fn stretches(patch: Patch, gap: f64) -> Vec<Patch> {
         index
     }
     for (position, (bounds, index)) in boxes.iter().enumerate() {
-        for (other, other_index) in boxes[position + 1..].iter().take_while(|(other, _)| other.min.x <= bounds.max.x) {
+        for (other, other_index) in
+            boxes[position + 1..].iter().take_while(|(other, _)| other.min.x <= bounds.max.x)
+        {
             if bounds.meets(*other) {
                 let (a, b) = (root(&mut parent, *index), root(&mut parent, *other_index));
                 parent[a.max(b)] = a.min(b);
@@ -331,7 +397,9 @@ mod tests {
 
     #[test]
     fn far_pieces_become_sites_of_their_own() {
-        let at = |x: f64| shape(rectangle(DVec2::ONE).iter().map(|&point| point + DVec2::X * x).collect());
+        let at = |x: f64| {
+            shape(rectangle(DVec2::ONE).iter().map(|&point| point + DVec2::X * x).collect())
+        };
         let split = stretches(vec![at(0.0), at(10.0), at(1.5), at(11.0)], 1.0);
         assert_eq!(split.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2]);
         assert!(stretches(Vec::new(), 1.0).is_empty());
@@ -341,7 +409,10 @@ mod tests {
     fn axes_are_right_handed() {
         for direction in [DVec3::X, DVec3::Y, DVec3::NEG_Z, DVec3::new(0.6, 0.0, 0.8)] {
             let axes = axes(direction);
-            assert!((axes.determinant() - 1.0).abs() < 1e-12 && (axes * direction - DVec3::Z).length() < 1e-12);
+            assert!(
+                (axes.determinant() - 1.0).abs() < 1e-12
+                    && (axes * direction - DVec3::Z).length() < 1e-12
+            );
         }
     }
 }

@@ -1,4 +1,5 @@
-//! The volumes that a gripper's bodies sweep: while the jaws close on the part, and along the straight approach.
+//! The volumes that a gripper's bodies sweep: while the jaws close on the part, and along the
+//! straight approach.
 
 use glam::{DMat3, DVec3};
 use parry3d_f64::query::details::intersection_test_support_map_support_map;
@@ -65,11 +66,14 @@ pub(super) struct Motion {
 /// All sweeps of a gripper, in the order in which they are tested.
 pub(super) fn sweeps(gripper: &Gripper, motion: &Motion) -> Vec<Sweep> {
     let turn = |turned: bool| if turned { half_turn() } else { DMat3::IDENTITY };
-    // Outside grips: jaw I stands at +x3 and opens along +x3. Inside grips: its outer pad pushes face I, which lies at
-    // -x3, so it is the jaw at -x3, and it draws in along +x3 for the approach.
+    // Outside grips: jaw I stands at +x3 and opens along +x3. Inside grips: its outer pad pushes
+    // face I, which lies at -x3, so it is the jaw at -x3, and it draws in along +x3 for the
+    // approach.
     let (gap, way) = match motion.kind {
         PairKind::External => (motion.width, motion.opening),
-        PairKind::Internal => (motion.width - 2.0 * gripper.outer_pad.unwrap_or(0.0), -motion.opening),
+        PairKind::Internal => {
+            (motion.width - 2.0 * gripper.outer_pad.unwrap_or(0.0), -motion.opening)
+        }
     };
     let back = motion.approach * DVec3::NEG_X;
     let (mut grip, mut approach) = (Vec::new(), Vec::new());
@@ -78,8 +82,14 @@ pub(super) fn sweeps(gripper: &Gripper, motion: &Motion) -> Vec<Sweep> {
         for body in &gripper.fingers {
             // Away from the gripped face by the tolerance, so that lying on it is no collision.
             let touching = motion.touch * way.signum();
-            let closed = Frame { rotation: turn(side < 0.0), origin: DVec3::Z * side * (gap / 2.0 + touching) };
-            let opened = Frame { origin: DVec3::Z * side * (gap / 2.0 + way.abs().max(motion.touch) * way.signum()), ..closed };
+            let closed = Frame {
+                rotation: turn(side < 0.0),
+                origin: DVec3::Z * side * (gap / 2.0 + touching),
+            };
+            let opened = Frame {
+                origin: DVec3::Z * side * (gap / 2.0 + way.abs().max(motion.touch) * way.signum()),
+                ..closed
+            };
             let path = opened.origin - closed.origin;
             grip.push(Sweep::new(body.moved(&closed), jaw, Stage::Grip, path, motion));
             approach.push(Sweep::new(body.moved(&opened), jaw, Stage::Approach, back, motion));
@@ -97,19 +107,29 @@ pub(super) fn sweeps(gripper: &Gripper, motion: &Motion) -> Vec<Sweep> {
 
 impl Sweep {
     fn new(body: Body, jaw: &'static str, stage: Stage, path: DVec3, motion: &Motion) -> Self {
-        // Clearance on all sides but along x3, where a finger may lie on its face (the touch tolerance keeps it off).
+        // Clearance on all sides but along x3, where a finger may lie on its face (the touch
+        // tolerance keeps it off).
         let side = motion.clearance - motion.flush;
         let grown = DVec3::new(side, side, if jaw.is_empty() { side } else { 0.0 });
         Self::grown(body, jaw, stage, path, grown)
     }
 
-    /// The sweep along `path` with `grown` added on all sides (less where negative, as far as it is a box).
-    pub(super) fn grown(body: Body, jaw: &'static str, stage: Stage, path: DVec3, grown: DVec3) -> Self {
+    /// The sweep along `path` with `grown` added on all sides (less where negative, as far as it is
+    /// a box).
+    pub(super) fn grown(
+        body: Body,
+        jaw: &'static str,
+        stage: Stage,
+        path: DVec3,
+        grown: DVec3,
+    ) -> Self {
         let [mut low, mut high] = body.bounds();
         (low, high) = (low.min(low + path), high.max(high + path));
         // A box moved along one of its axes sweeps a box.
         let along_axis = path.to_array().iter().filter(|part| **part != 0.0).count() <= 1;
-        let is_box = along_axis && matches!(body.shape, Shape::Box { .. }) && is_axis_parallel(body.grip_from_body.rotation);
+        let is_box = along_axis
+            && matches!(body.shape, Shape::Box { .. })
+            && is_axis_parallel(body.grip_from_body.rotation);
         let grown = if is_box { grown.max((low - high) * 0.499) } else { grown.max(DVec3::ZERO) };
         let exact = (!is_box).then(|| Convex { body: body.clone(), path, grown });
         Self { body: body.name, jaw, stage, low: low - grown, high: high + grown, exact }
@@ -128,7 +148,8 @@ impl Sweep {
         }
     }
 
-    /// Whether the sweep meets the triangle (grip frame; surfaces that only touch may go either way).
+    /// Whether the sweep meets the triangle (grip frame; surfaces that only touch may go either
+    /// way).
     pub(super) fn meets(&self, triangle: [DVec3; 3]) -> bool {
         if !box_meets_triangle(self.low, self.high, triangle) {
             return false;
@@ -138,12 +159,17 @@ impl Sweep {
             Some(convex) => {
                 // GJK wants the shapes near each other's origin.
                 let [a, b, c] = triangle;
-                intersection_test_support_map_support_map(&parry3d_f64::math::Pose::IDENTITY, convex, &Triangle::new(a, b, c))
+                intersection_test_support_map_support_map(
+                    &parry3d_f64::math::Pose::IDENTITY,
+                    convex,
+                    &Triangle::new(a, b, c),
+                )
             }
         }
     }
 
-    /// Whether the sweep meets the box `low..high` of another frame, `other_from_grip` being this one's frame there.
+    /// Whether the sweep meets the box `low..high` of another frame, `other_from_grip` being this
+    /// one's frame there.
     pub(super) fn meets_box(&self, other_from_grip: &Frame, low: DVec3, high: DVec3) -> bool {
         let placed = Placed { sweep: self, frame: *other_from_grip };
         let cuboid = parry3d_f64::shape::Cuboid::new((high - low) / 2.0);
@@ -174,7 +200,10 @@ impl SupportMap for Placed<'_> {
 }
 
 fn is_axis_parallel(rotation: DMat3) -> bool {
-    rotation.to_cols_array().iter().all(|value| value.abs() < 1e-12 || (value.abs() - 1.0).abs() < 1e-12)
+    rotation
+        .to_cols_array()
+        .iter()
+        .all(|value| value.abs() < 1e-12 || (value.abs() - 1.0).abs() < 1e-12)
 }
 
 /// Separating axes of an axis-parallel box and a triangle (Akenine-Moeller 2001).
@@ -189,7 +218,11 @@ pub(super) fn box_meets_triangle(low: DVec3, high: DVec3, triangle: [DVec3; 3]) 
         return false;
     }
     for edge in [b - a, c - b, a - c] {
-        for axis in [DVec3::new(0.0, -edge.z, edge.y), DVec3::new(edge.z, 0.0, -edge.x), DVec3::new(-edge.y, edge.x, 0.0)] {
+        for axis in [
+            DVec3::new(0.0, -edge.z, edge.y),
+            DVec3::new(edge.z, 0.0, -edge.x),
+            DVec3::new(-edge.y, edge.x, 0.0),
+        ] {
             let (x, y, z) = (axis.dot(a), axis.dot(b), axis.dot(c));
             let reach = half.dot(axis.abs());
             if x.min(y).min(z) > reach || x.max(y).max(z) < -reach {
@@ -241,7 +274,16 @@ mod tests {
     }
 
     fn motion() -> Motion {
-        Motion { kind: PairKind::External, width: 0.02, opening: 0.005, touch: 1e-6, flush: 1e-6, clearance: 0.0, approach: 1.0, flipped: false }
+        Motion {
+            kind: PairKind::External,
+            width: 0.02,
+            opening: 0.005,
+            touch: 1e-6,
+            flush: 1e-6,
+            clearance: 0.0,
+            approach: 1.0,
+            flipped: false,
+        }
     }
 
     #[test]
@@ -250,7 +292,10 @@ mod tests {
         let sweeps = sweeps(&gripper, &motion());
         assert_eq!(sweeps.len(), 10);
         let tip = &sweeps[0];
-        assert!((tip.low.z - 0.010001).abs() < 1e-12 && (tip.high.z - 0.025).abs() < 1e-12, "{tip:?}");
+        assert!(
+            (tip.low.z - 0.010001).abs() < 1e-12 && (tip.high.z - 0.025).abs() < 1e-12,
+            "{tip:?}"
+        );
         assert!(tip.is_box() && (tip.high.x - 0.011999).abs() < 1e-12);
         let other = &sweeps[2];
         assert!((other.high.z + 0.010001).abs() < 1e-12 && other.jaw == "II");
@@ -258,8 +303,8 @@ mod tests {
     }
 
     proptest! {
-        /// The exact test of a turned box and a cylinder against sampling: a triangle with a point well inside meets,
-        /// one whose points are all beyond a plane of the shape does not.
+        /// The exact test of a turned box and a cylinder against sampling: a triangle with a point
+        /// well inside meets, one whose points are all beyond a plane of the shape does not.
         #[test]
         fn round_and_turned_bodies(centre in vector(0.02), u in vector(0.02), v in vector(0.02), angle in 0.0..3.0f64) {
             let frame = Frame { rotation: DMat3::from_rotation_x(angle) * DMat3::from_rotation_y(angle), origin: DVec3::new(0.001, 0.002, 0.003) };

@@ -1,9 +1,10 @@
 //! A bounding-volume tree of the part's triangles whose boxes are tight along the closing axis.
 //!
-//! The bodies of a gripper turn about the closing axis only, and pads lie on faces perpendicular to it. Boxes in axes
-//! that follow the closing axis make both exact and cheap: a face under a pad has a box without height, however finely
-//! it is triangulated, and a turned body meets a box by five separating axes instead of fifteen. The tree's shape is
-//! built once per part; per closing direction only vertices and boxes are computed anew.
+//! The bodies of a gripper turn about the closing axis only, and pads lie on faces perpendicular to
+//! it. Boxes in axes that follow the closing axis make both exact and cheap: a face under a pad has
+//! a box without height, however finely it is triangulated, and a turned body meets a box by five
+//! separating axes instead of fifteen. The tree's shape is built once per part; per closing
+//! direction only vertices and boxes are computed anew.
 
 use std::sync::Arc;
 
@@ -17,8 +18,8 @@ const LEAF: usize = 4;
 /// Subtrees smaller than this are built by one thread.
 const SERIAL: usize = 8192;
 
-/// One node: the triangles `first..first + count` in tree order. Nodes lie in depth-first order: the left child of an
-/// inner node follows it.
+/// One node: the triangles `first..first + count` in tree order. Nodes lie in depth-first order:
+/// the left child of an inner node follows it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Node {
     first: u32,
@@ -35,8 +36,8 @@ pub(super) struct Topology {
     corners: Vec<[u32; 3]>,
     /// Mesh index of the triangles in tree order.
     order: Vec<u32>,
-    /// Vertices in the part frame, in the order in which the triangles need them first: neighbours in the tree are
-    /// neighbours in memory.
+    /// Vertices in the part frame, in the order in which the triangles need them first: neighbours
+    /// in the tree are neighbours in memory.
     vertices: Vec<DVec3>,
 }
 
@@ -46,12 +47,14 @@ impl Topology {
             .triangles
             .par_iter()
             .map(|triangle| {
-                let sum: DVec3 = triangle.iter().map(|&vertex| mesh.vertices[vertex as usize]).sum();
+                let sum: DVec3 =
+                    triangle.iter().map(|&vertex| mesh.vertices[vertex as usize]).sum();
                 (sum / 3.0).as_vec3().to_array()
             })
             .collect();
         let mut order: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
-        let mut nodes = vec![Node::default(); if order.is_empty() { 0 } else { 2 * leaves(order.len()) - 1 }];
+        let mut nodes =
+            vec![Node::default(); if order.is_empty() { 0 } else { 2 * leaves(order.len()) - 1 }];
         if !order.is_empty() {
             build(&mut nodes, 0, &mut order, 0, &centroids);
         }
@@ -65,7 +68,10 @@ impl Topology {
             }
             *slot
         };
-        let corners = order.iter().map(|&triangle| mesh.triangles[triangle as usize].map(&mut renumbered)).collect();
+        let corners = order
+            .iter()
+            .map(|&triangle| mesh.triangles[triangle as usize].map(&mut renumbered))
+            .collect();
         Self { nodes, corners, order, vertices }
     }
 }
@@ -74,8 +80,8 @@ fn leaves(count: usize) -> usize {
     if count <= LEAF { 1 } else { leaves(count / 2) + leaves(count - count / 2) }
 }
 
-/// Splits `order` at the median along its longest extent; `nodes` holds exactly the nodes of this subtree, the first of
-/// which has the index `base`.
+/// Splits `order` at the median along its longest extent; `nodes` holds exactly the nodes of this
+/// subtree, the first of which has the index `base`.
 fn build(nodes: &mut [Node], base: usize, order: &mut [u32], first: usize, centroids: &[[f32; 3]]) {
     nodes[0] = Node { first: first as u32, count: order.len() as u32, right: 0 };
     if order.len() <= LEAF {
@@ -89,16 +95,21 @@ fn build(nodes: &mut [Node], base: usize, order: &mut [u32], first: usize, centr
             high[axis] = high[axis].max(centroid[axis]);
         }
     }
-    let axis = (0..3).max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b]))).unwrap_or(0);
+    let axis =
+        (0..3).max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b]))).unwrap_or(0);
     let half = order.len() / 2;
     // The index breaks ties, so that the tree is the same on every run.
-    order.select_nth_unstable_by(half, |&a, &b| centroids[a as usize][axis].total_cmp(&centroids[b as usize][axis]).then(a.cmp(&b)));
+    order.select_nth_unstable_by(half, |&a, &b| {
+        centroids[a as usize][axis].total_cmp(&centroids[b as usize][axis]).then(a.cmp(&b))
+    });
     let (left, right) = order.split_at_mut(half);
     let split = 1 + 2 * leaves(half) - 1;
     nodes[0].right = (base + split) as u32;
     let (left_nodes, right_nodes) = nodes.split_at_mut(split);
-    let build_left = |left: &mut [u32]| build(&mut left_nodes[1..], base + 1, left, first, centroids);
-    let build_right = |right: &mut [u32]| build(right_nodes, base + split, right, first + half, centroids);
+    let build_left =
+        |left: &mut [u32]| build(&mut left_nodes[1..], base + 1, left, first, centroids);
+    let build_right =
+        |right: &mut [u32]| build(right_nodes, base + split, right, first + half, centroids);
     if left.len() < SERIAL {
         let (mut build_left, mut build_right) = (build_left, build_right);
         build_left(left);
@@ -121,13 +132,21 @@ pub(super) struct Tree {
 impl Tree {
     /// `axes_from_part` turns part coordinates into those of the tree.
     pub(super) fn new(shape: &Arc<Topology>, axes_from_part: DMat3) -> Self {
-        let points: Vec<Vec3A> = shape.vertices.par_iter().map(|&vertex| (axes_from_part * vertex).as_vec3a()).collect();
-        let reach = shape.vertices.par_iter().map(|vertex| vertex.length_squared()).reduce(|| 0.0, f64::max).sqrt();
-        // Rounding a coordinate moves it by at most 2^-24 of its size, growing the box rounds again.
+        let points: Vec<Vec3A> =
+            shape.vertices.par_iter().map(|&vertex| (axes_from_part * vertex).as_vec3a()).collect();
+        let reach = shape
+            .vertices
+            .par_iter()
+            .map(|vertex| vertex.length_squared())
+            .reduce(|| 0.0, f64::max)
+            .sqrt();
+        // Rounding a coordinate moves it by at most 2^-24 of its size, growing the box rounds
+        // again.
         let slack = Vec3A::splat((reach * f64::from(f32::EPSILON)) as f32);
         let leaf = |node: &Node| {
             let (mut low, mut high) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
-            for triangle in &shape.corners[node.first as usize..(node.first + node.count) as usize] {
+            for triangle in &shape.corners[node.first as usize..(node.first + node.count) as usize]
+            {
                 for &vertex in triangle {
                     let point = points[vertex as usize];
                     (low, high) = (low.min(point), high.max(point));
@@ -135,7 +154,11 @@ impl Tree {
             }
             [(low - slack).to_array(), (high + slack).to_array()]
         };
-        let mut boxes: Vec<[[f32; 3]; 2]> = shape.nodes.par_iter().map(|node| if node.right == 0 { leaf(node) } else { [[0.0; 3]; 2] }).collect();
+        let mut boxes: Vec<[[f32; 3]; 2]> = shape
+            .nodes
+            .par_iter()
+            .map(|node| if node.right == 0 { leaf(node) } else { [[0.0; 3]; 2] })
+            .collect();
         for index in (0..shape.nodes.len()).rev() {
             let right = shape.nodes[index].right as usize;
             if right != 0 {
@@ -160,7 +183,9 @@ impl Tree {
 
     /// Middle and half sizes of a node's box.
     pub(super) fn bounds(&self, node: u32) -> (DVec3, DVec3) {
-        let [low, high] = self.boxes[node as usize].map(|corner| DVec3::new(f64::from(corner[0]), f64::from(corner[1]), f64::from(corner[2])));
+        let [low, high] = self.boxes[node as usize].map(|corner| {
+            DVec3::new(f64::from(corner[0]), f64::from(corner[1]), f64::from(corner[2]))
+        });
         ((low + high) / 2.0, (high - low) / 2.0)
     }
 
@@ -172,8 +197,9 @@ impl Tree {
     /// Triangles under a node: mesh index and corners.
     pub(super) fn triangles(&self, node: u32) -> impl Iterator<Item = (u32, [DVec3; 3])> + '_ {
         let node = self.shape.nodes[node as usize];
-        (node.first as usize..(node.first + node.count) as usize)
-            .map(|index| (self.shape.order[index], self.shape.corners[index].map(|vertex| self.vertex(vertex))))
+        (node.first as usize..(node.first + node.count) as usize).map(|index| {
+            (self.shape.order[index], self.shape.corners[index].map(|vertex| self.vertex(vertex)))
+        })
     }
 
     /// Smallest and largest coordinates of a node's box.
@@ -203,7 +229,15 @@ mod tests {
     #[test]
     fn every_triangle_lies_in_the_boxes_above_it() {
         let count = 1000_u32;
-        let vertices: Vec<DVec3> = (0..3 * count).map(|k| DVec3::new((f64::from(k) * 0.7).sin(), (f64::from(k) * 1.3).cos(), f64::from(k % 17))).collect();
+        let vertices: Vec<DVec3> = (0..3 * count)
+            .map(|k| {
+                DVec3::new(
+                    (f64::from(k) * 0.7).sin(),
+                    (f64::from(k) * 1.3).cos(),
+                    f64::from(k % 17),
+                )
+            })
+            .collect();
         let triangles: Vec<[u32; 3]> = (0..count).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
         let mesh = Mesh { vertices, triangles };
         let shape = Arc::new(Topology::new(&mesh));
@@ -213,7 +247,9 @@ mod tests {
         while let Some(node) = stack.pop() {
             let (middle, half) = tree.bounds(node);
             for (index, corners) in tree.triangles(node) {
-                assert!(corners.iter().all(|corner| (*corner - middle).abs().cmple(half + 1e-12).all()));
+                assert!(
+                    corners.iter().all(|corner| (*corner - middle).abs().cmple(half + 1e-12).all())
+                );
                 if tree.children(node).is_none() {
                     assert!(!std::mem::replace(&mut found[index as usize], true));
                 }

@@ -34,10 +34,12 @@ pub(super) struct Buffers {
     blocked: Vec<bool>,
 }
 
-/// Contacts of one item by their rounded coordinates: a pad moved along a straight edge keeps its contact.
+/// Contacts of one item by their rounded coordinates: a pad moved along a straight edge keeps its
+/// contact.
 pub(super) type Known = FxHashMap<Vec<i64>, Arc<Contact>>;
 
-/// Contacts with more corners than this hardly ever repeat; looking for them would cost more than it saves.
+/// Contacts with more corners than this hardly ever repeat; looking for them would cost more than
+/// it saves.
 const SHARED_CORNERS: usize = 40;
 /// Contacts with coordinates this near, as a share of the pad's size, are one contact.
 const SAME_CONTACT: f64 = 1e-10;
@@ -48,9 +50,14 @@ pub(super) fn frame(site: &super::Site, place: DVec2, angle: f64) -> Frame {
     site.part_from_site.compose(&turn)
 }
 
-/// The pad outline of an orientation in the grip frame before the half turn: with exchanged jaws it is mirrored.
+/// The pad outline of an orientation in the grip frame before the half turn: with exchanged jaws it
+/// is mirrored.
 pub(super) fn oriented(pad: &[DVec2], flipped: bool) -> Ring {
-    if flipped { pad.iter().rev().map(|point| DVec2::new(point.x, -point.y)).collect() } else { pad.to_vec() }
+    if flipped {
+        pad.iter().rev().map(|point| DVec2::new(point.x, -point.y)).collect()
+    } else {
+        pad.to_vec()
+    }
 }
 
 /// The reason for which a sweep that meets the part rejects a candidate.
@@ -63,7 +70,13 @@ pub(super) fn reason(sweep: &Sweep) -> Rejection {
 }
 
 impl Proposer<'_> {
-    pub(super) fn evaluate(&self, item: &Item, prepared: &Prepared<'_>, tree: &Tree, buffers: &mut Buffers) -> Outcome {
+    pub(super) fn evaluate(
+        &self,
+        item: &Item,
+        prepared: &Prepared<'_>,
+        tree: &Tree,
+        buffers: &mut Buffers,
+    ) -> Outcome {
         let mut outcome = Outcome::default();
         let mut known = Known::default();
         // Numbers of the poses already taken, for the flips of an unsymmetric gripper.
@@ -78,7 +91,16 @@ impl Proposer<'_> {
             let alive = std::mem::take(&mut buffers.alive);
             for &index in &alive {
                 let place = site.positions[item.positions.start + index as usize];
-                let contact = self.contact(&prepared.patches, &pad, place, angle, flipped, buffers.whole[index as usize], &mut buffers.scratch, &mut known);
+                let contact = self.contact(
+                    &prepared.patches,
+                    &pad,
+                    place,
+                    angle,
+                    flipped,
+                    buffers.whole[index as usize],
+                    &mut buffers.scratch,
+                    &mut known,
+                );
                 let mut grip = Grip {
                     id: item.id + u64::from(index) * self.stride(),
                     part_from_grip: frame(site, place, angle),
@@ -113,8 +135,17 @@ impl Proposer<'_> {
         outcome
     }
 
-    /// Leaves in `buffers.alive` the item's positions without a reason against them, and counts the others.
-    fn survivors(&self, item: &Item, prepared: &Prepared<'_>, tree: &Tree, flipped: bool, buffers: &mut Buffers, outcome: &mut Outcome) {
+    /// Leaves in `buffers.alive` the item's positions without a reason against them, and counts the
+    /// others.
+    fn survivors(
+        &self,
+        item: &Item,
+        prepared: &Prepared<'_>,
+        tree: &Tree,
+        flipped: bool,
+        buffers: &mut Buffers,
+        outcome: &mut Outcome,
+    ) {
         let site = prepared.site;
         let angle = site.angles[item.angle];
         let positions = &site.positions[item.positions.clone()];
@@ -138,7 +169,10 @@ impl Proposer<'_> {
 
         if let Some(most) = self.options.max_offset {
             let centre = self.part.mass_properties(1.0).centre_of_mass;
-            let lost = keep(&mut buffers.alive, &mut |index| site.part_from_site.point(positions[index as usize].extend(0.0)).distance(centre) <= most);
+            let lost = keep(&mut buffers.alive, &mut |index| {
+                site.part_from_site.point(positions[index as usize].extend(0.0)).distance(centre)
+                    <= most
+            });
             reject(Rejection::TooFarFromCentreOfMass, lost);
         }
 
@@ -148,12 +182,14 @@ impl Proposer<'_> {
         buffers.whole.resize(positions.len(), [true; 2]);
         let (scratch, whole) = (&mut buffers.scratch, &mut buffers.whole);
         let lost = keep(&mut buffers.alive, &mut |index| {
-            prepared.patches.iter().enumerate().all(|(side, patch)| match patch.touch(&pad, positions[index as usize], &mut scratch[side]) {
-                Touch::Empty => false,
-                Touch::Whole => true,
-                Touch::Part(area) => {
-                    whole[index as usize][side] = false;
-                    area >= floor
+            prepared.patches.iter().enumerate().all(|(side, patch)| {
+                match patch.touch(&pad, positions[index as usize], &mut scratch[side]) {
+                    Touch::Empty => false,
+                    Touch::Whole => true,
+                    Touch::Part(area) => {
+                        whole[index as usize][side] = false;
+                        area >= floor
+                    }
                 }
             })
         });
@@ -163,10 +199,11 @@ impl Proposer<'_> {
             let sweeps = &prepared.outer_sweeps[usize::from(flipped)];
             let depths = self.environment.depths(sweeps, &origin_frame);
             let mut lost: Vec<(Rejection, usize)> = Vec::new();
-            let mut note = |reason: Rejection| match lost.iter_mut().find(|(known, _)| *known == reason) {
-                Some((_, count)) => *count += 1,
-                None => lost.push((reason, 1)),
-            };
+            let mut note =
+                |reason: Rejection| match lost.iter_mut().find(|(known, _)| *known == reason) {
+                    Some((_, count)) => *count += 1,
+                    None => lost.push((reason, 1)),
+                };
             keep(&mut buffers.alive, &mut |index| {
                 let grip = frame(site, positions[index as usize], angle);
                 if let Some(sweep) = self.environment.grounded(&depths, grip.origin) {
@@ -201,7 +238,8 @@ impl Proposer<'_> {
 
     /// Smallest contact area at a site [m^2]; reached up to rounding is enough.
     pub(super) fn contact_floor(&self, site: &super::Site, pad: f64) -> f64 {
-        (self.options.min_contact * pad.min(site.overlap)).max(self.options.min_pad_share * pad) * (1.0 - 1e-9)
+        (self.options.min_contact * pad.min(site.overlap)).max(self.options.min_pad_share * pad)
+            * (1.0 - 1e-9)
     }
 
     /// The part in the grip axes of a site at an angle.
@@ -232,7 +270,9 @@ impl Proposer<'_> {
         let mut patch = |side: usize| -> Patch {
             match patches[side].touch(pad, place, &mut scratch[side]) {
                 Touch::Empty => Patch::new(),
-                Touch::Whole => vec![Polygon { outer: oriented(&self.gripper.pad, flipped), holes: Vec::new() }],
+                Touch::Whole => {
+                    vec![Polygon { outer: oriented(&self.gripper.pad, flipped), holes: Vec::new() }]
+                }
                 Touch::Part(_) => patches[side].outline(pad, place, &mut scratch[side], angle),
             }
         };
@@ -244,19 +284,27 @@ impl Proposer<'_> {
 
     /// The contact with exchanged jaws.
     fn mirrored(&self, contact: &Arc<Contact>, known: &mut Known) -> Arc<Contact> {
-        if Arc::ptr_eq(contact, &self.whole) { Arc::clone(&self.whole) } else { self.shared(mirror(contact), known) }
+        if Arc::ptr_eq(contact, &self.whole) {
+            Arc::clone(&self.whole)
+        } else {
+            self.shared(mirror(contact), known)
+        }
     }
 
     fn shared(&self, contact: Contact, known: &mut Known) -> Arc<Contact> {
-        let step = SAME_CONTACT * self.gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
-        let rings = || [&contact.face_i, &contact.face_ii].into_iter().flatten().flat_map(polygon::rings);
+        let step =
+            SAME_CONTACT * self.gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
+        let rings =
+            || [&contact.face_i, &contact.face_ii].into_iter().flatten().flat_map(polygon::rings);
         if rings().map(<[DVec2]>::len).sum::<usize>() > SHARED_CORNERS {
             return Arc::new(contact);
         }
         let mut key = Vec::new();
         for patch in [&contact.face_i, &contact.face_ii] {
             for ring in patch.iter().flat_map(polygon::rings) {
-                key.extend(ring.iter().flat_map(|point| [(point.x / step).round() as i64, (point.y / step).round() as i64]));
+                key.extend(ring.iter().flat_map(|point| {
+                    [(point.x / step).round() as i64, (point.y / step).round() as i64]
+                }));
                 key.push(i64::MAX);
             }
             key.push(i64::MIN);

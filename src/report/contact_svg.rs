@@ -1,5 +1,5 @@
-//! A drawing of one contact pair at its limit state: both faces with the pressure, the separation line, the slip centre
-//! and the directions in which friction acts on the body.
+//! A drawing of one contact pair at its limit state: both faces with the pressure, the separation
+//! line, the slip centre and the directions in which friction acts on the body.
 
 use std::fmt::Write;
 
@@ -32,14 +32,23 @@ impl View {
 
 /// The drawing as an SVG document; `x1` to the right, `x2` up, both faces seen along `-x3`.
 pub fn draw(title: &str, contact: &Contact, score: &Score) -> String {
-    let points: Vec<DVec2> = [&contact.face_i, &contact.face_ii].into_iter().flatten().flat_map(|polygon| polygon.outer.iter().copied()).collect();
-    let (low, high) = points.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
+    let points: Vec<DVec2> = [&contact.face_i, &contact.face_ii]
+        .into_iter()
+        .flatten()
+        .flat_map(|polygon| polygon.outer.iter().copied())
+        .collect();
+    let (low, high) = points
+        .iter()
+        .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
     let size = (high - low).max(DVec2::splat(f64::MIN_POSITIVE));
     let scale = PANEL / size.max_element();
     let height = size.y * scale;
     let width = 2.0 * PANEL + 3.0 * MARGIN;
     let pressure = score.pressure.unwrap_or_default();
-    let peak = points.iter().flat_map(|&x| [value(&pressure, 0, x), value(&pressure, 1, x)]).fold(0.0, f64::max);
+    let peak = points
+        .iter()
+        .flat_map(|&x| [value(&pressure, 0, x), value(&pressure, 1, x)])
+        .fold(0.0, f64::max);
     let mut svg = String::new();
     let total = height + 2.0 * MARGIN + 64.0;
     // Writing to a String cannot fail.
@@ -48,9 +57,18 @@ pub fn draw(title: &str, contact: &Contact, score: &Score) -> String {
         r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0} {total:.0}" font-family="system-ui, sans-serif" font-size="13" fill="#222"><rect width="100%" height="100%" fill="#fff"/><title>{}</title>"##,
         escape(title)
     );
-    for (k, (patch, name)) in [(&contact.face_i, "face I  (x3 = +d/2)"), (&contact.face_ii, "face II  (x3 = -d/2)")].into_iter().enumerate() {
+    for (k, (patch, name)) in
+        [(&contact.face_i, "face I  (x3 = +d/2)"), (&contact.face_ii, "face II  (x3 = -d/2)")]
+            .into_iter()
+            .enumerate()
+    {
         let view = View { low, scale, left: MARGIN + k as f64 * (PANEL + MARGIN), height };
-        let _ = write!(svg, r#"<text x="{:.1}" y="{:.1}" font-weight="600">{name}</text>"#, view.left, MARGIN - 22.0);
+        let _ = write!(
+            svg,
+            r#"<text x="{:.1}" y="{:.1}" font-weight="600">{name}</text>"#,
+            view.left,
+            MARGIN - 22.0
+        );
         area(&mut svg, &view, patch, &pressure, k, peak);
         separation(&mut svg, &view, patch, &pressure, k);
         if let Some(slip) = score.slip {
@@ -60,10 +78,24 @@ pub fn draw(title: &str, contact: &Contact, score: &Score) -> String {
         axes(&mut svg, &view, size);
     }
     let y = MARGIN + height + 62.0;
-    let mu = score.mu_s.map_or_else(|| format!("no limit state ({:?})", score.status), |mu| format!("mu_s = {mu:.6}"));
-    let _ = write!(svg, r#"<text x="{MARGIN}" y="{y:.1}" font-weight="600">{}</text>"#, escape(&format!("{title}: {mu}")));
-    let text = format!("pressure 0 (white) to {:.1} kPa (blue); arrows: friction on the body; dashed: separation line; cross: slip centre", peak * 1e-3);
-    let _ = write!(svg, r##"<text x="{MARGIN}" y="{:.1}" fill="#555" font-size="12">{text}</text></svg>"##, y + 20.0);
+    let mu = score.mu_s.map_or_else(
+        || format!("no limit state ({:?})", score.status),
+        |mu| format!("mu_s = {mu:.6}"),
+    );
+    let _ = write!(
+        svg,
+        r#"<text x="{MARGIN}" y="{y:.1}" font-weight="600">{}</text>"#,
+        escape(&format!("{title}: {mu}"))
+    );
+    let text = format!(
+        "pressure 0 (white) to {:.1} kPa (blue); arrows: friction on the body; dashed: separation line; cross: slip centre",
+        peak * 1e-3
+    );
+    let _ = write!(
+        svg,
+        r##"<text x="{MARGIN}" y="{:.1}" fill="#555" font-size="12">{text}</text></svg>"##,
+        y + 20.0
+    );
     svg
 }
 
@@ -79,15 +111,20 @@ fn inside(patch: &Patch, x: DVec2) -> bool {
 fn area(svg: &mut String, view: &View, patch: &Patch, pressure: &Pressure, k: usize, peak: f64) {
     let slope = DVec2::new(pressure.a1, pressure.a2) * if k == 0 { 1.0 } else { -1.0 };
     let at_origin = value(pressure, k, DVec2::ZERO);
-    let rings = || patch.iter().flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes));
-    let across = rings().flatten().map(|x| x.dot(slope)).fold(0.0, |most: f64, p| most.max(p.abs()));
+    let rings =
+        || patch.iter().flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes));
+    let across =
+        rings().flatten().map(|x| x.dot(slope)).fold(0.0, |most: f64, p| most.max(p.abs()));
     let fill = if across <= 1e-9 * peak {
         colour(if peak > 0.0 { (at_origin / peak).clamp(0.0, 1.0) } else { 0.0 })
     } else {
         let zero = -at_origin * slope / slope.length_squared();
         let (from, to) = (view.at(zero), view.at(zero + slope * (peak / slope.length_squared())));
-        let _ =
-            write!(svg, r#"<linearGradient id="p{k}" gradientUnits="userSpaceOnUse" x1="{:.1}" y1="{:.1}" x2="{:.1}" y2="{:.1}">"#, from.x, from.y, to.x, to.y);
+        let _ = write!(
+            svg,
+            r#"<linearGradient id="p{k}" gradientUnits="userSpaceOnUse" x1="{:.1}" y1="{:.1}" x2="{:.1}" y2="{:.1}">"#,
+            from.x, from.y, to.x, to.y
+        );
         for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
             let _ = write!(svg, r#"<stop offset="{share}" stop-color="{}"/>"#, colour(share));
         }
@@ -102,7 +139,10 @@ fn area(svg: &mut String, view: &View, patch: &Patch, pressure: &Pressure, k: us
         }
         path.push('Z');
     }
-    let _ = write!(svg, r##"<path d="{path}" fill="{fill}" fill-rule="evenodd" stroke="#222" stroke-width="1.4"/>"##);
+    let _ = write!(
+        svg,
+        r##"<path d="{path}" fill="{fill}" fill-rule="evenodd" stroke="#222" stroke-width="1.4"/>"##
+    );
 }
 
 /// White for no pressure, blue for the peak, light enough for the arrows on it.
@@ -123,7 +163,8 @@ fn separation(svg: &mut String, view: &View, patch: &Patch, pressure: &Pressure,
     }
 }
 
-/// Pieces of the zero-pressure line inside the area: its crossings with the boundary, in order, two by two.
+/// Pieces of the zero-pressure line inside the area: its crossings with the boundary, in order, two
+/// by two.
 fn crossing_pairs(edges: &[(DVec2, DVec2)], pressure: &Pressure, k: usize) -> Vec<(DVec2, DVec2)> {
     let along = DVec2::new(-pressure.a2, pressure.a1);
     let mut crossings: Vec<DVec2> = edges
@@ -137,7 +178,15 @@ fn crossing_pairs(edges: &[(DVec2, DVec2)], pressure: &Pressure, k: usize) -> Ve
     crossings.chunks_exact(2).map(|pair| (pair[0], pair[1])).collect()
 }
 
-fn arrows(svg: &mut String, view: &View, patch: &Patch, pressure: &Pressure, k: usize, size: DVec2, slip: Slip) {
+fn arrows(
+    svg: &mut String,
+    view: &View,
+    patch: &Patch,
+    pressure: &Pressure,
+    k: usize,
+    size: DVec2,
+    slip: Slip,
+) {
     let step = size.max_element() / ARROWS as f64;
     let (nx, ny) = ((size.x / step).ceil() as usize, (size.y / step).ceil() as usize);
     for j in 0..ny {
@@ -187,7 +236,8 @@ fn centre(svg: &mut String, view: &View, low: DVec2, high: DVec2, slip: Slip) {
 }
 
 fn axes(svg: &mut String, view: &View, size: DVec2) {
-    let mm = |v: f64| format!("{:.4}", v * 1e3).trim_end_matches('0').trim_end_matches('.').to_string();
+    let mm =
+        |v: f64| format!("{:.4}", v * 1e3).trim_end_matches('0').trim_end_matches('.').to_string();
     let (a, b) = (view.at(view.low), view.at(view.low + size));
     let _ = write!(
         svg,
@@ -219,7 +269,9 @@ mod tests {
 
     #[test]
     fn draws_pressure_separation_line_and_slip_centre() {
-        let ring = [(-0.01, -0.01), (0.01, -0.01), (0.01, 0.01), (-0.01, 0.01)].map(|(x, y)| DVec2::new(x, y)).to_vec();
+        let ring = [(-0.01, -0.01), (0.01, -0.01), (0.01, 0.01), (-0.01, 0.01)]
+            .map(|(x, y)| DVec2::new(x, y))
+            .to_vec();
         let patch = vec![Polygon { outer: ring, holes: Vec::new() }];
         let contact = Contact { face_i: patch.clone(), face_ii: patch };
         let wrench = Wrench { force: glam::DVec3::ZERO, moment: glam::DVec3::new(0.6, 0.0, 0.2) };
@@ -231,7 +283,14 @@ mod tests {
         // Both faces are filled along the slope of their pressure, from its zero line on.
         assert_eq!(svg.matches("<linearGradient").count(), 2);
         assert!(svg.contains("fill=\"url(#p0)\"") && svg.contains("fill=\"url(#p1)\""));
-        let level = solve(&contact, 0.02, 50.0, &Wrench { force: glam::DVec3::X, moment: glam::DVec3::ZERO }, &Options::default()).unwrap();
+        let level = solve(
+            &contact,
+            0.02,
+            50.0,
+            &Wrench { force: glam::DVec3::X, moment: glam::DVec3::ZERO },
+            &Options::default(),
+        )
+        .unwrap();
         assert!(!draw("level", &contact, &level).contains("linearGradient"));
     }
 }

@@ -1,18 +1,21 @@
-//! Fewer triangles for display: edge collapses by quadric error (Garland and Heckbert 1997), in f64.
+//! Fewer triangles for display: edge collapses by quadric error (Garland and Heckbert 1997), in
+//! f64.
 //!
-//! A vertex only ever moves onto a neighbour, so corners of the part stay where they are and a refined planar face
-//! collapses at no error. Each pass takes the cheapest collapses whose neighbourhoods do not touch; a collapse that
-//! would turn a triangle over or pinch the surface is refused. Nothing here feeds the mechanics.
+//! A vertex only ever moves onto a neighbour, so corners of the part stay where they are and a
+//! refined planar face collapses at no error. Each pass takes the cheapest collapses whose
+//! neighbourhoods do not touch; a collapse that would turn a triangle over or pinch the surface is
+//! refused. Nothing here feeds the mechanics.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Smallest cosine between a triangle's normal before and after a collapse; keeps the surface from folding.
+/// Smallest cosine between a triangle's normal before and after a collapse; keeps the surface from
+/// folding.
 const FLIP_COSINE: f64 = 0.25;
 /// Weight of the planes that hold open boundaries in place, over the weight of the surface.
 const BOUNDARY_WEIGHT: f64 = 10.0;
-/// Share of the squared edge length added to a collapse's cost: of many free collapses the shortest come first,
-/// which keeps the triangles of a plane compact.
+/// Share of the squared edge length added to a collapse's cost: of many free collapses the shortest
+/// come first, which keeps the triangles of a plane compact.
 const LENGTH_WEIGHT: f64 = 1e-7;
 /// More passes than a reduction by a factor of a million takes.
 const MAX_PASSES: usize = 80;
@@ -28,7 +31,8 @@ struct Quadric {
 impl Quadric {
     fn plane(normal: DVec3, point: DVec3, weight: f64) -> Self {
         let (n, offset) = (normal, -normal.dot(point));
-        let a = [n.x * n.x, n.x * n.y, n.x * n.z, n.y * n.y, n.y * n.z, n.z * n.z].map(|value| weight * value);
+        let a = [n.x * n.x, n.x * n.y, n.x * n.z, n.y * n.y, n.y * n.z, n.z * n.z]
+            .map(|value| weight * value);
         Self { a, b: n * (weight * offset), c: weight * offset * offset }
     }
 
@@ -42,7 +46,9 @@ impl Quadric {
 
     fn at(&self, p: DVec3) -> f64 {
         let a = &self.a;
-        let quadratic = p.x * (a[0] * p.x + 2.0 * (a[1] * p.y + a[2] * p.z)) + p.y * (a[3] * p.y + 2.0 * a[4] * p.z) + p.z * a[5] * p.z;
+        let quadratic = p.x * (a[0] * p.x + 2.0 * (a[1] * p.y + a[2] * p.z))
+            + p.y * (a[3] * p.y + 2.0 * a[4] * p.z)
+            + p.z * a[5] * p.z;
         (quadratic + 2.0 * self.b.dot(p) + self.c).max(0.0)
     }
 }
@@ -74,21 +80,29 @@ impl Stars {
     }
 
     fn of(&self, vertex: u32) -> &[u32] {
-        &self.triangle[self.start[vertex as usize] as usize..self.start[vertex as usize + 1] as usize]
+        &self.triangle
+            [self.start[vertex as usize] as usize..self.start[vertex as usize + 1] as usize]
     }
 }
 
-/// Triangles over the same vertices, at most about `budget` of them where the surface allows it. Indices must be in range
-/// and coordinates finite; the order of the result depends on the input only.
+/// Triangles over the same vertices, at most about `budget` of them where the surface allows it.
+/// Indices must be in range and coordinates finite; the order of the result depends on the input
+/// only.
 pub(super) fn decimate(vertices: &[DVec3], triangles: &[[u32; 3]], budget: usize) -> Vec<[u32; 3]> {
-    let (low, high) = vertices.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)));
+    let (low, high) = vertices
+        .iter()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)));
     let size = (high - low).max_element();
     if triangles.len() <= budget || size.is_nan() || size <= 0.0 {
         return triangles.to_vec();
     }
     // Unit size about the middle: quadrics then lose no digits to the position of the part.
     let points: Vec<DVec3> = vertices.iter().map(|&v| (v - (low + high) / 2.0) / size).collect();
-    let mut live: Vec<[u32; 3]> = triangles.iter().copied().filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]).collect();
+    let mut live: Vec<[u32; 3]> = triangles
+        .iter()
+        .copied()
+        .filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0])
+        .collect();
     let mut quadrics = quadrics(&points, &live);
     let mut marks = Marks { epoch: 0, seen: vec![0; points.len()] };
     for _ in 0..MAX_PASSES {
@@ -112,7 +126,8 @@ fn quadrics(points: &[DVec3], triangles: &[[u32; 3]]) -> Vec<Quadric> {
         let normal = cross(points, t);
         let twice_area = normal.length();
         if twice_area > 0.0 {
-            let plane = Quadric::plane(normal / twice_area, points[t[0] as usize], twice_area / 2.0);
+            let plane =
+                Quadric::plane(normal / twice_area, points[t[0] as usize], twice_area / 2.0);
             t.iter().for_each(|&v| quadrics[v as usize].add(&plane));
         }
         for k in 0..3 {
@@ -125,7 +140,8 @@ fn quadrics(points: &[DVec3], triangles: &[[u32; 3]]) -> Vec<Quadric> {
         let (a, b, t) = run[0];
         let along = points[b as usize] - points[a as usize];
         let side = along.cross(cross(points, triangles[t as usize])).normalize_or_zero();
-        let plane = Quadric::plane(side, points[a as usize], BOUNDARY_WEIGHT * along.length_squared());
+        let plane =
+            Quadric::plane(side, points[a as usize], BOUNDARY_WEIGHT * along.length_squared());
         quadrics[a as usize].add(&plane);
         quadrics[b as usize].add(&plane);
     }
@@ -155,7 +171,13 @@ impl Marks {
 }
 
 /// One round of collapses; false when none was possible.
-fn pass(points: &[DVec3], quadrics: &mut [Quadric], live: &mut Vec<[u32; 3]>, budget: usize, marks: &mut Marks) -> bool {
+fn pass(
+    points: &[DVec3],
+    quadrics: &mut [Quadric],
+    live: &mut Vec<[u32; 3]>,
+    budget: usize,
+    marks: &mut Marks,
+) -> bool {
     let stars = Stars::new(points.len(), live);
     let cheapest = |v0: u32| {
         // The next corner of each triangle: every neighbour once, but for one at an open boundary.
@@ -172,15 +194,24 @@ fn pass(points: &[DVec3], quadrics: &mut [Quadric], live: &mut Vec<[u32; 3]>, bu
         let cost = |v1: u32| {
             let (p0, p1) = (points[v0 as usize], points[v1 as usize]);
             let length = p0.distance_squared(p1);
-            quadrics[v0 as usize].at(p1) + quadrics[v1 as usize].at(p1) + LENGTH_WEIGHT * length * length
+            quadrics[v0 as usize].at(p1)
+                + quadrics[v1 as usize].at(p1)
+                + LENGTH_WEIGHT * length * length
         };
-        neighbours.map(|v1| (cost(v1), v0, v1)).filter(|candidate| candidate.0.is_finite()).min_by(|a, b| a.0.total_cmp(&b.0))
+        neighbours
+            .map(|v1| (cost(v1), v0, v1))
+            .filter(|candidate| candidate.0.is_finite())
+            .min_by(|a, b| a.0.total_cmp(&b.0))
     };
-    let mut candidates: Vec<(f64, u32, u32)> = (0..points.len() as u32).into_par_iter().filter_map(cheapest).collect();
+    let mut candidates: Vec<(f64, u32, u32)> =
+        (0..points.len() as u32).into_par_iter().filter_map(cheapest).collect();
     candidates.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    // Costly collapses wait until the cheap ones, which this pass's neighbours still block, have had their turn.
+    // Costly collapses wait until the cheap ones, which this pass's neighbours still block, have
+    // had their turn.
     let wanted = live.len() - budget;
-    let limit = candidates.get((wanted / 2).max(candidates.len() / 4)).map_or(f64::INFINITY, |candidate| candidate.0);
+    let limit = candidates
+        .get((wanted / 2).max(candidates.len() / 4))
+        .map_or(f64::INFINITY, |candidate| candidate.0);
     let mut locked = vec![false; points.len()];
     let mut removed = 0;
     for &(cost, v0, v1) in &candidates {
@@ -188,8 +219,11 @@ fn pass(points: &[DVec3], quadrics: &mut [Quadric], live: &mut Vec<[u32; 3]>, bu
             break;
         }
         let star = stars.of(v0);
-        // Triangles that died in this pass have locked corners only: the first test keeps away from them.
-        let blocked = locked[v0 as usize] || locked[v1 as usize] || star.iter().any(|&t| live[t as usize].iter().any(|&v| locked[v as usize]));
+        // Triangles that died in this pass have locked corners only: the first test keeps away from
+        // them.
+        let blocked = locked[v0 as usize]
+            || locked[v1 as usize]
+            || star.iter().any(|&t| live[t as usize].iter().any(|&v| locked[v as usize]));
         if blocked || !allowed(points, live, &stars, v0, v1, marks) {
             continue;
         }
@@ -210,8 +244,16 @@ fn pass(points: &[DVec3], quadrics: &mut [Quadric], live: &mut Vec<[u32; 3]>, bu
     removed > 0
 }
 
-/// Whether `v0` may move onto `v1`: no triangle turns over or vanishes, and the surface is not pinched.
-fn allowed(points: &[DVec3], live: &[[u32; 3]], stars: &Stars, v0: u32, v1: u32, marks: &mut Marks) -> bool {
+/// Whether `v0` may move onto `v1`: no triangle turns over or vanishes, and the surface is not
+/// pinched.
+fn allowed(
+    points: &[DVec3],
+    live: &[[u32; 3]],
+    stars: &Stars,
+    v0: u32,
+    v1: u32,
+    marks: &mut Marks,
+) -> bool {
     let mut dying = 0;
     for &t in stars.of(v0) {
         let corners = live[t as usize];
@@ -221,8 +263,14 @@ fn allowed(points: &[DVec3], live: &[[u32; 3]], stars: &Stars, v0: u32, v1: u32,
         }
         let moved = corners.map(|v| if v == v0 { v1 } else { v });
         let (before, after) = (cross(points, corners), cross(points, moved));
-        let longest = (0..3).map(|k| points[moved[k] as usize].distance_squared(points[moved[(k + 1) % 3] as usize])).fold(0.0, f64::max);
-        if after.length() <= 1e-9 * longest || before.dot(after) < FLIP_COSINE * before.length() * after.length() {
+        let longest = (0..3)
+            .map(|k| {
+                points[moved[k] as usize].distance_squared(points[moved[(k + 1) % 3] as usize])
+            })
+            .fold(0.0, f64::max);
+        if after.length() <= 1e-9 * longest
+            || before.dot(after) < FLIP_COSINE * before.length() * after.length()
+        {
             return false;
         }
     }
@@ -231,7 +279,12 @@ fn allowed(points: &[DVec3], live: &[[u32; 3]], stars: &Stars, v0: u32, v1: u32,
     stars.of(v0).iter().flat_map(|&t| &live[t as usize]).for_each(|&v| {
         marks.add(v);
     });
-    let mut shared: Vec<u32> = stars.of(v1).iter().flat_map(|&t| live[t as usize]).filter(|&v| v != v0 && v != v1 && marks.has(v)).collect();
+    let mut shared: Vec<u32> = stars
+        .of(v1)
+        .iter()
+        .flat_map(|&t| live[t as usize])
+        .filter(|&v| v != v0 && v != v1 && marks.has(v))
+        .collect();
     shared.sort_unstable();
     shared.dedup();
     (1..=2).contains(&dying) && shared.len() == dying
@@ -251,13 +304,20 @@ mod tests {
                     let mut key = [0; 3];
                     (key[axis], key[(axis + 1) % 3], key[(axis + 2) % 3]) = (side, u, v);
                     *index.entry(key).or_insert_with(|| {
-                        vertices.push(DVec3::new(f64::from(key[0]), f64::from(key[1]), f64::from(key[2])) / f64::from(n));
+                        vertices.push(
+                            DVec3::new(f64::from(key[0]), f64::from(key[1]), f64::from(key[2]))
+                                / f64::from(n),
+                        );
                         vertices.len() as u32 - 1
                     })
                 };
                 for (u, v) in (0..n * n).map(|i| (i % n, i / n)) {
                     let [a, b, c, d] = [at(u, v), at(u + 1, v), at(u + 1, v + 1), at(u, v + 1)];
-                    triangles.extend(if side == n { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] });
+                    triangles.extend(if side == n {
+                        [[a, b, c], [a, c, d]]
+                    } else {
+                        [[a, c, b], [a, d, c]]
+                    });
                 }
             }
         }
@@ -265,7 +325,11 @@ mod tests {
     }
 
     fn volume_and_area(vertices: &[DVec3], triangles: &[[u32; 3]]) -> (f64, f64) {
-        let volume = triangles.iter().map(|t| t.map(|i| vertices[i as usize])).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum();
+        let volume = triangles
+            .iter()
+            .map(|t| t.map(|i| vertices[i as usize]))
+            .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+            .sum();
         (volume, triangles.iter().map(|&t| cross(vertices, t).length() / 2.0).sum())
     }
 
@@ -275,7 +339,10 @@ mod tests {
         let few = decimate(&vertices, &triangles, 300);
         assert!(few.len() <= 300, "{} triangles of {}", few.len(), triangles.len());
         let (volume, area) = volume_and_area(&vertices, &few);
-        assert!((volume - 1.0).abs() < 1e-12 && (area - 6.0).abs() < 1e-12, "volume {volume}, area {area}");
+        assert!(
+            (volume - 1.0).abs() < 1e-12 && (area - 6.0).abs() < 1e-12,
+            "volume {volume}, area {area}"
+        );
     }
 
     #[test]
@@ -286,7 +353,10 @@ mod tests {
         assert!(few.len() <= 4000, "{}", few.len());
         let (volume, area) = volume_and_area(&vertices, &few);
         let sphere = 4.0 / 3.0 * std::f64::consts::PI;
-        assert!((volume / sphere - 1.0).abs() < 5e-3 && (area / (3.0 * sphere) - 1.0).abs() < 5e-3, "volume {volume}, area {area}");
+        assert!(
+            (volume / sphere - 1.0).abs() < 5e-3 && (area / (3.0 * sphere) - 1.0).abs() < 5e-3,
+            "volume {volume}, area {area}"
+        );
     }
 
     #[test]

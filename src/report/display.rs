@@ -10,11 +10,13 @@ use rayon::prelude::*;
 use super::decimate::decimate;
 use crate::part::Mesh;
 
-/// Triangles that a laptop's integrated graphics turns smoothly and that keep the page a few megabytes small.
+/// Triangles that a laptop's integrated graphics turns smoothly and that keep the page a few
+/// megabytes small.
 pub(super) const TRIANGLE_BUDGET: usize = 150_000;
 /// Faces that meet at a larger angle than 30 degrees are drawn with a sharp edge between them.
 const CREASE_COSINE: f64 = 0.866_025_403_784_438_6;
-/// A vertex with more triangles than this is the hub of a fan; averaging over all of them would cost their square.
+/// A vertex with more triangles than this is the hub of a fan; averaging over all of them would
+/// cost their square.
 const LARGEST_SMOOTHED_FAN: usize = 256;
 /// Removed vertices on which the deviation of a decimated surface is measured.
 const DEVIATION_SAMPLES: usize = 20_000;
@@ -36,16 +38,23 @@ pub(super) struct Display {
     pub(super) edges: Vec<u32>,
     /// Triangles of the part.
     pub(super) original: usize,
-    /// Largest distance of a vertex left out from the surface shown, over up to [`DEVIATION_SAMPLES`] of them [m].
+    /// Largest distance of a vertex left out from the surface shown, over up to
+    /// [`DEVIATION_SAMPLES`] of them [m].
     pub(super) deviation: f64,
 }
 
 impl Display {
-    /// The drawable form of `mesh` with at most about `budget` triangles; `None` when it has no usable triangle.
+    /// The drawable form of `mesh` with at most about `budget` triangles; `None` when it has no
+    /// usable triangle.
     pub(super) fn new(mesh: &Mesh, budget: usize) -> Option<Self> {
-        let usable = |t: &[u32; 3]| t.iter().all(|&i| mesh.vertices.get(i as usize).is_some_and(|v| v.is_finite()));
-        let whole: Cow<'_, [[u32; 3]]> =
-            if mesh.triangles.iter().all(usable) { Cow::Borrowed(&mesh.triangles) } else { mesh.triangles.iter().copied().filter(usable).collect() };
+        let usable = |t: &[u32; 3]| {
+            t.iter().all(|&i| mesh.vertices.get(i as usize).is_some_and(|v| v.is_finite()))
+        };
+        let whole: Cow<'_, [[u32; 3]]> = if mesh.triangles.iter().all(usable) {
+            Cow::Borrowed(&mesh.triangles)
+        } else {
+            mesh.triangles.iter().copied().filter(usable).collect()
+        };
         if whole.is_empty() {
             return None;
         }
@@ -64,17 +73,27 @@ impl Display {
 
     /// Splits the vertices along creases, so that each has one normal, and quantises.
     fn shaded(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Self {
-        let (low, high) = triangles.iter().flatten().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &i| {
-            let v = vertices[i as usize];
-            (low.min(v), high.max(v))
-        });
+        let (low, high) = triangles.iter().flatten().fold(
+            (DVec3::INFINITY, DVec3::NEG_INFINITY),
+            |(low, high), &i| {
+                let v = vertices[i as usize];
+                (low.min(v), high.max(v))
+            },
+        );
         let scale = (high - low).max_element().max(f64::MIN_POSITIVE);
         let mut display = Self { origin: low, scale, ..Self::default() };
         // Length = twice the area: large triangles decide the normal of a vertex.
-        let normals: Vec<DVec3> = triangles.iter().map(|t| t.map(|i| vertices[i as usize])).map(|[a, b, c]| (b - a).cross(c - a)).collect();
+        let normals: Vec<DVec3> = triangles
+            .iter()
+            .map(|t| t.map(|i| vertices[i as usize]))
+            .map(|[a, b, c]| (b - a).cross(c - a))
+            .collect();
         let units: Vec<DVec3> = normals.iter().map(|n| n.normalize_or_zero()).collect();
-        let mut corners: Vec<(u32, u32, u8)> =
-            triangles.iter().enumerate().flat_map(|(t, corners)| (0..3).map(move |k| (corners[k as usize], t as u32, k))).collect();
+        let mut corners: Vec<(u32, u32, u8)> = triangles
+            .iter()
+            .enumerate()
+            .flat_map(|(t, corners)| (0..3).map(move |k| (corners[k as usize], t as u32, k)))
+            .collect();
         corners.sort_unstable();
         display.triangles = vec![0; triangles.len() * 3];
         let mut drawn_as = vec![0u32; vertices.len()];
@@ -85,11 +104,18 @@ impl Display {
             let steps = ((vertices[vertex as usize] - low) / scale * 65535.0).round();
             for &(_, t, k) in run {
                 let own = units[t as usize];
-                let near = run.iter().filter(|other| units[other.1 as usize].dot(own) > CREASE_COSINE);
-                let sum: DVec3 = if run.len() > LARGEST_SMOOTHED_FAN { own } else { near.map(|other| normals[other.1 as usize]).sum() };
-                let n = (if sum == DVec3::ZERO { own } else { sum.normalize_or_zero() } * 127.0).round();
+                let near =
+                    run.iter().filter(|other| units[other.1 as usize].dot(own) > CREASE_COSINE);
+                let sum: DVec3 = if run.len() > LARGEST_SMOOTHED_FAN {
+                    own
+                } else {
+                    near.map(|other| normals[other.1 as usize]).sum()
+                };
+                let n = (if sum == DVec3::ZERO { own } else { sum.normalize_or_zero() } * 127.0)
+                    .round();
                 let normal = [n.x as i8, n.y as i8, n.z as i8, 0];
-                let known = display.normals[first * 4..].chunks_exact(4).position(|known| known == normal);
+                let known =
+                    display.normals[first * 4..].chunks_exact(4).position(|known| known == normal);
                 let index = first
                     + known.unwrap_or_else(|| {
                         display.positions.extend([steps.x as u16, steps.y as u16, steps.z as u16]);
@@ -99,7 +125,11 @@ impl Display {
                 display.triangles[t as usize * 3 + usize::from(k)] = index as u32;
             }
         }
-        display.edges = feature_edges(triangles, &units).into_iter().flatten().map(|v| drawn_as[v as usize]).collect();
+        display.edges = feature_edges(triangles, &units)
+            .into_iter()
+            .flatten()
+            .map(|v| drawn_as[v as usize])
+            .collect();
         display
     }
 }
@@ -122,25 +152,41 @@ fn compact(vertices: &[DVec3], triangles: &[[u32; 3]]) -> (Vec<DVec3>, Vec<[u32;
     (used, renumbered)
 }
 
-/// Edges with one triangle, or more than two, or between faces that meet at more than the crease angle.
+/// Edges with one triangle, or more than two, or between faces that meet at more than the crease
+/// angle.
 fn feature_edges(triangles: &[[u32; 3]], units: &[DVec3]) -> Vec<[u32; 2]> {
-    let mut edges: Vec<(u32, u32, u32)> =
-        triangles.iter().enumerate().flat_map(|(t, c)| (0..3).map(move |k| (c[k].min(c[(k + 1) % 3]), c[k].max(c[(k + 1) % 3]), t as u32))).collect();
+    let mut edges: Vec<(u32, u32, u32)> = triangles
+        .iter()
+        .enumerate()
+        .flat_map(|(t, c)| {
+            (0..3).map(move |k| (c[k].min(c[(k + 1) % 3]), c[k].max(c[(k + 1) % 3]), t as u32))
+        })
+        .collect();
     edges.par_sort_unstable();
     let sharp = |run: &&[(u32, u32, u32)]| match run {
         [(_, _, s), (_, _, t)] => {
-            units[*s as usize].dot(units[*t as usize]) < CREASE_COSINE && units[*s as usize] != DVec3::ZERO && units[*t as usize] != DVec3::ZERO
+            units[*s as usize].dot(units[*t as usize]) < CREASE_COSINE
+                && units[*s as usize] != DVec3::ZERO
+                && units[*t as usize] != DVec3::ZERO
         }
         _ => true,
     };
-    edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).filter(sharp).map(|run| [run[0].0, run[0].1]).collect()
+    edges
+        .chunk_by(|a, b| (a.0, a.1) == (b.0, b.1))
+        .filter(sharp)
+        .map(|run| [run[0].0, run[0].1])
+        .collect()
 }
 
 /// Largest distance from a sample of `vertices` to the surface.
 fn deviation(vertices: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
     let Ok(surface) = TriMesh::new(vertices.to_vec(), triangles.to_vec()) else { return 0.0 };
     let step = vertices.len().div_ceil(DEVIATION_SAMPLES).max(1);
-    vertices.par_iter().step_by(step).map(|&v| surface.distance_to_local_point(v, false)).reduce(|| 0.0, f64::max)
+    vertices
+        .par_iter()
+        .step_by(step)
+        .map(|&v| surface.distance_to_local_point(v, false))
+        .reduce(|| 0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -163,11 +209,14 @@ mod tests {
 
     #[test]
     fn a_decimated_gear_stays_a_gear() {
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("data/parts/spur_gear.stl");
+        let path =
+            std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("data/parts/spur_gear.stl");
         let part = crate::part::Part::read(&path, &crate::part::ReadOptions::default()).unwrap();
         let (low, high) = part.mesh.bounding_box();
         let display = Display::new(&part.mesh, 1000).unwrap();
-        assert!(display.triangles.len() <= 3 * 1000 && display.original == part.mesh.triangles.len());
+        assert!(
+            display.triangles.len() <= 3 * 1000 && display.original == part.mesh.triangles.len()
+        );
         // Measured: 9e-4 of the size.
         let share = display.deviation / (high - low).length();
         assert!(share > 0.0 && share < 2e-3, "{share}");

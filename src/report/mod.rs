@@ -1,7 +1,8 @@
-//! The page that people look at: one HTML file with the part, the grips and a viewer, which loads nothing from anywhere.
+//! The page that people look at: one HTML file with the part, the grips and a viewer, which loads
+//! nothing from anywhere.
 //!
-//! The viewer's sources are in `viewer/`; `page.html` beside this file is built from them and committed, so that building
-//! this crate needs no Node. A test proves that it is current.
+//! The viewer's sources are in `viewer/`; `page.html` beside this file is built from them and
+//! committed, so that building this crate needs no Node. A test proves that it is current.
 
 pub mod contact_svg;
 pub mod figures;
@@ -32,7 +33,13 @@ const DATA_MARK: &str = "@@gripfast-data@@";
 /// [`Error::Input`] when `set` contradicts itself (a grip under a load that is not listed).
 pub fn render(set: &GripSet, mesh: Option<&Mesh>) -> Result<String> {
     let payload = Payload::new(set, mesh)?;
-    let damaged = || Error::input("report", "the page template of this build is damaged", "rebuild it: see viewer/README.md");
+    let damaged = || {
+        Error::input(
+            "report",
+            "the page template of this build is damaged",
+            "rebuild it: see viewer/README.md",
+        )
+    };
     let (before, rest) = TEMPLATE.split_once(HEADER_MARK).ok_or_else(damaged)?;
     let (between, after) = rest.split_once(DATA_MARK).ok_or_else(damaged)?;
     Ok([before, &payload.header, between, &payload.data, after].concat())

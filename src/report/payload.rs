@@ -1,7 +1,9 @@
-//! What the page carries: a JSON header in plain sight and one block of binary columns, compressed, in base64.
+//! What the page carries: a JSON header in plain sight and one block of binary columns, compressed,
+//! in base64.
 //!
-//! Columns are little-endian arrays, each at a multiple of eight bytes; the header's `sections` say where. Numbers are
-//! single precision, which is more than the page prints; a missing number is NaN.
+//! Columns are little-endian arrays, each at a multiple of eight bytes; the header's `sections` say
+//! where. Numbers are single precision, which is more than the page prints; a missing number is
+//! NaN.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -68,22 +70,34 @@ impl Payload {
     /// [`Error::Input`] when a grip names a load that is not in the list.
     pub(super) fn new(set: &GripSet, mesh: Option<&Mesh>) -> Result<Self> {
         if cfg!(target_endian = "big") {
-            return Err(Error::input("report", "this machine stores numbers big-endian first", "write the page on a little-endian machine"));
+            return Err(Error::input(
+                "report",
+                "this machine stores numbers big-endian first",
+                "write the page on a little-endian machine",
+            ));
         }
         let mut columns = Columns::default();
         let grips = &set.grips[..set.grips.len().min(MAX_GRIPS)];
         if let Some(grip) = grips.iter().find(|grip| grip.worst.load as usize >= set.loads.len()) {
-            let problem = format!("grip {} names load {}, but the file lists {}", grip.grip.id, grip.worst.load, set.loads.len());
+            let problem = format!(
+                "grip {} names load {}, but the file lists {}",
+                grip.grip.id,
+                grip.worst.load,
+                set.loads.len()
+            );
             return Err(Error::input("result file", problem, "use a file that gripfast wrote"));
         }
         let statuses = poses_and_scores(&mut columns, grips);
         contacts(&mut columns, grips);
         let by_load = loads(&mut columns, set, grips);
-        let display = mesh.and_then(|mesh| Display::new(mesh, TRIANGLE_BUDGET)).map(|display| surface(&mut columns, display));
-        let (gripper, gripper_problem) = match serde_json::from_value::<Gripper>(set.gripper.clone()) {
-            Ok(gripper) => (gripper_json(&gripper), Value::Null),
-            Err(error) => (Value::Null, Value::String(error.to_string())),
-        };
+        let display = mesh
+            .and_then(|mesh| Display::new(mesh, TRIANGLE_BUDGET))
+            .map(|display| surface(&mut columns, display));
+        let (gripper, gripper_problem) =
+            match serde_json::from_value::<Gripper>(set.gripper.clone()) {
+                Ok(gripper) => (gripper_json(&gripper), Value::Null),
+                Err(error) => (Value::Null, Value::String(error.to_string())),
+            };
         let header = json!({
             "format": "gripfast-report", "version": 1, "provenance": set.provenance, "part": set.part, "display": display,
             "gripper": gripper, "gripper_problem": gripper_problem, "loads": set.loads, "summary": set.summary,
@@ -96,7 +110,9 @@ impl Payload {
 
 /// JSON that cannot end the `script` element it stands in.
 fn script_safe(value: &impl Serialize) -> Result<String> {
-    let text = serde_json::to_string(value).map_err(|error| Error::input("result file", format!("cannot be written as JSON: {error}"), ""))?;
+    let text = serde_json::to_string(value).map_err(|error| {
+        Error::input("result file", format!("cannot be written as JSON: {error}"), "")
+    })?;
     Ok(text.replace('<', "\\u003c"))
 }
 
@@ -114,7 +130,8 @@ fn poses_and_scores(columns: &mut Columns, grips: &[RankedGrip]) -> Vec<Value> {
     columns.f64("flip_of", grips.iter().map(|g| g.grip.flip_of.map_or(nan, |id| id as f64)));
     columns.u32("rank", grips.iter().map(|g| u32::try_from(g.rank).unwrap_or(u32::MAX)));
     columns.f32("origin", grips.iter().flat_map(|g| g.grip.part_from_grip.origin.to_array()));
-    columns.f32("rotation", grips.iter().flat_map(|g| g.grip.part_from_grip.rotation.to_cols_array()));
+    columns
+        .f32("rotation", grips.iter().flat_map(|g| g.grip.part_from_grip.rotation.to_cols_array()));
     columns.f32("width", grips.iter().map(|g| g.grip.width));
     columns.add("inside", "u8", &grips.iter().map(|g| u8::from(g.grip.inside)).collect::<Vec<_>>());
     columns.f32("angle", grips.iter().map(|g| g.grip.angle));
@@ -129,11 +146,26 @@ fn poses_and_scores(columns: &mut Columns, grips: &[RankedGrip]) -> Vec<Value> {
     columns.f32("force_needed", grips.iter().map(|g| g.force_needed.unwrap_or(nan)));
     columns.u32("load", grips.iter().map(|g| g.worst.load));
     columns.f32("mu", grips.iter().map(|g| g.worst.mu_s.unwrap_or(nan)));
-    columns.f32("wrench", grips.iter().flat_map(|g| [g.worst.wrench.force.to_array(), g.worst.wrench.moment.to_array()]).flatten());
-    columns.f32("pressure", grips.iter().flat_map(|g| g.worst.pressure.map_or([nan; 4], |p| [p.a_i0, p.a_ii0, p.a1, p.a2])));
-    columns.f32("bounds", grips.iter().flat_map(|g| g.worst.bounds.map_or([nan; 2], |b| [b.lower, b.upper])));
+    columns.f32(
+        "wrench",
+        grips
+            .iter()
+            .flat_map(|g| [g.worst.wrench.force.to_array(), g.worst.wrench.moment.to_array()])
+            .flatten(),
+    );
+    columns.f32(
+        "pressure",
+        grips
+            .iter()
+            .flat_map(|g| g.worst.pressure.map_or([nan; 4], |p| [p.a_i0, p.a_ii0, p.a1, p.a2])),
+    );
+    columns.f32(
+        "bounds",
+        grips.iter().flat_map(|g| g.worst.bounds.map_or([nan; 2], |b| [b.lower, b.upper])),
+    );
     columns.f32("residual", grips.iter().map(|g| g.worst.residual));
-    // Slip: kind (0 unknown, 1 rotation, 2 translation, 3 none), then centre or direction, then sense.
+    // Slip: kind (0 unknown, 1 rotation, 2 translation, 3 none), then centre or direction, then
+    // sense.
     let slip = |slip: Option<Slip>| match slip {
         Option::None => [0.0, nan, nan, nan],
         Some(Slip::Rotation { c, sense }) => [1.0, c[0], c[1], f64::from(sense)],
@@ -155,10 +187,12 @@ fn poses_and_scores(columns: &mut Columns, grips: &[RankedGrip]) -> Vec<Value> {
     statuses
 }
 
-/// Contact areas, each written once: ring starts into the points, and per ring face (bit 0) and hole (bit 1).
+/// Contact areas, each written once: ring starts into the points, and per ring face (bit 0) and
+/// hole (bit 1).
 fn contacts(columns: &mut Columns, grips: &[RankedGrip]) {
     let mut known: FxHashMap<Vec<u64>, u32> = FxHashMap::default();
-    let (mut ring_of_contact, mut point_of_ring, mut kinds, mut points) = (vec![0u32], vec![0u32], Vec::<u8>::new(), Vec::<f32>::new());
+    let (mut ring_of_contact, mut point_of_ring, mut kinds, mut points) =
+        (vec![0u32], vec![0u32], Vec::<u8>::new(), Vec::<f32>::new());
     let numbers: Vec<u32> = grips
         .iter()
         .map(|grip| {
@@ -167,7 +201,9 @@ fn contacts(columns: &mut Columns, grips: &[RankedGrip]) {
             *known.entry(key(contact)).or_insert_with(|| {
                 for (face, patch) in [(0, &contact.face_i), (1, &contact.face_ii)] {
                     for polygon in patch {
-                        for (hole, ring) in std::iter::once((0, &polygon.outer)).chain(polygon.holes.iter().map(|ring| (2, ring))) {
+                        for (hole, ring) in std::iter::once((0, &polygon.outer))
+                            .chain(polygon.holes.iter().map(|ring| (2, ring)))
+                        {
                             points.extend(ring.iter().flat_map(|p| [p.x as f32, p.y as f32]));
                             point_of_ring.push((points.len() / 2) as u32);
                             kinds.push(face | hole);
@@ -191,7 +227,9 @@ fn key(contact: &Contact) -> Vec<u64> {
     let mut key = Vec::new();
     for (face, patch) in [(0, &contact.face_i), (1, &contact.face_ii)] {
         for polygon in patch {
-            for (hole, ring) in std::iter::once((0, &polygon.outer)).chain(polygon.holes.iter().map(|ring| (2, ring))) {
+            for (hole, ring) in std::iter::once((0, &polygon.outer))
+                .chain(polygon.holes.iter().map(|ring| (2, ring)))
+            {
                 key.push((ring.len() as u64) << 2 | hole | face);
                 key.extend(ring.iter().flat_map(|p| [p.x.to_bits(), p.y.to_bits()]));
             }
@@ -200,28 +238,53 @@ fn key(contact: &Contact) -> Vec<u64> {
     key
 }
 
-/// A `mu_s` below this share of the largest one is shown as zero: a colour scale has no use for more.
+/// A `mu_s` below this share of the largest one is shown as zero: a colour scale has no use for
+/// more.
 const LEAST_SHARE: f64 = 1e-6;
 
-/// `mu_s` of each load on a logarithmic scale of 65,533 steps (0: no limit state, 1: zero), for the grips all of whose loads are known,
-/// as many as fit; their places in the list are a column of their own.
+/// `mu_s` of each load on a logarithmic scale of 65,533 steps (0: no limit state, 1: zero), for the
+/// grips all of whose loads are known, as many as fit; their places in the list are a column of
+/// their own.
 fn loads(columns: &mut Columns, set: &GripSet, grips: &[RankedGrip]) -> Value {
     let n = set.loads.len();
     let whole = |grip: &RankedGrip| n > 0 && grip.mu_by_load.len() == n;
-    let rows: Vec<usize> = (0..grips.len()).filter(|&index| whole(&grips[index])).take(MAX_LOAD_VALUES / n.max(1)).collect();
-    let finite = || rows.iter().flat_map(|&row| &grips[row].mu_by_load).filter_map(|mu| *mu).filter(|mu| mu.is_finite());
-    // A load along the closing axis needs no friction but for rounding; many decades of that would leave few steps for the rest.
+    let rows: Vec<usize> = (0..grips.len())
+        .filter(|&index| whole(&grips[index]))
+        .take(MAX_LOAD_VALUES / n.max(1))
+        .collect();
+    let finite = || {
+        rows.iter()
+            .flat_map(|&row| &grips[row].mu_by_load)
+            .filter_map(|mu| *mu)
+            .filter(|mu| mu.is_finite())
+    };
+    // A load along the closing axis needs no friction but for rounding; many decades of that would
+    // leave few steps for the rest.
     let zero = LEAST_SHARE * finite().fold(0.0, f64::max);
     let positive = || finite().filter(|mu| *mu > zero);
-    let (low, high) = positive().fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), mu| (low.min(mu), high.max(mu)));
-    let (low, high) = if low < high { (low, high) } else { (if high > 0.0 { high } else { 1.0 }, high.max(1.0) * 2.0) };
+    let (low, high) = positive()
+        .fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), mu| (low.min(mu), high.max(mu)));
+    let (low, high) = if low < high {
+        (low, high)
+    } else {
+        (if high > 0.0 { high } else { 1.0 }, high.max(1.0) * 2.0)
+    };
     let code = |mu: Option<f64>| match mu {
-        Some(mu) if mu > zero && mu.is_finite() => 2 + ((mu / low).ln() / (high / low).ln() * 65_533.0).round().clamp(0.0, 65_533.0) as u16,
+        Some(mu) if mu > zero && mu.is_finite() => {
+            2 + ((mu / low).ln() / (high / low).ln() * 65_533.0).round().clamp(0.0, 65_533.0) as u16
+        }
         Some(mu) if mu <= zero => 1,
         _ => 0,
     };
     columns.u32("by_load_grip", rows.iter().map(|&row| row as u32));
-    columns.add("by_load", "u16", &rows.iter().flat_map(|&row| grips[row].mu_by_load.iter().map(|&mu| code(mu))).collect::<Vec<_>>());
+    columns.add(
+        "by_load",
+        "u16",
+        &rows
+            .iter()
+            .flat_map(|&row| grips[row].mu_by_load.iter().map(|&mu| code(mu)))
+            .collect::<Vec<_>>(),
+    );
     json!({ "rows": rows.len(), "low": low, "high": high })
 }
 
@@ -231,7 +294,11 @@ fn surface(columns: &mut Columns, display: Display) -> Value {
     columns.add("normals", "i8", &display.normals);
     // Differences of neighbouring indices are small and repeat, which the compression needs.
     let differences = |indices: &[u32]| -> Vec<i32> {
-        std::iter::once(0).chain(indices.iter().copied()).zip(indices).map(|(before, &now)| now.wrapping_sub(before) as i32).collect()
+        std::iter::once(0)
+            .chain(indices.iter().copied())
+            .zip(indices)
+            .map(|(before, &now)| now.wrapping_sub(before) as i32)
+            .collect()
     };
     columns.add("triangles", "delta", &differences(&display.triangles));
     columns.add("edges", "delta", &differences(&display.edges));
@@ -246,10 +313,14 @@ fn gripper_json(gripper: &Gripper) -> Value {
     let body = |body: &Body| {
         let (r, o) = (body.grip_from_body.rotation, body.grip_from_body.origin);
         let column = |axis: glam::DVec3, w: f64| [axis.x, axis.y, axis.z, w];
-        let matrix = [column(r.x_axis, 0.0), column(r.y_axis, 0.0), column(r.z_axis, 0.0), column(o, 1.0)].concat();
+        let matrix =
+            [column(r.x_axis, 0.0), column(r.y_axis, 0.0), column(r.z_axis, 0.0), column(o, 1.0)]
+                .concat();
         let shape = match &body.shape {
             Shape::Box { half } => json!({ "type": "box", "half": half }),
-            Shape::Cylinder { radius, half_height } => json!({ "type": "cylinder", "radius": radius, "half_height": half_height }),
+            Shape::Cylinder { radius, half_height } => {
+                json!({ "type": "cylinder", "radius": radius, "half_height": half_height })
+            }
             Shape::Hull { points } => json!({ "type": "hull", "points": points }),
         };
         json!({ "name": body.name, "matrix": matrix, "shape": shape })
@@ -267,9 +338,13 @@ mod tests {
 
     #[test]
     fn a_header_cannot_end_its_script_element() {
-        let text = script_safe(&json!({ "file": "</script><script>alert(1)</script><!--" })).unwrap();
+        let text =
+            script_safe(&json!({ "file": "</script><script>alert(1)</script><!--" })).unwrap();
         assert!(!text.contains('<'), "{text}");
-        assert_eq!(serde_json::from_str::<Value>(&text).unwrap()["file"], "</script><script>alert(1)</script><!--");
+        assert_eq!(
+            serde_json::from_str::<Value>(&text).unwrap()["file"],
+            "</script><script>alert(1)</script><!--"
+        );
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! Reading and writing of the native file: JSON, or JSON Lines (the set without its grips on the first line, then a grip a line).
+//! Reading and writing of the native file: JSON, or JSON Lines (the set without its grips on the
+//! first line, then a grip a line).
 
 use std::io::Write;
 use std::path::Path;
@@ -35,8 +36,9 @@ impl GripSet {
     /// Reads a native result file, JSON or JSON Lines.
     ///
     /// # Errors
-    /// When the file cannot be read, is no result file or of another version, breaks off, or holds a grip that cannot be
-    /// (a pose that is no rotation, a load that is not in the list), naming line or grip.
+    /// When the file cannot be read, is no result file or of another version, breaks off, or holds
+    /// a grip that cannot be (a pose that is no rotation, a load that is not in the list), naming
+    /// line or grip.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
         Self::parse(&path.display().to_string(), &bytes)
@@ -49,12 +51,18 @@ impl GripSet {
     pub fn parse(place: &str, bytes: &[u8]) -> Result<Self> {
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         if bytes.iter().all(u8::is_ascii_whitespace) {
-            return Err(Error::input(place, "the file is empty", "give a result file written by `gripfast plan -o`"));
+            return Err(Error::input(
+                place,
+                "the file is empty",
+                "give a result file written by `gripfast plan -o`",
+            ));
         }
         let first_line = bytes.iter().position(|byte| *byte == b'\n').unwrap_or(bytes.len());
         let set = match serde_json::from_slice::<Self>(&bytes[..first_line]) {
             Ok(head) => head.with_lines(place, &bytes[first_line..])?,
-            Err(_) => serde_json::from_slice(bytes).map_err(|error| explain(place, bytes, &error))?,
+            Err(_) => {
+                serde_json::from_slice(bytes).map_err(|error| explain(place, bytes, &error))?
+            }
         };
         set.check(place)?;
         Ok(set)
@@ -68,7 +76,11 @@ impl GripSet {
             }
             // The piece before the first newline is the end of line 1.
             let grip = serde_json::from_slice(line).map_err(|error| {
-                Error::input(format!("{place}:{}", index + 1), format!("not a grip: {error}"), "the file is cut off or was changed by hand; write it anew")
+                Error::input(
+                    format!("{place}:{}", index + 1),
+                    format!("not a grip: {error}"),
+                    "the file is cut off or was changed by hand; write it anew",
+                )
             })?;
             self.grips.push(grip);
         }
@@ -79,21 +91,37 @@ impl GripSet {
     fn check(&self, place: &str) -> Result<()> {
         check_marks(place, Some(&self.format), Some(self.version.into()))?;
         for (index, ranked) in self.grips.iter().enumerate() {
-            let wrong =
-                |problem: String| Error::input(format!("{place}, grips[{index}] (id {})", ranked.grip.id), problem, "write the file anew with `gripfast plan`");
+            let wrong = |problem: String| {
+                Error::input(
+                    format!("{place}, grips[{index}] (id {})", ranked.grip.id),
+                    problem,
+                    "write the file anew with `gripfast plan`",
+                )
+            };
             let pose = ranked.grip.part_from_grip;
             let drift = pose.rotation * pose.rotation.transpose() - DMat3::IDENTITY;
-            if !(drift.to_cols_array().iter().all(|entry| entry.abs() <= ROTATION_TOLERANCE) && pose.rotation.determinant() > 0.0 && pose.origin.is_finite()) {
+            if !(drift.to_cols_array().iter().all(|entry| entry.abs() <= ROTATION_TOLERANCE)
+                && pose.rotation.determinant() > 0.0
+                && pose.origin.is_finite())
+            {
                 return Err(wrong("part_from_grip is not a rotation and an origin".into()));
             }
             if !(ranked.grip.width.is_finite() && ranked.grip.width >= 0.0) {
                 return Err(wrong(format!("a width of {} m", ranked.grip.width)));
             }
             if ranked.worst.load as usize >= self.loads.len() {
-                return Err(wrong(format!("its worst load is number {}, but the file has {} loads", ranked.worst.load, self.loads.len())));
+                return Err(wrong(format!(
+                    "its worst load is number {}, but the file has {} loads",
+                    ranked.worst.load,
+                    self.loads.len()
+                )));
             }
             if !(ranked.mu_by_load.is_empty() || ranked.mu_by_load.len() == self.loads.len()) {
-                return Err(wrong(format!("mu_by_load has {} values for {} loads", ranked.mu_by_load.len(), self.loads.len())));
+                return Err(wrong(format!(
+                    "mu_by_load has {} values for {} loads",
+                    ranked.mu_by_load.len(),
+                    self.loads.len()
+                )));
             }
         }
         Ok(())
@@ -102,7 +130,8 @@ impl GripSet {
     /// Writes native JSON, a line per grip, whole or not at all.
     ///
     /// # Errors
-    /// When a grip's pose or contact is not finite (nothing is written), or the file cannot be written.
+    /// When a grip's pose or contact is not finite (nothing is written), or the file cannot be
+    /// written.
     pub fn write(&self, path: &Path) -> Result<()> {
         self.check_finite()?;
         crate::file::write(path, |writer| self.write_json(writer))
@@ -173,18 +202,45 @@ impl GripSet {
     fn check_finite(&self) -> Result<()> {
         let finite = |ranked: &RankedGrip| {
             let grip = &ranked.grip;
-            let rings = grip.contact.face_i.iter().chain(&grip.contact.face_ii).flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes));
+            let rings = grip
+                .contact
+                .face_i
+                .iter()
+                .chain(&grip.contact.face_ii)
+                .flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes));
             let wrench = ranked.worst.wrench;
             grip.part_from_grip.rotation.is_finite()
-                && [grip.part_from_grip.origin, wrench.force, wrench.moment].iter().all(|vector| vector.is_finite())
-                && [grip.width, grip.angle, ranked.alpha, ranked.delta_d, ranked.contact_share, ranked.twist_margin].iter().all(|value| value.is_finite())
-                && ranked.worst.pressure.is_none_or(|p| [p.a_i0, p.a_ii0, p.a1, p.a2].iter().all(|value| value.is_finite()))
+                && [grip.part_from_grip.origin, wrench.force, wrench.moment]
+                    .iter()
+                    .all(|vector| vector.is_finite())
+                && [
+                    grip.width,
+                    grip.angle,
+                    ranked.alpha,
+                    ranked.delta_d,
+                    ranked.contact_share,
+                    ranked.twist_margin,
+                ]
+                .iter()
+                .all(|value| value.is_finite())
+                && ranked.worst.pressure.is_none_or(|p| {
+                    [p.a_i0, p.a_ii0, p.a1, p.a2].iter().all(|value| value.is_finite())
+                })
                 && rings.flatten().all(|point| point.is_finite())
         };
         let mass = &self.part.mass;
-        let part = [self.part.bbox_min, self.part.bbox_max, mass.centre_of_mass, DVec3::new(self.part.unit_m, mass.volume, mass.mass)];
+        let part = [
+            self.part.bbox_min,
+            self.part.bbox_max,
+            mass.centre_of_mass,
+            DVec3::new(self.part.unit_m, mass.volume, mass.mass),
+        ];
         if !(part.iter().all(|vector| vector.is_finite()) && mass.inertia.is_finite()) {
-            return Err(Error::input("result", "the part's size or mass properties are not finite", "check the mesh with `gripfast part`"));
+            return Err(Error::input(
+                "result",
+                "the part's size or mass properties are not finite",
+                "check the mesh with `gripfast part`",
+            ));
         }
         match self.grips.iter().find(|grip| !finite(grip)) {
             None => Ok(()),
@@ -211,20 +267,41 @@ fn explain(place: &str, bytes: &[u8], error: &serde_json::Error) -> Error {
     {
         return error;
     }
-    let remedy = if error.is_eof() { "the file is cut off; write it anew" } else { "give a result file written by `gripfast plan -o`" };
-    Error::input(format!("{place}:{}:{}", error.line(), error.column()), format!("not a result file: {error}"), remedy)
+    let remedy = if error.is_eof() {
+        "the file is cut off; write it anew"
+    } else {
+        "give a result file written by `gripfast plan -o`"
+    };
+    Error::input(
+        format!("{place}:{}:{}", error.line(), error.column()),
+        format!("not a result file: {error}"),
+        remedy,
+    )
 }
 
 fn check_marks(place: &str, format: Option<&str>, version: Option<u64>) -> Result<()> {
     if format != Some(FORMAT) {
-        let found = format.map_or_else(|| "no format is named in it".to_owned(), |format| format!("its format is '{format}'"));
-        return Err(Error::input(place, format!("not a gripfast result file: {found}"), "give a result file written by `gripfast plan -o`"));
+        let found = format.map_or_else(
+            || "no format is named in it".to_owned(),
+            |format| format!("its format is '{format}'"),
+        );
+        return Err(Error::input(
+            place,
+            format!("not a gripfast result file: {found}"),
+            "give a result file written by `gripfast plan -o`",
+        ));
     }
     match version {
         Some(version) if version == u64::from(VERSION) => Ok(()),
-        Some(version) if version > u64::from(VERSION) => {
-            Err(Error::input(place, format!("version {version} of the result format; this program reads version {VERSION}"), "use a newer gripfast"))
-        }
-        _ => Err(Error::input(place, format!("the result format's version is missing or older than {VERSION}"), "write the file anew with `gripfast plan`")),
+        Some(version) if version > u64::from(VERSION) => Err(Error::input(
+            place,
+            format!("version {version} of the result format; this program reads version {VERSION}"),
+            "use a newer gripfast",
+        )),
+        _ => Err(Error::input(
+            place,
+            format!("the result format's version is missing or older than {VERSION}"),
+            "write the file anew with `gripfast plan`",
+        )),
     }
 }

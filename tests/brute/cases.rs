@@ -61,16 +61,29 @@ fn plain(outer: Vec<DVec2>) -> Patch {
 
 fn ring(random: &mut Random, corners: usize, radius: impl Fn(&mut Random) -> f64) -> Vec<DVec2> {
     let turn = random.range(0.0, std::f64::consts::TAU);
-    (0..corners).map(|i| radius(random) * DVec2::from_angle(turn + std::f64::consts::TAU * i as f64 / corners as f64)).collect()
+    (0..corners)
+        .map(|i| {
+            radius(random)
+                * DVec2::from_angle(turn + std::f64::consts::TAU * i as f64 / corners as f64)
+        })
+        .collect()
 }
 
 fn rectangle(a: f64, b: f64) -> Vec<DVec2> {
-    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| DVec2::new(x * a / 2.0, y * b / 2.0)).to_vec()
+    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+        .map(|(x, y)| DVec2::new(x * a / 2.0, y * b / 2.0))
+        .to_vec()
 }
 
 fn mapped(patch: Patch, map: impl Fn(DVec2) -> DVec2) -> Patch {
     let ring = |ring: Vec<DVec2>| ring.into_iter().map(&map).collect::<Vec<_>>();
-    patch.into_iter().map(|polygon| Polygon { outer: ring(polygon.outer), holes: polygon.holes.into_iter().map(ring).collect() }).collect()
+    patch
+        .into_iter()
+        .map(|polygon| Polygon {
+            outer: ring(polygon.outer),
+            holes: polygon.holes.into_iter().map(ring).collect(),
+        })
+        .collect()
 }
 
 /// An area of about unit size near the origin.
@@ -92,7 +105,11 @@ fn patch(random: &mut Random) -> Patch {
             vec![Polygon { outer, holes: vec![hole] }]
         }
         4 => {
-            let thin = if random.chance(0.1) { random.power(-4.0, -2.0) } else { random.power(-2.0, -0.5) };
+            let thin = if random.chance(0.1) {
+                random.power(-4.0, -2.0)
+            } else {
+                random.power(-2.0, -0.5)
+            };
             plain(rectangle(1.0, thin)) // sliver
         }
         5 => {
@@ -106,9 +123,22 @@ fn patch(random: &mut Random) -> Patch {
         6 => {
             let (a, b) = (random.range(0.1, 0.3), 0.5); // a cross
             plain(
-                [(a, -b), (a, -a), (b, -a), (b, a), (a, a), (a, b), (-a, b), (-a, a), (-b, a), (-b, -a), (-a, -a), (-a, -b)]
-                    .map(|(x, y)| DVec2::new(x, y))
-                    .to_vec(),
+                [
+                    (a, -b),
+                    (a, -a),
+                    (b, -a),
+                    (b, a),
+                    (a, a),
+                    (a, b),
+                    (-a, b),
+                    (-a, a),
+                    (-b, a),
+                    (-b, -a),
+                    (-a, -a),
+                    (-a, -b),
+                ]
+                .map(|(x, y)| DVec2::new(x, y))
+                .to_vec(),
             )
         }
         _ => {
@@ -116,7 +146,11 @@ fn patch(random: &mut Random) -> Patch {
             plain(rectangle(a, b))
         }
     };
-    let turn = if random.chance(0.4) { DVec2::X } else { DVec2::from_angle(random.range(0.0, std::f64::consts::TAU)) };
+    let turn = if random.chance(0.4) {
+        DVec2::X
+    } else {
+        DVec2::from_angle(random.range(0.0, std::f64::consts::TAU))
+    };
     let size = random.power(-0.3, 0.3);
     mapped(shape, |x| size * turn.rotate(x))
 }
@@ -137,7 +171,8 @@ pub(crate) fn case(number: u64) -> Case {
         }
     };
     let away = if random.chance(0.3) { random.point(3.0) } else { DVec2::ZERO };
-    let contact = Contact { face_i: mapped(face_i, |x| x + away), face_ii: mapped(face_ii, |x| x + away) };
+    let contact =
+        Contact { face_i: mapped(face_i, |x| x + away), face_ii: mapped(face_ii, |x| x + away) };
     let size = if random.chance(0.1) { random.power(-6.0, 6.0) } else { random.power(-1.5, 0.2) };
     let mut in_plane = [random.range(-1.0, 1.0), random.range(-1.0, 1.0), random.range(-1.0, 1.0)];
     if random.chance(0.3) {
@@ -146,10 +181,15 @@ pub(crate) fn case(number: u64) -> Case {
         in_plane = std::array::from_fn(|i| if i == kept { in_plane[i] } else { 0.0 });
     }
     let f3 = if random.chance(0.3) { random.range(-2.2, 2.2) } else { random.range(-0.5, 0.5) };
-    let tilting = if random.chance(0.3) { DVec2::ZERO } else { random.point(1.0) * if random.chance(0.15) { 1.2 } else { 0.4 } };
+    let tilting = if random.chance(0.3) {
+        DVec2::ZERO
+    } else {
+        random.point(1.0) * if random.chance(0.15) { 1.2 } else { 0.4 }
+    };
     let force = DVec3::new(size * in_plane[0], size * in_plane[1], f3);
     // The moment about the pads' middle, carried to the origin.
-    let moment = DVec3::new(tilting.x, tilting.y, size * in_plane[2]) + away.extend(0.0).cross(force);
+    let moment =
+        DVec3::new(tilting.x, tilting.y, size * in_plane[2]) + away.extend(0.0).cross(force);
     let distance = match random.below(20) {
         0 => 0.0,
         1 => random.power(-6.0, 6.0),
@@ -165,10 +205,16 @@ impl Case {
     pub(crate) fn scaled(&self, length: f64, force: f64) -> Self {
         let patch = |patch: &Patch| mapped(patch.clone(), |x| x * length);
         Self {
-            contact: Contact { face_i: patch(&self.contact.face_i), face_ii: patch(&self.contact.face_ii) },
+            contact: Contact {
+                face_i: patch(&self.contact.face_i),
+                face_ii: patch(&self.contact.face_ii),
+            },
             distance: self.distance * length,
             force: self.force * force,
-            wrench: Wrench { force: self.wrench.force * force, moment: self.wrench.moment * (force * length) },
+            wrench: Wrench {
+                force: self.wrench.force * force,
+                moment: self.wrench.moment * (force * length),
+            },
         }
     }
 

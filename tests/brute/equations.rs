@@ -10,11 +10,11 @@ use super::{Rings, loops, moments, precise, pressed, rings};
 /// What the equations say of an answer.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Check {
-    /// Largest residual over the largest force in the equations, `Fn` or the load's with its lever; moments over that
-    /// times `sqrt(A)`.
+    /// Largest residual over the largest force in the equations, `Fn` or the load's with its lever;
+    /// moments over that times `sqrt(A)`.
     pub(crate) residual: f64,
-    /// What rounding the answer's numbers to doubles may alone change in it: on a small contact the pressure is the small
-    /// difference of large coefficients.
+    /// What rounding the answer's numbers to doubles may alone change in it: on a small contact the
+    /// pressure is the small difference of large coefficients.
     pub(crate) rounding: f64,
     /// Areas in contact by the pressure planes [m^2].
     pub(crate) areas: [f64; 2],
@@ -22,11 +22,14 @@ pub(crate) struct Check {
     pub(crate) coupling: f64,
 }
 
-/// `None` for an answer without numbers. The contact is where the planes are positive, so the pressure on it is.
+/// `None` for an answer without numbers. The contact is where the planes are positive, so the
+/// pressure on it is.
 pub(crate) fn check(case: &Case, score: &Score) -> Option<Check> {
     let (mu, slip, p) = (score.mu_s?, score.slip?, score.pressure?);
     let twist = match slip {
-        Slip::Rotation { c, sense } => [f64::from(sense) * c[1], -f64::from(sense) * c[0], f64::from(sense)],
+        Slip::Rotation { c, sense } => {
+            [f64::from(sense) * c[1], -f64::from(sense) * c[0], f64::from(sense)]
+        }
         Slip::Translation { direction } => [direction[0], direction[1], 0.0],
         Slip::None => [0.0; 3],
     };
@@ -43,7 +46,11 @@ pub(crate) fn check(case: &Case, score: &Score) -> Option<Check> {
         normal[k] = force;
         let sign = [1.0, -1.0][k];
         x += sign * DVec2::new(x1, x2);
-        let reach = contact.iter().flatten().map(|x| p[0].abs() + (p[1] * x.x).abs() + (p[2] * x.y).abs()).fold(0.0, f64::max);
+        let reach = contact
+            .iter()
+            .flatten()
+            .map(|x| p[0].abs() + (p[1] * x.x).abs() + (p[2] * x.y).abs())
+            .fold(0.0, f64::max);
         // In the moments each part counts with its lever.
         let lever = contact.iter().flatten().map(|x| x.length() / length).fold(1.0, f64::max);
         rounding += f64::EPSILON * reach * area * lever / case.force;
@@ -65,11 +72,18 @@ pub(crate) fn check(case: &Case, score: &Score) -> Option<Check> {
         (2.0 * case.force - normal[0] - normal[1]) / case.force,
     ];
     let coupling = mu * d.abs() / length;
-    let residual = residuals.iter().fold(0.0, |most: f64, r| if r.is_nan() { f64::NAN } else { most.max(r.abs()) });
+    let residual = residuals
+        .iter()
+        .fold(0.0, |most: f64, r| if r.is_nan() { f64::NAN } else { most.max(r.abs()) });
     // Where the load is far larger than Fn, the equations' own terms are.
     let load = f.truncate().length().max(m.z.abs() / length) / case.force;
     let largest = 1.0 + load * (1.0 + d.abs() / length);
     // The pressures' rounding enters as it is, and as friction with its lever.
     let terms = 1.0 + mu * (1.0 + d.abs() / 2.0 / length);
-    Some(Check { residual: residual / largest, rounding: 16.0 * rounding * terms / largest, areas, coupling })
+    Some(Check {
+        residual: residual / largest,
+        rounding: 16.0 * rounding * terms / largest,
+        areas,
+        coupling,
+    })
 }

@@ -1,10 +1,12 @@
-//! Limit states looked for without `mechanics::`: a scan of all contact moments that pressing pads can carry.
+//! Limit states looked for without `mechanics::`: a scan of all contact moments that pressing pads
+//! can carry.
 //!
 //! Every solution of the seven equations is a zero of a map of the plane: from the contact moment
-//! `X = int_I x p_I - int_II x p_II`, which lies in the convex region `N_I conv A_I - N_II conv A_II` and fixes the
-//! pressure, through the slip under that pressure, to what (6) and (7) leave over. The map is continuous, so its zeros
-//! are found by looking at it everywhere: on rays from the middle to the region's rim, denser towards the rim.
-//! Everything is in units of `Fn` and of a length of the pads' size.
+//! `X = int_I x p_I - int_II x p_II`, which lies in the convex region `N_I conv A_I - N_II conv
+//! A_II` and fixes the pressure, through the slip under that pressure, to what (6) and (7) leave
+//! over. The map is continuous, so its zeros are found by looking at it everywhere: on rays from
+//! the middle to the region's rim, denser towards the rim. Everything is in units of `Fn` and of a
+//! length of the pads' size.
 
 #![allow(dead_code, reason = "each suite uses a part of it")]
 
@@ -53,7 +55,8 @@ pub(crate) struct Sample {
 pub(crate) struct Scan {
     /// Distinct zeros, by rising `mu`.
     pub(crate) zeros: Vec<Sample>,
-    /// Turns of the map's value along the outermost ring: the zeros inside it, counted with their signs.
+    /// Turns of the map's value along the outermost ring: the zeros inside it, counted with their
+    /// signs.
     pub(crate) winding: Option<i32>,
     /// Points at which the pressure or the slip could not be found.
     pub(crate) blind: usize,
@@ -68,11 +71,20 @@ fn rings(patch: &Patch) -> Rings {
         }
         ring
     };
-    patch.iter().flat_map(|polygon| std::iter::once(turned(&polygon.outer, 1.0)).chain(polygon.holes.iter().map(|hole| turned(hole, -1.0)))).collect()
+    patch
+        .iter()
+        .flat_map(|polygon| {
+            std::iter::once(turned(&polygon.outer, 1.0))
+                .chain(polygon.holes.iter().map(|hole| turned(hole, -1.0)))
+        })
+        .collect()
 }
 
 fn signed_area(ring: &[DVec2]) -> f64 {
-    (0..ring.len()).map(|i| (ring[i] - ring[0]).perp_dot(ring[(i + 1) % ring.len()] - ring[0])).sum::<f64>() / 2.0
+    (0..ring.len())
+        .map(|i| (ring[i] - ring[0]).perp_dot(ring[(i + 1) % ring.len()] - ring[0]))
+        .sum::<f64>()
+        / 2.0
 }
 
 /// The part of every ring where `p0 + p1 x1 + p2 x2 > 0`.
@@ -99,13 +111,16 @@ fn pressed(area: &Rings, p: [f64; 3]) -> Rings {
 fn moments(area: &Rings) -> [f64; 6] {
     let mut m = [0.0; 6];
     for ring in area {
-        // Triangles from the ring's first point: nothing cancels for a thin ring away from the origin.
+        // Triangles from the ring's first point: nothing cancels for a thin ring away from the
+        // origin.
         for i in 1..ring.len() - 1 {
             let (a, b, c) = (ring[0], ring[i], ring[i + 1]);
             let area = (b - a).perp_dot(c - a) / 2.0;
             let (ab, bc, ca) = ((a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0);
             for x in [ab, bc, ca] {
-                for (sum, value) in m.iter_mut().zip([1.0, x.x, x.y, x.x * x.x, x.x * x.y, x.y * x.y]) {
+                for (sum, value) in
+                    m.iter_mut().zip([1.0, x.x, x.y, x.x * x.x, x.x * x.y, x.y * x.y])
+                {
                     *sum += area / 3.0 * value;
                 }
             }
@@ -117,7 +132,13 @@ fn moments(area: &Rings) -> [f64; 6] {
 fn loops(area: &Rings) -> Loops {
     let polygons: Vec<Polygon> = area
         .iter()
-        .map(|ring| if signed_area(ring) > 0.0 { Polygon { outer: ring.clone(), holes: vec![] } } else { Polygon { outer: vec![], holes: vec![ring.clone()] } })
+        .map(|ring| {
+            if signed_area(ring) > 0.0 {
+                Polygon { outer: ring.clone(), holes: vec![] }
+            } else {
+                Polygon { outer: vec![], holes: vec![ring.clone()] }
+            }
+        })
         .collect();
     Loops::new(&polygons)
 }
@@ -144,16 +165,27 @@ impl Problem {
         }
         let rim = gripfast::geometry::hull::convex_hull(&corners);
         let middle = rim.iter().sum::<DVec2>() / rim.len() as f64;
-        Some(Self { areas, normal, load, uncoupled, half_distance: case.distance / 2.0, rim, middle })
+        Some(Self {
+            areas,
+            normal,
+            load,
+            uncoupled,
+            half_distance: case.distance / 2.0,
+            rim,
+            middle,
+        })
     }
 
     /// Pressure, slip and what is left over at the contact moment `x`, from a neighbour's.
     pub(crate) fn sample(&self, x: DVec2, near: Option<&Sample>) -> Option<Sample> {
-        let q = self.pressure(x, near.map(|near| near.q)).or_else(|| near.and_then(|_| self.pressure(x, None)))?;
+        let q = self
+            .pressure(x, near.map(|near| near.q))
+            .or_else(|| near.and_then(|_| self.pressure(x, None)))?;
         let p = planes(&q);
         let pressed = [0, 1].map(|k| loops(&pressed(&self.areas[k], p[k])));
         let v = self.slip(&pressed, &p, near.map(|near| near.v))?;
-        let [one, two] = [0, 1].map(|k| Vector3::from(friction(&pressed[k], v.into(), p[k]).gradient(p[k])));
+        let [one, two] =
+            [0, 1].map(|k| Vector3::from(friction(&pressed[k], v.into(), p[k]).gradient(p[k])));
         let mu = self.load.dot(&v) / (one + two).dot(&v);
         let difference = self.half_distance * mu * (one - two);
         let g = x - self.uncoupled - DVec2::new(difference.x, difference.y);
@@ -188,7 +220,8 @@ impl Problem {
             (0.5 * q.dot(&(k * q)) - f.dot(q), error, k, a[0] > 0.0 && b[0] > 0.0)
         };
         let whole = self.areas.each_ref().map(|area| moments(area)[0]);
-        let mut q = start.unwrap_or_else(|| Vector4::new(f[0] / whole[0], f[1] / whole[1], 0.0, 0.0));
+        let mut q =
+            start.unwrap_or_else(|| Vector4::new(f[0] / whole[0], f[1] / whole[1], 0.0, 0.0));
         let (mut value, mut error, mut k, _) = at(&q);
         for _ in 0..80 {
             if error.amax() < 1e-14 {
@@ -197,12 +230,15 @@ impl Problem {
             // Scaled to a unit diagonal, then lifted until it factors.
             let scale = k.diagonal().map(|d| 1.0 / d.max(1e-300).sqrt());
             let unit = Matrix4::from_fn(|i, j| k[(i, j)] * scale[i] * scale[j]);
-            let factor = [0.0, 1e-14, 1e-11, 1e-8, 1e-4].iter().find_map(|lift| (unit + Matrix4::identity() * *lift).cholesky())?;
+            let factor = [0.0, 1e-14, 1e-11, 1e-8, 1e-4]
+                .iter()
+                .find_map(|lift| (unit + Matrix4::identity() * *lift).cholesky())?;
             let step = -factor.solve(&error.component_mul(&scale)).component_mul(&scale);
             let slope = error.dot(&step);
             let found = (0..25).map(|i| 0.5f64.powi(i)).find_map(|t| {
                 let next = at(&(q + t * step));
-                let falls = next.0 <= value + 1e-4 * t * slope || next.1.norm() < 0.3 * error.norm();
+                let falls =
+                    next.0 <= value + 1e-4 * t * slope || next.1.norm() < 0.3 * error.norm();
                 (next.3 && falls).then_some((q + t * step, next))
             });
             let Some((next_q, next)) = found else { break };
@@ -216,7 +252,12 @@ impl Problem {
     }
 
     /// Minimises `D^2/2 - w.v`.
-    fn slip(&self, areas: &[Loops; 2], p: &[[f64; 3]; 2], start: Option<Vector3<f64>>) -> Option<Vector3<f64>> {
+    fn slip(
+        &self,
+        areas: &[Loops; 2],
+        p: &[[f64; 3]; 2],
+        start: Option<Vector3<f64>>,
+    ) -> Option<Vector3<f64>> {
         let size = self.load.norm();
         let w = self.load / size;
         let at = |v: &Vector3<f64>| {
@@ -239,12 +280,15 @@ impl Problem {
                 break;
             }
             let lift = matrix.trace();
-            let factor = [0.0, 1e-14, 1e-11, 1e-8, 1e-4, 1.0].iter().find_map(|share| (matrix + Matrix3::identity() * (share * lift)).cholesky())?;
+            let factor = [0.0, 1e-14, 1e-11, 1e-8, 1e-4, 1.0]
+                .iter()
+                .find_map(|share| (matrix + Matrix3::identity() * (share * lift)).cholesky())?;
             let step = -factor.solve(&error);
             let slope = error.dot(&step);
             let found = (0..25).map(|i| 0.5f64.powi(i)).find_map(|t| {
                 let next = at(&(v + t * step));
-                (next.0 <= value + 1e-4 * t * slope || next.1.norm() < 0.3 * error.norm()).then_some((v + t * step, next))
+                (next.0 <= value + 1e-4 * t * slope || next.1.norm() < 0.3 * error.norm())
+                    .then_some((v + t * step, next))
             });
             let Some((next_v, next)) = found else { break };
             if next.1.norm() >= error.norm() && error.amax() < 1e-9 {
@@ -274,7 +318,8 @@ impl Problem {
         let mut ends = Vec::new();
         for (a, b) in self.rim.iter().zip(self.rim.iter().cycle().skip(1)) {
             let (a, b) = (*a - self.middle, *b - self.middle);
-            let pieces = (a.angle_to(b).abs() / std::f64::consts::TAU * rays as f64).ceil().max(2.0) as usize;
+            let pieces = (a.angle_to(b).abs() / std::f64::consts::TAU * rays as f64).ceil().max(2.0)
+                as usize;
             ends.extend((0..pieces).map(|i| a.lerp(b, i as f64 / pieces as f64)));
         }
         ends
@@ -305,25 +350,44 @@ impl Problem {
         let mut starts: Vec<Sample> = Vec::new();
         for i in 0..n {
             for j in 0..rings {
-                let cell = [grid[i][j], grid[(i + 1) % n][j], grid[(i + 1) % n][j + 1], grid[i][j + 1]];
+                let cell =
+                    [grid[i][j], grid[(i + 1) % n][j], grid[(i + 1) % n][j + 1], grid[i][j + 1]];
                 let corners: Vec<Sample> = cell.iter().flatten().copied().collect();
-                if corners.len() >= 3 && (encloses(&corners[0..3]) || (corners.len() == 4 && encloses(&[corners[0], corners[2], corners[3]]))) {
-                    starts.extend(corners.iter().copied().min_by(|a, b| a.g.length().total_cmp(&b.g.length())));
+                if corners.len() >= 3
+                    && (encloses(&corners[0..3])
+                        || (corners.len() == 4 && encloses(&[corners[0], corners[2], corners[3]])))
+                {
+                    starts.extend(
+                        corners
+                            .iter()
+                            .copied()
+                            .min_by(|a, b| a.g.length().total_cmp(&b.g.length())),
+                    );
                 }
-                // A pair of zeros between the grid's lines turns nothing, but the value is small beside them.
+                // A pair of zeros between the grid's lines turns nothing, but the value is small
+                // beside them.
                 let Some(here) = grid[i][j] else { continue };
-                let around = [-1i32, 0, 1].iter().flat_map(|&di| [-1i32, 0, 1].map(|dj| (di, dj))).filter_map(|(di, dj)| {
-                    let column = &grid[(i as i32 + di).rem_euclid(n as i32) as usize];
-                    column.get(usize::try_from(j as i32 + dj).ok()?).copied().flatten()
-                });
-                if (j > 0 || i == 0) && around.clone().all(|other| other.g.length() >= here.g.length()) {
+                let around = [-1i32, 0, 1]
+                    .iter()
+                    .flat_map(|&di| [-1i32, 0, 1].map(|dj| (di, dj)))
+                    .filter_map(|(di, dj)| {
+                        let column = &grid[(i as i32 + di).rem_euclid(n as i32) as usize];
+                        column.get(usize::try_from(j as i32 + dj).ok()?).copied().flatten()
+                    });
+                if (j > 0 || i == 0)
+                    && around.clone().all(|other| other.g.length() >= here.g.length())
+                {
                     starts.push(here);
                 }
             }
         }
         for column in &grid {
             starts.extend(
-                column[rings].filter(|last| column[rings - 1].is_none_or(|before| last.g.length() < before.g.length())).filter(|last| last.g.length() < 0.05),
+                column[rings]
+                    .filter(|last| {
+                        column[rings - 1].is_none_or(|before| last.g.length() < before.g.length())
+                    })
+                    .filter(|last| last.g.length() < 0.05),
             );
         }
         let mut zeros: Vec<Sample> = Vec::new();
@@ -332,16 +396,22 @@ impl Problem {
                 continue;
             }
             if let Some(zero) = self.polish(start)
-                && !zeros.iter().any(|known| (known.mu / zero.mu - 1.0).abs() < 1e-6 && known.x.distance(zero.x) < 1e-5)
+                && !zeros.iter().any(|known| {
+                    (known.mu / zero.mu - 1.0).abs() < 1e-6 && known.x.distance(zero.x) < 1e-5
+                })
             {
                 zeros.push(zero);
             }
         }
         zeros.sort_by(|a, b| a.mu.total_cmp(&b.mu));
-        let last: Option<Vec<DVec2>> = grid.iter().map(|ray| ray[rings].map(|sample| sample.g)).collect();
+        let last: Option<Vec<DVec2>> =
+            grid.iter().map(|ray| ray[rings].map(|sample| sample.g)).collect();
         let winding = last.and_then(|ring| {
             let turns: Vec<f64> = (0..n).map(|i| ring[i].angle_to(ring[(i + 1) % n])).collect();
-            turns.iter().all(|turn| turn.abs() < 2.5).then(|| (turns.iter().sum::<f64>() / std::f64::consts::TAU).round() as i32)
+            turns
+                .iter()
+                .all(|turn| turn.abs() < 2.5)
+                .then(|| (turns.iter().sum::<f64>() / std::f64::consts::TAU).round() as i32)
         });
         Scan { zeros, winding, blind, points }
     }
@@ -368,7 +438,10 @@ impl Problem {
                 return None;
             }
             let difference = |e: DVec2| {
-                let (plus, minus) = (self.sample(at.x + step * e, Some(&at))?, self.sample(at.x - step * e, Some(&at))?);
+                let (plus, minus) = (
+                    self.sample(at.x + step * e, Some(&at))?,
+                    self.sample(at.x - step * e, Some(&at))?,
+                );
                 Some((plus.g - minus.g) / (2.0 * step))
             };
             let (gx, gy) = (difference(DVec2::X)?, difference(DVec2::Y)?);
@@ -382,7 +455,8 @@ impl Problem {
                 if room(x) <= 0.0 {
                     return None;
                 }
-                self.sample(x, Some(&at)).filter(|next| next.g.length() < (1.0 - 0.1 * t) * at.g.length())
+                self.sample(x, Some(&at))
+                    .filter(|next| next.g.length() < (1.0 - 0.1 * t) * at.g.length())
             });
             let Some(next) = next else { break };
             at = next;
@@ -390,11 +464,16 @@ impl Problem {
         (at.g.length() < 1e-8).then_some(at)
     }
 
-    /// The zero on the branch that starts at `d = 0`, followed in small steps of `d` (Newton's method from the step before), the
-    /// first of which changes nothing much, each longer than the one before by the same factor; `None` where the branch ends before
-    /// the real `d`.
+    /// The zero on the branch that starts at `d = 0`, followed in small steps of `d` (Newton's
+    /// method from the step before), the first of which changes nothing much, each longer than the
+    /// one before by the same factor; `None` where the branch ends before the real `d`.
     pub(crate) fn branch(&self, steps: usize) -> Option<Sample> {
-        let with = |share: f64| Self { half_distance: share * self.half_distance, areas: self.areas.clone(), rim: self.rim.clone(), ..*self };
+        let with = |share: f64| Self {
+            half_distance: share * self.half_distance,
+            areas: self.areas.clone(),
+            rim: self.rim.clone(),
+            ..*self
+        };
         let mut at = with(0.0).sample(self.uncoupled, None)?;
         let first = 0.01 / (1.0 + 2.0 * at.mu * self.half_distance.abs());
         for step in 0..=steps {

@@ -1,5 +1,5 @@
-//! Pressed areas with twice the digits of doubles. On contacts of a millionth of the area, and far apart, everything is a
-//! small difference of large numbers.
+//! Pressed areas with twice the digits of doubles. On contacts of a millionth of the area, and far
+//! apart, everything is a small difference of large numbers.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -76,7 +76,8 @@ pub(super) fn pressed(area: &Rings, p: [f64; 3]) -> [f64; 4] {
     for ring in area {
         let mut kept: Vec<[Double; 2]> = Vec::new();
         for i in 0..ring.len() {
-            let [a, b] = [ring[i], ring[(i + 1) % ring.len()]].map(|x| [Double::from(x.x), Double::from(x.y)]);
+            let [a, b] = [ring[i], ring[(i + 1) % ring.len()]]
+                .map(|x| [Double::from(x.x), Double::from(x.y)]);
             let (pa, pb) = (value(a), value(b));
             if pa.0 > 0.0 {
                 kept.push(a);
@@ -88,7 +89,8 @@ pub(super) fn pressed(area: &Rings, p: [f64; 3]) -> [f64; 4] {
         }
         for i in 1..kept.len().max(2) - 1 {
             let [a, b, c] = [kept[0], kept[i], kept[i + 1]];
-            let part = third * half * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
+            let part =
+                third * half * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
             // Exact for the products by the middles of the sides.
             for [u, v] in [[a, b], [b, c], [c, a]] {
                 let x = [0, 1].map(|i| half * (u[i] + v[i]));

@@ -10,7 +10,9 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 use gripfast::gripper::{Body, Gripper, Shape, rectangle};
 use gripfast::model::{Bounds, Contact, Frame, Grip, Polygon, Pressure, Slip, Status, Wrench};
 use gripfast::part::MassProperties;
-use gripfast::results::{FORMAT, GripSet, LoadCase, LoadScore, PartSummary, Provenance, RankedGrip, Summary, VERSION};
+use gripfast::results::{
+    FORMAT, GripSet, LoadCase, LoadScore, PartSummary, Provenance, RankedGrip, Summary, VERSION,
+};
 
 /// 20 x 10 mm pads, 40 mm fingers, a palm, 85 mm stroke.
 pub(crate) fn gripper() -> Gripper {
@@ -37,7 +39,10 @@ pub(crate) fn gripper() -> Gripper {
 pub(crate) fn grip(id: u64, part_from_grip: Frame, mu_s: f64) -> RankedGrip {
     let square = |half: f64| Polygon { outer: rectangle(DVec2::splat(2.0 * half)), holes: vec![] };
     let hole = vec![DVec2::new(0.001, 0.001), DVec2::new(0.001, 0.002), DVec2::new(0.002, 0.001)];
-    let contact = Contact { face_i: vec![Polygon { holes: vec![hole], ..square(0.005) }], face_ii: vec![square(0.004)] };
+    let contact = Contact {
+        face_i: vec![Polygon { holes: vec![hole], ..square(0.005) }],
+        face_ii: vec![square(0.004)],
+    };
     RankedGrip {
         rank: 0,
         grip: Grip {
@@ -54,12 +59,22 @@ pub(crate) fn grip(id: u64, part_from_grip: Frame, mu_s: f64) -> RankedGrip {
         score: None,
         worst: LoadScore {
             load: u32::try_from(id % 2).unwrap(),
-            wrench: Wrench { force: DVec3::new(1.0, -2.0, 0.5), moment: DVec3::new(0.01, 0.02, -0.03) },
+            wrench: Wrench {
+                force: DVec3::new(1.0, -2.0, 0.5),
+                moment: DVec3::new(0.01, 0.02, -0.03),
+            },
             status: Status::Ok,
             mu_s: Some(mu_s),
-            slip: Some(if id.is_multiple_of(3) { Slip::Translation { direction: [0.6, -0.8] } } else { Slip::Rotation { c: [0.01, -0.002], sense: -1 } }),
+            slip: Some(if id.is_multiple_of(3) {
+                Slip::Translation { direction: [0.6, -0.8] }
+            } else {
+                Slip::Rotation { c: [0.01, -0.002], sense: -1 }
+            }),
             pressure: Some(Pressure { a_i0: 1e5, a_ii0: 2e5, a1: -3e6, a2: 4e6 }),
-            bounds: Some(Bounds { lower: mu_s, upper: if id.is_multiple_of(2) { f64::INFINITY } else { mu_s * 1.001 } }),
+            bounds: Some(Bounds {
+                lower: mu_s,
+                upper: if id.is_multiple_of(2) { f64::INFINITY } else { mu_s * 1.001 },
+            }),
             residual: 1e-13,
         },
         alpha: 0.25,
@@ -80,8 +95,15 @@ pub(crate) fn grip(id: u64, part_from_grip: Frame, mu_s: f64) -> RankedGrip {
 pub(crate) fn grip_set(count: u64) -> GripSet {
     let grips: Vec<RankedGrip> = (0..count)
         .map(|index| {
-            let turn = DQuat::from_scaled_axis(DVec3::new(0.3 * index as f64, 1.0 - 0.2 * index as f64, 0.5));
-            let pose = Frame { rotation: DMat3::from_quat(turn), origin: DVec3::new(0.001 * index as f64, -0.002, 0.01) };
+            let turn = DQuat::from_scaled_axis(DVec3::new(
+                0.3 * index as f64,
+                1.0 - 0.2 * index as f64,
+                0.5,
+            ));
+            let pose = Frame {
+                rotation: DMat3::from_quat(turn),
+                origin: DVec3::new(0.001 * index as f64, -0.002, 0.01),
+            };
             let mut grip = grip(index + 7, pose, 0.05 * (index + 1) as f64);
             grip.rank = index + 1;
             grip.score = Some(1.0 / grip.worst.mu_s.unwrap() + grip.alpha);
@@ -90,7 +112,11 @@ pub(crate) fn grip_set(count: u64) -> GripSet {
         .collect();
     let mass = 0.1296;
     let inertia = DMat3::from_diagonal(
-        DVec3::new(0.04_f64.powi(2) + 0.02_f64.powi(2), 0.06_f64.powi(2) + 0.02_f64.powi(2), 0.06_f64.powi(2) + 0.04_f64.powi(2)) * (mass / 12.0),
+        DVec3::new(
+            0.04_f64.powi(2) + 0.02_f64.powi(2),
+            0.06_f64.powi(2) + 0.02_f64.powi(2),
+            0.06_f64.powi(2) + 0.04_f64.powi(2),
+        ) * (mass / 12.0),
     );
     GripSet {
         format: FORMAT.into(),
@@ -99,7 +125,10 @@ pub(crate) fn grip_set(count: u64) -> GripSet {
             gripfast: "0.0.0".into(),
             command: vec!["gripfast".into(), "plan".into(), "a \"quoted\"\nname: #1.stl".into()],
             backend: "cpu".into(),
-            settings: BTreeMap::from([("force_n".to_owned(), serde_json::json!(80.0)), ("opening_m".to_owned(), serde_json::json!(0.005))]),
+            settings: BTreeMap::from([
+                ("force_n".to_owned(), serde_json::json!(80.0)),
+                ("opening_m".to_owned(), serde_json::json!(0.005)),
+            ]),
         },
         part: PartSummary {
             file: "box.stl".into(),
@@ -107,14 +136,31 @@ pub(crate) fn grip_set(count: u64) -> GripSet {
             triangles: 12,
             bbox_min: DVec3::new(-0.03, -0.02, -0.01),
             bbox_max: DVec3::new(0.03, 0.02, 0.01),
-            mass: MassProperties { volume: 4.8e-5, mass, centre_of_mass: DVec3::new(0.001, 0.002, 0.003), inertia },
+            mass: MassProperties {
+                volume: 4.8e-5,
+                mass,
+                centre_of_mass: DVec3::new(0.001, 0.002, 0.003),
+                inertia,
+            },
         },
         gripper: serde_json::to_value(gripper()).unwrap(),
         loads: vec![
-            LoadCase { name: "gravity -z".into(), wrench: Wrench { force: DVec3::new(0.0, 0.0, -1.27), moment: DVec3::ZERO } },
-            LoadCase { name: "gravity, \"+z\"".into(), wrench: Wrench { force: DVec3::new(0.0, 0.0, 1.27), moment: DVec3::ZERO } },
+            LoadCase {
+                name: "gravity -z".into(),
+                wrench: Wrench { force: DVec3::new(0.0, 0.0, -1.27), moment: DVec3::ZERO },
+            },
+            LoadCase {
+                name: "gravity, \"+z\"".into(),
+                wrench: Wrench { force: DVec3::new(0.0, 0.0, 1.27), moment: DVec3::ZERO },
+            },
         ],
-        summary: Summary { pairs: 3, candidates: 100, ranked: count, rejections: BTreeMap::from([("twisted_out".to_owned(), 5)]), comparison: None },
+        summary: Summary {
+            pairs: 3,
+            candidates: 100,
+            ranked: count,
+            rejections: BTreeMap::from([("twisted_out".to_owned(), 5)]),
+            comparison: None,
+        },
         grips,
     }
 }

@@ -10,9 +10,11 @@ pub(crate) fn reference(path: &str) -> Option<PathBuf> {
     if file.exists() {
         return Some(file);
     }
-    // Written to the terminal, not through the test harness's capture, so that a skip is always seen.
+    // Written to the terminal, not through the test harness's capture, so that a skip is always
+    // seen.
     use std::io::Write;
-    let _ = writeln!(std::io::stderr(), "SKIPPED: reference data '{path}' is not beside this checkout");
+    let _ =
+        writeln!(std::io::stderr(), "SKIPPED: reference data '{path}' is not beside this checkout");
     None
 }
 

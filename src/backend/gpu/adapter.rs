@@ -1,4 +1,5 @@
-//! Which graphics processor: listing, naming, and the rule that software never counts as one unless asked for by name.
+//! Which graphics processor: listing, naming, and the rule that software never counts as one unless
+//! asked for by name.
 
 use crate::error::{Error, Result};
 
@@ -58,7 +59,8 @@ impl AdapterSummary {
     }
 }
 
-/// Order of preference; `None` for what does not count as a GPU. `WGPU_POWER_PREF=low` prefers integrated ones.
+/// Order of preference; `None` for what does not count as a GPU. `WGPU_POWER_PREF=low` prefers
+/// integrated ones.
 fn rank(kind: wgpu::DeviceType) -> Option<u32> {
     let low_power = wgpu::PowerPreference::from_env() == Some(wgpu::PowerPreference::LowPower);
     match kind {
@@ -78,22 +80,37 @@ pub(crate) fn adapters() -> Vec<wgpu::Adapter> {
 
 /// All adapters, in the order of their indices.
 pub fn list() -> Vec<AdapterSummary> {
-    adapters().iter().enumerate().map(|(index, adapter)| AdapterSummary::new(index, adapter)).collect()
+    adapters()
+        .iter()
+        .enumerate()
+        .map(|(index, adapter)| AdapterSummary::new(index, adapter))
+        .collect()
 }
 
-/// The adapter asked for by index or part of its name (`--adapter`, else the environment variables `GRIPFAST_ADAPTER`
-/// and `WGPU_ADAPTER_NAME`), or else the best that counts as a GPU.
+/// The adapter asked for by index or part of its name (`--adapter`, else the environment variables
+/// `GRIPFAST_ADAPTER` and `WGPU_ADAPTER_NAME`), or else the best that counts as a GPU.
 ///
 /// # Errors
 /// [`Error::Backend`] when there is none; the message lists what there is.
 pub(crate) fn choose(asked: Option<&str>) -> Result<wgpu::Adapter> {
-    let from_environment = || [ADAPTER_VARIABLE, "WGPU_ADAPTER_NAME"].iter().find_map(|name| std::env::var(name).ok()).filter(|name| !name.trim().is_empty());
+    let from_environment = || {
+        [ADAPTER_VARIABLE, "WGPU_ADAPTER_NAME"]
+            .iter()
+            .find_map(|name| std::env::var(name).ok())
+            .filter(|name| !name.trim().is_empty())
+    };
     let asked = asked.map(str::to_owned).or_else(from_environment);
     let mut all = adapters();
     let position = match &asked {
-        Some(name) => position_of(name.trim(), &all.iter().map(|adapter| adapter.get_info().name).collect::<Vec<_>>()),
+        Some(name) => position_of(
+            name.trim(),
+            &all.iter().map(|adapter| adapter.get_info().name).collect::<Vec<_>>(),
+        ),
         None => {
-            let ranks = all.iter().enumerate().filter_map(|(i, adapter)| Some((rank(adapter.get_info().device_type)?, i)));
+            let ranks = all
+                .iter()
+                .enumerate()
+                .filter_map(|(i, adapter)| Some((rank(adapter.get_info().device_type)?, i)));
             ranks.min().map(|(_, i)| i)
         }
     };
@@ -101,11 +118,18 @@ pub(crate) fn choose(asked: Option<&str>) -> Result<wgpu::Adapter> {
         return Ok(all.swap_remove(position));
     }
     let found = all.iter().enumerate().map(|(index, adapter)| AdapterSummary::new(index, adapter));
-    let found: Vec<String> = found.map(|found| format!("[{}] {} ({})", found.index, found.name, found.kind)).collect();
-    let found = if found.is_empty() { "no graphics adapter was found".to_owned() } else { format!("found: {}", found.join(", ")) };
+    let found: Vec<String> =
+        found.map(|found| format!("[{}] {} ({})", found.index, found.name, found.kind)).collect();
+    let found = if found.is_empty() {
+        "no graphics adapter was found".to_owned()
+    } else {
+        format!("found: {}", found.join(", "))
+    };
     Err(Error::Backend(match asked {
         Some(name) => format!("no adapter is called `{name}`; {found}"),
-        None => format!("no graphics processor; {found}. A software adapter is used only when named with --adapter"),
+        None => format!(
+            "no graphics processor; {found}. A software adapter is used only when named with --adapter"
+        ),
     }))
 }
 

@@ -1,5 +1,5 @@
-//! The kernels on the graphics processor, through wgpu. Two sets of buffers: while one chunk computes, the next is
-//! uploaded and the one before read back.
+//! The kernels on the graphics processor, through wgpu. Two sets of buffers: while one chunk
+//! computes, the next is uploaded and the one before read back.
 
 mod adapter;
 mod shader;
@@ -86,8 +86,9 @@ struct Ticket {
 }
 
 impl Gpu {
-    /// Opens the adapter `asked` for (index or part of its name; see [`adapter::choose`]) and compiles the kernels.
-    /// `strict`: a lost device is an error, otherwise its chunk is computed on the processor.
+    /// Opens the adapter `asked` for (index or part of its name; see [`adapter::choose`]) and
+    /// compiles the kernels. `strict`: a lost device is an error, otherwise its chunk is computed
+    /// on the processor.
     ///
     /// # Errors
     /// [`Error::Backend`] when there is no such adapter or it cannot run the kernels.
@@ -95,8 +96,13 @@ impl Gpu {
         let adapter = adapter::choose(asked)?;
         let (info, available) = (adapter.get_info(), adapter.limits());
         let refused = |why: String| Error::Backend(format!("{}: {why}", info.name));
-        let descriptor = wgpu::DeviceDescriptor { label: Some("gripfast"), required_limits: available.clone(), ..Default::default() };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| refused(error.to_string()))?;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("gripfast"),
+            required_limits: available.clone(),
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|error| refused(error.to_string()))?;
         let lost = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&lost);
         device.set_device_lost_callback(move |_, _| flag.store(true, Ordering::Release));
@@ -113,10 +119,13 @@ impl Gpu {
         if let Some(error) = pollster::block_on(scope.pop()) {
             return Err(refused(error.to_string()));
         }
-        let bytes = CHUNK_BYTES.min(available.max_storage_buffer_binding_size).min(available.max_buffer_size);
+        let bytes = CHUNK_BYTES
+            .min(available.max_storage_buffer_binding_size)
+            .min(available.max_buffer_size);
         let rows = u64::from(available.max_compute_workgroups_per_dimension);
         // A group per load is the worst case; they fill a grid of GRID columns.
-        let loads = (bytes / size_of::<LoadRecord>() as u64).min(u64::from(shader::GRID) * rows) as usize;
+        let loads =
+            (bytes / size_of::<LoadRecord>() as u64).min(u64::from(shader::GRID) * rows) as usize;
         let limits = Limits {
             loads,
             contacts: (bytes / size_of::<ContactHeader>() as u64).min(rows) as usize,
@@ -160,9 +169,14 @@ impl Gpu {
         self.limits
     }
 
-    /// Computes chunk after chunk, handing each chunk's records to `take` in order. `next` makes the following chunk
-    /// while the device works on the one before.
-    pub(crate) fn run<T>(&self, seeds: &SeedSet, next: impl FnMut() -> Option<(Chunk, T)>, take: impl FnMut(Vec<SeedRecord>, T) -> Result<()>) -> Result<()> {
+    /// Computes chunk after chunk, handing each chunk's records to `take` in order. `next` makes
+    /// the following chunk while the device works on the one before.
+    pub(crate) fn run<T>(
+        &self,
+        seeds: &SeedSet,
+        next: impl FnMut() -> Option<(Chunk, T)>,
+        take: impl FnMut(Vec<SeedRecord>, T) -> Result<()>,
+    ) -> Result<()> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let outcome = self.run_chunks(&mut state, seeds, next, take);
         if outcome.is_err() {
@@ -206,7 +220,11 @@ impl Gpu {
     }
 
     fn check_lost(&self) -> std::result::Result<(), Failure> {
-        if self.lost.load(Ordering::Acquire) { Err(Failure::Lost(format!("{} does not answer any more", self.info.name))) } else { Ok(()) }
+        if self.lost.load(Ordering::Acquire) {
+            Err(Failure::Lost(format!("{} does not answer any more", self.info.name)))
+        } else {
+            Ok(())
+        }
     }
 
     /// The failure that an error of wgpu means.
@@ -219,9 +237,17 @@ impl Gpu {
     }
 
     /// Uploads a chunk, starts both kernels on it and the way back.
-    fn submit(&self, state: &mut State, slot: usize, chunk: &Chunk, seeds: &SeedSet) -> std::result::Result<Ticket, Failure> {
+    fn submit(
+        &self,
+        state: &mut State,
+        slot: usize,
+        chunk: &Chunk,
+        seeds: &SeedSet,
+    ) -> std::result::Result<Ticket, Failure> {
         #[cfg(test)]
-        if self.destroy_before.load(Ordering::Relaxed) > 0 && self.destroy_before.fetch_sub(1, Ordering::Relaxed) == 1 {
+        if self.destroy_before.load(Ordering::Relaxed) > 0
+            && self.destroy_before.fetch_sub(1, Ordering::Relaxed) == 1
+        {
             self.device.destroy();
         }
         self.check_lost()?;
@@ -239,11 +265,18 @@ impl Gpu {
         let (device, queue) = (&self.device, &self.queue);
         if state.seeds.as_ref().is_none_or(|(known, ..)| known != seeds) {
             let upload = |name: &str, bytes: &[u8]| {
-                let buffer = self.buffer(name, bytes.len() as u64, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST);
+                let buffer = self.buffer(
+                    name,
+                    bytes.len() as u64,
+                    wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+                );
                 queue.write_buffer(&buffer, 0, bytes);
                 buffer
             };
-            let (twists, rings) = (upload("twists", bytemuck::cast_slice(seeds.twists())), upload("rings", bytemuck::cast_slice(seeds.rings())));
+            let (twists, rings) = (
+                upload("twists", bytemuck::cast_slice(seeds.twists())),
+                upload("rings", bytemuck::cast_slice(seeds.rings())),
+            );
             state.seeds = Some((seeds.clone(), twists, rings));
         }
         let State { seeds: known, slots } = state;
@@ -251,27 +284,88 @@ impl Gpu {
         let records = (chunk.loads.len() * size_of::<SeedRecord>()) as u64;
         let basis_bytes = (chunk.basis * size_of::<[f32; 4]>()) as u64;
         let input = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
-        let output = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-        let contacts = self.upload(&mut slot.contacts, "contacts", bytemuck::cast_slice::<ContactHeader, u8>(&chunk.contacts));
-        let edges = self.upload(&mut slot.edges, "edges", bytemuck::cast_slice::<EdgeRecord, u8>(&chunk.edges));
-        let loads = self.upload(&mut slot.loads, "loads", bytemuck::cast_slice::<LoadRecord, u8>(&chunk.loads));
-        let groups = self.upload(&mut slot.groups, "groups", bytemuck::cast_slice::<GroupRecord, u8>(&chunk.groups));
+        let output = wgpu::BufferUsages::STORAGE
+            | wgpu::BufferUsages::COPY_SRC
+            | wgpu::BufferUsages::COPY_DST;
+        let contacts = self.upload(
+            &mut slot.contacts,
+            "contacts",
+            bytemuck::cast_slice::<ContactHeader, u8>(&chunk.contacts),
+        );
+        let edges = self.upload(
+            &mut slot.edges,
+            "edges",
+            bytemuck::cast_slice::<EdgeRecord, u8>(&chunk.edges),
+        );
+        let loads = self.upload(
+            &mut slot.loads,
+            "loads",
+            bytemuck::cast_slice::<LoadRecord, u8>(&chunk.loads),
+        );
+        let groups = self.upload(
+            &mut slot.groups,
+            "groups",
+            bytemuck::cast_slice::<GroupRecord, u8>(&chunk.groups),
+        );
         let basis = self.grown(&mut slot.basis, "basis", basis_bytes, input);
         let found = self.grown(&mut slot.seeds, "seeds", records, output);
-        let readback = self.grown(&mut slot.readback, "readback", records, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("seed") });
+        let readback = self.grown(
+            &mut slot.readback,
+            "readback",
+            records,
+            wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        );
+        let mut encoder =
+            device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("seed") });
         // Zero is the status UNWRITTEN.
         encoder.clear_buffer(&found, 0, Some(records));
         if let Some((seeds, twists, rings)) = &*known {
-            let (twists, rings) = ((twists, size_of_val(seeds.twists()) as u64), (rings, size_of_val(seeds.rings()) as u64));
-            let (contacts, edges) = ((&contacts, size_of_val(&chunk.contacts[..]) as u64), (&edges, size_of_val(&chunk.edges[..]) as u64));
-            let fan = self.fan.bind(device, &[contacts, edges, twists, (&basis, basis_bytes), (&self.gauss, size_of_val(&GAUSS) as u64)]);
-            let (loads, groups) = ((&loads, size_of_val(&chunk.loads[..]) as u64), (&groups, size_of_val(&chunk.groups[..]) as u64));
-            let search = self.search.bind(device, &[contacts, edges, twists, rings, (&basis, basis_bytes), loads, groups, (&found, records)]);
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("seed"), timestamp_writes: None });
+            let (twists, rings) = (
+                (twists, size_of_val(seeds.twists()) as u64),
+                (rings, size_of_val(seeds.rings()) as u64),
+            );
+            let (contacts, edges) = (
+                (&contacts, size_of_val(&chunk.contacts[..]) as u64),
+                (&edges, size_of_val(&chunk.edges[..]) as u64),
+            );
+            let fan = self.fan.bind(
+                device,
+                &[
+                    contacts,
+                    edges,
+                    twists,
+                    (&basis, basis_bytes),
+                    (&self.gauss, size_of_val(&GAUSS) as u64),
+                ],
+            );
+            let (loads, groups) = (
+                (&loads, size_of_val(&chunk.loads[..]) as u64),
+                (&groups, size_of_val(&chunk.groups[..]) as u64),
+            );
+            let search = self.search.bind(
+                device,
+                &[
+                    contacts,
+                    edges,
+                    twists,
+                    rings,
+                    (&basis, basis_bytes),
+                    loads,
+                    groups,
+                    (&found, records),
+                ],
+            );
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some("seed"),
+                timestamp_writes: None,
+            });
             pass.set_pipeline(&self.fan.pipeline);
             pass.set_bind_group(0, &fan, &[]);
-            pass.dispatch_workgroups(seeds.len().div_ceil(super::layout::BASIS_GROUP) as u32, chunk.contacts.len() as u32, 1);
+            pass.dispatch_workgroups(
+                seeds.len().div_ceil(super::layout::BASIS_GROUP) as u32,
+                chunk.contacts.len() as u32,
+                1,
+            );
             pass.set_pipeline(&self.search.pipeline);
             pass.set_bind_group(0, &search, &[]);
             let count = chunk.groups.len() as u32;
@@ -289,16 +383,26 @@ impl Gpu {
 
     /// Waits for a chunk and copies its records.
     fn collect(&self, ticket: &Ticket) -> std::result::Result<Vec<SeedRecord>, Failure> {
-        let wait = wgpu::PollType::Wait { submission_index: Some(ticket.submission.clone()), timeout: None };
+        let wait = wgpu::PollType::Wait {
+            submission_index: Some(ticket.submission.clone()),
+            timeout: None,
+        };
         let outcome = self.device.poll(wait);
         self.check_lost()?;
-        outcome.map_err(|error| Failure::Fault(format!("waiting for the graphics processor: {error}")))?;
+        outcome.map_err(|error| {
+            Failure::Fault(format!("waiting for the graphics processor: {error}"))
+        })?;
         match ticket.mapped.try_recv() {
             Ok(Ok(())) => {}
             Ok(Err(error)) => return Err(Failure::Lost(format!("reading back: {error}"))),
-            Err(_) => return Err(Failure::Fault("the answers were not ready after the wait".to_owned())),
+            Err(_) => {
+                return Err(Failure::Fault("the answers were not ready after the wait".to_owned()));
+            }
         }
-        let view = ticket.readback.get_mapped_range(0..ticket.bytes).map_err(|error| Failure::Fault(error.to_string()))?;
+        let view = ticket
+            .readback
+            .get_mapped_range(0..ticket.bytes)
+            .map_err(|error| Failure::Fault(error.to_string()))?;
         let records = bytemuck::pod_collect_to_vec(&view);
         drop(view);
         ticket.readback.unmap();
@@ -306,22 +410,40 @@ impl Gpu {
     }
 
     fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
-        self.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size: size.max(16), usage, mapped_at_creation: false })
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: size.max(16),
+            usage,
+            mapped_at_creation: false,
+        })
     }
 
     /// The slot's buffer, replaced by a larger one where `size` needs it.
-    fn grown(&self, place: &mut Option<wgpu::Buffer>, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    fn grown(
+        &self,
+        place: &mut Option<wgpu::Buffer>,
+        label: &str,
+        size: u64,
+        usage: wgpu::BufferUsages,
+    ) -> wgpu::Buffer {
         match place {
             Some(buffer) if buffer.size() >= size => buffer.clone(),
             _ => {
                 let most = self.device.limits().max_buffer_size;
-                place.insert(self.buffer(label, size.next_power_of_two().min(most).max(size), usage)).clone()
+                place
+                    .insert(self.buffer(label, size.next_power_of_two().min(most).max(size), usage))
+                    .clone()
             }
         }
     }
 
     fn upload(&self, place: &mut Option<wgpu::Buffer>, label: &str, bytes: &[u8]) -> wgpu::Buffer {
-        let buffer = self.grown(place, label, bytes.len() as u64, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST);
+        let buffer = self.grown(
+            place,
+            label,
+            bytes.len() as u64,
+            wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        );
         self.queue.write_buffer(&buffer, 0, bytes);
         buffer
     }

@@ -9,7 +9,8 @@ pub(crate) const FAN: &str = include_str!("../../../shaders/fan.wgsl");
 /// The search kernel.
 pub(crate) const SEARCH: &str = include_str!("../../../shaders/search.wgsl");
 
-/// Workgroups per row of a dispatch (the guaranteed least of every implementation is 65,535 per dimension).
+/// Workgroups per row of a dispatch (the guaranteed least of every implementation is 65,535 per
+/// dimension).
 pub(crate) const GRID: u32 = 32_768;
 
 /// The constants that the shaders leave open, from [`layout`].
@@ -44,11 +45,20 @@ pub(crate) enum Access {
 }
 
 /// Bindings of the basis kernel: contacts, edges, twists, basis, Gauss points.
-pub(crate) const FAN_BINDINGS: [Access; 5] = [Access::Read, Access::Read, Access::Read, Access::Write, Access::Uniform];
+pub(crate) const FAN_BINDINGS: [Access; 5] =
+    [Access::Read, Access::Read, Access::Read, Access::Write, Access::Uniform];
 
 /// Bindings of the search kernel: contacts, edges, twists, rings, basis, loads, groups, seeds.
-pub(crate) const SEARCH_BINDINGS: [Access; 8] =
-    [Access::Read, Access::Read, Access::Read, Access::Read, Access::Read, Access::Read, Access::Read, Access::Write];
+pub(crate) const SEARCH_BINDINGS: [Access; 8] = [
+    Access::Read,
+    Access::Read,
+    Access::Read,
+    Access::Read,
+    Access::Read,
+    Access::Read,
+    Access::Read,
+    Access::Write,
+];
 
 /// A compiled kernel.
 #[derive(Debug)]
@@ -60,7 +70,8 @@ pub(crate) struct Kernel {
 impl Kernel {
     pub(crate) fn new(device: &wgpu::Device, name: &str, text: &str, bindings: &[Access]) -> Self {
         let source = wgpu::ShaderSource::Wgsl(format!("{LAYOUT}\n{text}").into());
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(name), source });
+        let module =
+            device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(name), source });
         let entries: Vec<wgpu::BindGroupLayoutEntry> = bindings
             .iter()
             .zip(0..)
@@ -79,32 +90,53 @@ impl Kernel {
                 count: None,
             })
             .collect();
-        let bindings = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(name), entries: &entries });
-        let layout =
-            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor { label: Some(name), bind_group_layouts: &[Some(&bindings)], immediate_size: 0 });
+        let bindings = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some(name),
+            entries: &entries,
+        });
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(name),
+            bind_group_layouts: &[Some(&bindings)],
+            immediate_size: 0,
+        });
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(name),
             layout: Some(&layout),
             module: &module,
             entry_point: Some(name),
             // Every workgroup writes its memory before it reads it.
-            compilation_options: wgpu::PipelineCompilationOptions { constants: &constants(), zero_initialize_workgroup_memory: false },
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &constants(),
+                zero_initialize_workgroup_memory: false,
+            },
             cache: None,
         });
         Self { pipeline, bindings }
     }
 
     /// Binds `buffers` (with the number of bytes in use) in order.
-    pub(crate) fn bind(&self, device: &wgpu::Device, buffers: &[(&wgpu::Buffer, u64)]) -> wgpu::BindGroup {
+    pub(crate) fn bind(
+        &self,
+        device: &wgpu::Device,
+        buffers: &[(&wgpu::Buffer, u64)],
+    ) -> wgpu::BindGroup {
         let entries: Vec<wgpu::BindGroupEntry<'_>> = buffers
             .iter()
             .zip(0..)
             .map(|((buffer, size), binding)| wgpu::BindGroupEntry {
                 binding,
-                resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size: std::num::NonZeroU64::new(*size) }),
+                resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                    buffer,
+                    offset: 0,
+                    size: std::num::NonZeroU64::new(*size),
+                }),
             })
             .collect();
-        device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &self.bindings, entries: &entries })
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &self.bindings,
+            entries: &entries,
+        })
     }
 }
 
@@ -116,14 +148,24 @@ mod tests {
 
     fn module(text: &str) -> naga::Module {
         let text = format!("{LAYOUT}\n{text}");
-        naga::front::wgsl::parse_str(&text).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)))
+        naga::front::wgsl::parse_str(&text)
+            .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)))
     }
 
     /// Offsets and size of a struct as the shader has it.
     fn in_shader(module: &naga::Module, name: &str) -> (Vec<(String, usize)>, usize) {
-        let (_, found) = module.types.iter().find(|(_, found)| found.name.as_deref() == Some(name)).unwrap();
-        let naga::TypeInner::Struct { members, span } = &found.inner else { panic!("{name} is no struct") };
-        (members.iter().map(|member| (member.name.clone().unwrap(), member.offset as usize)).collect(), *span as usize)
+        let (_, found) =
+            module.types.iter().find(|(_, found)| found.name.as_deref() == Some(name)).unwrap();
+        let naga::TypeInner::Struct { members, span } = &found.inner else {
+            panic!("{name} is no struct")
+        };
+        (
+            members
+                .iter()
+                .map(|member| (member.name.clone().unwrap(), member.offset as usize))
+                .collect(),
+            *span as usize,
+        )
     }
 
     macro_rules! assert_same_layout {
@@ -149,13 +191,15 @@ mod tests {
     #[test]
     fn every_open_constant_is_set_and_none_is_missing() {
         let module = module("");
-        let mut open: Vec<String> = module.overrides.iter().filter_map(|(_, constant)| constant.name.clone()).collect();
+        let mut open: Vec<String> =
+            module.overrides.iter().filter_map(|(_, constant)| constant.name.clone()).collect();
         let mut set: Vec<String> = constants().iter().map(|(name, _)| (*name).to_owned()).collect();
         open.sort();
         set.sort();
         assert_eq!(open, set);
         let fixed = |name: &str| {
-            let line = LAYOUT.lines().find(|line| line.starts_with(&format!("const {name} "))).unwrap();
+            let line =
+                LAYOUT.lines().find(|line| line.starts_with(&format!("const {name} "))).unwrap();
             line.split(['=', ';']).nth(1).unwrap().trim().trim_end_matches('u').to_owned()
         };
         assert_eq!(fixed("BASIS"), layout::BASIS.to_string());
@@ -167,7 +211,9 @@ mod tests {
 
     #[test]
     fn bindings_are_those_of_the_shaders() {
-        for (text, bindings) in [(FAN, FAN_BINDINGS.as_slice()), (SEARCH, SEARCH_BINDINGS.as_slice())] {
+        for (text, bindings) in
+            [(FAN, FAN_BINDINGS.as_slice()), (SEARCH, SEARCH_BINDINGS.as_slice())]
+        {
             let module = module(text);
             let mut found: Vec<(u32, Access)> = module
                 .global_variables
@@ -175,7 +221,11 @@ mod tests {
                 .filter_map(|(_, variable)| {
                     let access = match variable.space {
                         naga::AddressSpace::Uniform => Access::Uniform,
-                        naga::AddressSpace::Storage { access } if access.contains(naga::StorageAccess::STORE) => Access::Write,
+                        naga::AddressSpace::Storage { access }
+                            if access.contains(naga::StorageAccess::STORE) =>
+                        {
+                            Access::Write
+                        }
                         naga::AddressSpace::Storage { .. } => Access::Read,
                         _ => return None,
                     };

@@ -6,14 +6,19 @@ use super::*;
 use crate::model::{Contact, Patch, Polygon, Wrench};
 use glam::{DVec2, DVec3};
 
-/// Largest difference allowed between the processor's and the shader's records, relative to values of order one.
-/// Vulkan allows a logarithm 5e-7 off, fused products change the last bits, and a bound divides by the twist spacing.
+/// Largest difference allowed between the processor's and the shader's records, relative to values
+/// of order one. Vulkan allows a logarithm 5e-7 off, fused products change the last bits, and a
+/// bound divides by the twist spacing.
 const RECORD_TOLERANCE: f32 = 2e-5;
 
-/// A device for the tests, software included. Without any: a visible word, or a failure under `GRIPFAST_GPU=require`.
+/// A device for the tests, software included. Without any: a visible word, or a failure under
+/// `GRIPFAST_GPU=require`.
 fn gpu(strict: bool) -> Option<Gpu> {
     if list().is_empty() {
-        assert!(std::env::var("GRIPFAST_GPU").as_deref() != Ok("require"), "GRIPFAST_GPU=require, but there is no graphics adapter");
+        assert!(
+            std::env::var("GRIPFAST_GPU").as_deref() != Ok("require"),
+            "GRIPFAST_GPU=require, but there is no graphics adapter"
+        );
         eprintln!("SKIPPED: no graphics adapter, not even a software one");
         return None;
     }
@@ -27,7 +32,8 @@ struct Random(u64);
 
 impl Random {
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
@@ -40,10 +46,14 @@ impl Random {
     }
 
     fn star(&mut self, size: f64) -> Patch {
-        let (corners, centre) = (3 + (self.next() * 8.0) as usize, DVec2::new(self.within(-0.01, 0.01), self.within(-0.01, 0.01)));
+        let (corners, centre) = (
+            3 + (self.next() * 8.0) as usize,
+            DVec2::new(self.within(-0.01, 0.01), self.within(-0.01, 0.01)),
+        );
         let turn = self.next();
         let outer = (0..corners).map(|i| {
-            let angle = (i as f64 + turn + self.within(-0.2, 0.2)) / corners as f64 * std::f64::consts::TAU;
+            let angle =
+                (i as f64 + turn + self.within(-0.2, 0.2)) / corners as f64 * std::f64::consts::TAU;
             centre + DVec2::from_angle(angle) * size * self.within(0.4, 1.0)
         });
         vec![Polygon { outer: outer.collect(), holes: vec![] }]
@@ -75,10 +85,13 @@ fn compare(found: &[SeedRecord], expected: &[SeedRecord]) -> std::result::Result
             return Err(format!("record {i} is not finite: {a:?} {b:?}"));
         }
         let close = |x: f32, y: f32, scale: f32| (x - y).abs() <= RECORD_TOLERANCE * scale.max(1.0);
-        // Two twists of equal value may change places; the bound and the interpolated twist then come from other triangles.
+        // Two twists of equal value may change places; the bound and the interpolated twist then
+        // come from other triangles.
         let same_triangle = a.best == b.best;
         let twist = (0..3).all(|m| close(a.twist[m], b.twist[m], 40.0));
-        if !close(a.lower, b.lower, b.lower) || same_triangle && !(close(a.upper, b.upper, b.upper) && twist) {
+        if !close(a.lower, b.lower, b.lower)
+            || same_triangle && !(close(a.upper, b.upper, b.upper) && twist)
+        {
             return Err(format!("record {i}: {a:?} instead of {b:?}"));
         }
         if !same_triangle && !(0.9..1.1).contains(&(a.upper / b.upper)) {
@@ -89,14 +102,20 @@ fn compare(found: &[SeedRecord], expected: &[SeedRecord]) -> std::result::Result
 }
 
 /// Records of both kernels for the same chunks.
-fn records(gpu: &Gpu, problems: Vec<Problem<'_>>, seeds: &SeedSet) -> (Vec<SeedRecord>, Vec<SeedRecord>) {
+fn records(
+    gpu: &Gpu,
+    problems: Vec<Problem<'_>>,
+    seeds: &SeedSet,
+) -> (Vec<SeedRecord>, Vec<SeedRecord>) {
     let batch = Batch { problems };
     let job = Job::new(&batch, seeds).unwrap();
     let mut answers = vec![super::super::not_searched(SeedStatus::NoContact); job.loads];
-    let mut chunks: Vec<Chunk> = job.plans(gpu.limits(), &mut answers).iter_mut().map(|plan| job.build(plan)).collect();
+    let mut chunks: Vec<Chunk> =
+        job.plans(gpu.limits(), &mut answers).iter_mut().map(|plan| job.build(plan)).collect();
     let expected = chunks.iter().flat_map(|chunk| cpu::run(chunk, seeds)).collect();
     let mut found = Vec::new();
-    let mut next = chunks.drain(..).filter(|chunk| !chunk.loads.is_empty()).map(|chunk| (chunk, ()));
+    let mut next =
+        chunks.drain(..).filter(|chunk| !chunk.loads.is_empty()).map(|chunk| (chunk, ()));
     gpu.run(
         seeds,
         || next.next(),
@@ -118,24 +137,46 @@ fn shaders_give_the_records_of_the_processor() {
         let grips: Vec<_> = (0..150)
             .map(|_| {
                 let loads: Vec<Wrench> = (0..(random.next() * 150.0) as usize)
-                    .map(|_| Wrench { force: random.vector() * 10.0, moment: random.vector() * 0.1 * random.next() })
+                    .map(|_| Wrench {
+                        force: random.vector() * 10.0,
+                        moment: random.vector() * 0.1 * random.next(),
+                    })
                     .collect();
                 (random.contact(), random.within(0.0, 0.1), loads)
             })
             .collect();
-        let problems = grips.iter().map(|(contact, distance, wrenches)| Problem { contact, distance: *distance, force: 40.0, wrenches }).collect();
+        let problems = grips
+            .iter()
+            .map(|(contact, distance, wrenches)| Problem {
+                contact,
+                distance: *distance,
+                force: 40.0,
+                wrenches,
+            })
+            .collect();
         let (found, expected) = records(&gpu, problems, &seeds);
         assert_same(&found, &expected);
         let bounded = found.iter().filter(|r| r.status == BOUNDED).count();
         let changed = found.iter().zip(&expected).filter(|(a, b)| a.status != b.status).count();
-        println!("{} twists: {} records, {bounded} bounded, {changed} with another status", seeds.len(), found.len());
+        println!(
+            "{} twists: {} records, {bounded} bounded, {changed} with another status",
+            seeds.len(),
+            found.len()
+        );
         assert!(bounded > found.len() / 10 && changed <= found.len() / 1000);
     }
 }
 
 #[test]
 fn the_comparer_sees_one_wrong_number() {
-    let right = SeedRecord { twist: [0.6, 0.0, 0.8], lower: 1.0, upper: 1.01, status: BOUNDED, best: 3, padding: 0 };
+    let right = SeedRecord {
+        twist: [0.6, 0.0, 0.8],
+        lower: 1.0,
+        upper: 1.01,
+        status: BOUNDED,
+        best: 3,
+        padding: 0,
+    };
     assert!(compare(&[right; 3], &[right; 3]).is_ok());
     assert!(compare(&[right; 2], &[right; 3]).is_err());
     let wrong = [
@@ -157,8 +198,17 @@ fn with_doomed_device<R>(mut gpu: Gpu, then: impl FnOnce(&Backend, &Batch<'_>) -
     gpu.destroy_before = AtomicU64::new(3);
     let mut random = Random(11);
     let contact = random.contact();
-    let wrenches: Vec<Wrench> = (0..350).map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 }).collect();
-    let batch = Batch { problems: vec![Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches }] };
+    let wrenches: Vec<Wrench> = (0..350)
+        .map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 })
+        .collect();
+    let batch = Batch {
+        problems: vec![Problem {
+            contact: &contact,
+            distance: 0.03,
+            force: 20.0,
+            wrenches: &wrenches,
+        }],
+    };
     then(&Backend::Gpu(Box::new(gpu)), &batch)
 }
 
@@ -167,10 +217,14 @@ fn a_lost_device_is_replaced_by_the_processor_under_auto() {
     let Some(gpu) = gpu(false) else { return };
     with_doomed_device(gpu, |backend, batch| {
         let set = SeedSet::default();
-        let (found, expected) = (backend.seed(batch, &set).unwrap(), Backend::Cpu.seed(batch, &set).unwrap());
+        let (found, expected) =
+            (backend.seed(batch, &set).unwrap(), Backend::Cpu.seed(batch, &set).unwrap());
         assert_eq!(found.len(), expected.len());
         for (a, b) in found.iter().zip(&expected) {
-            assert!(a.status == b.status && (a.lower - b.lower).abs() <= 1e-4 * b.lower.max(1e-9), "{a:?} instead of {b:?}");
+            assert!(
+                a.status == b.status && (a.lower - b.lower).abs() <= 1e-4 * b.lower.max(1e-9),
+                "{a:?} instead of {b:?}"
+            );
         }
         // Chunk two was in flight, three and four were never sent.
         assert_eq!(found[200..], expected[200..]);
@@ -183,14 +237,18 @@ fn a_lost_device_is_replaced_by_the_processor_under_auto() {
 fn final_answers_are_right_when_the_device_is_lost_in_mid_batch() {
     let Some(gpu) = gpu(false) else { return };
     with_doomed_device(gpu, |backend, batch| {
-        let (set, options) = (SeedSet::default(), ScoreOptions { polish: Polish::All, ..ScoreOptions::default() });
-        let [found, expected] = [backend, &Backend::Cpu].map(|backend| backend.score(batch, &set, &options).unwrap().remove(0));
+        let (set, options) =
+            (SeedSet::default(), ScoreOptions { polish: Polish::All, ..ScoreOptions::default() });
+        let [found, expected] = [backend, &Backend::Cpu]
+            .map(|backend| backend.score(batch, &set, &options).unwrap().remove(0));
         let Backend::Gpu(gpu) = backend else { panic!("the backend changed") };
         assert!(gpu.chunks_redone() > 0);
-        let ((load, worst), (expected_load, expected_worst)) = (found.worst.unwrap(), expected.worst.unwrap());
+        let ((load, worst), (expected_load, expected_worst)) =
+            (found.worst.unwrap(), expected.worst.unwrap());
         assert_eq!((load, worst.status), (expected_load, expected_worst.status));
         for (a, b) in found.all.iter().zip(&expected.all) {
-            let same = a.mu_s.zip(b.mu_s).map_or(a.mu_s == b.mu_s, |(a, b)| (a / b - 1.0).abs() < 1e-9);
+            let same =
+                a.mu_s.zip(b.mu_s).map_or(a.mu_s == b.mu_s, |(a, b)| (a / b - 1.0).abs() < 1e-9);
             assert!(same && a.status == b.status, "{a:?} instead of {b:?}");
         }
     });
@@ -205,15 +263,25 @@ fn a_lost_device_is_an_error_under_gpu() {
     });
 }
 
-/// Outputs start as zeros, also in buffers used before: a record that no invocation wrote is found out.
+/// Outputs start as zeros, also in buffers used before: a record that no invocation wrote is found
+/// out.
 #[test]
 fn a_record_that_was_not_written_is_an_error() {
     let Some(gpu) = gpu(true) else { return };
     let set = SeedSet::default();
     let mut random = Random(19);
     let contact = random.contact();
-    let wrenches: Vec<Wrench> = (0..130).map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 }).collect();
-    let batch = Batch { problems: vec![Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches }] };
+    let wrenches: Vec<Wrench> = (0..130)
+        .map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 })
+        .collect();
+    let batch = Batch {
+        problems: vec![Problem {
+            contact: &contact,
+            distance: 0.03,
+            force: 20.0,
+            wrenches: &wrenches,
+        }],
+    };
     let job = Job::new(&batch, &set).unwrap();
     let run = |forget: bool| {
         let mut answers = vec![super::super::not_searched(SeedStatus::NoContact); job.loads];

@@ -41,7 +41,9 @@ impl Partial {
     /// Removes the file of a run that is finished.
     pub(super) fn remove(&self) -> Result<()> {
         match std::fs::remove_file(&self.path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(Error::io(&self.path, "remove", error)),
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(Error::io(&self.path, "remove", error))
+            }
             _ => Ok(()),
         }
     }
@@ -68,9 +70,14 @@ pub(super) struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Looks at all candidates; with `resume` at those that the unfinished run has left, if there is one.
+    /// Looks at all candidates; with `resume` at those that the unfinished run has left, if there
+    /// is one.
     pub(super) fn run(&self, proposer: &mut Proposer<'_>, resume: bool) -> anyhow::Result<Found> {
-        let mut found = Found { collector: Collector::default(), complete: true, backend: self.assessor.backend.name() };
+        let mut found = Found {
+            collector: Collector::default(),
+            complete: true,
+            backend: self.assessor.backend.name(),
+        };
         let mut best = self.race.then(|| Best::new(self.keep));
         let total = proposer.candidates();
         if let Some(partial) = self.partial {
@@ -98,7 +105,8 @@ impl Search<'_> {
         let mut done = proposer.progress();
         bar.set_position(done.candidates());
         bar.reset_eta();
-        let (mut saved, mut pause) = (Instant::now(), self.partial.map_or(Duration::MAX, |partial| partial.every));
+        let (mut saved, mut pause) =
+            (Instant::now(), self.partial.map_or(Duration::MAX, |partial| partial.every));
         while let Some(chunk) = proposer.next() {
             let proposed = chunk.grips.len();
             let scored = match &mut best {
@@ -136,7 +144,10 @@ impl Search<'_> {
         if !found.complete {
             self.note("interrupted: the ranking covers the candidates looked at so far");
             if let (true, Some(partial)) = (self.save(&done, &found), self.partial) {
-                self.note(&format!("wrote {}: the same command with --resume goes on from it", partial.path.display()));
+                self.note(&format!(
+                    "wrote {}: the same command with --resume goes on from it",
+                    partial.path.display()
+                ));
             }
         }
         Ok(found)
@@ -145,7 +156,8 @@ impl Search<'_> {
     /// Writes the state. A failure costs the state, not the run.
     fn save(&self, done: &Progress, found: &Found) -> bool {
         let Some(partial) = self.partial else { return false };
-        let written = Checkpoint::new(&partial.inputs, &found.backend, done, &found.collector).write(&partial.path);
+        let written = Checkpoint::new(&partial.inputs, &found.backend, done, &found.collector)
+            .write(&partial.path);
         if let Err(error) = &written {
             self.note(&format!("warning: this run cannot be resumed: {error}"));
         }
@@ -163,7 +175,8 @@ impl Search<'_> {
 fn stop_on_interrupt() -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
-    // A second handler in one process is refused; then an interrupt just ends the program, which is all right too.
+    // A second handler in one process is refused; then an interrupt just ends the program, which is
+    // all right too.
     let _ = ctrlc::set_handler(move || {
         if flag.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
@@ -178,7 +191,9 @@ fn progress_bar(total: u64, quiet: bool) -> ProgressBar {
         return ProgressBar::hidden();
     }
     let bar = ProgressBar::new(total);
-    if let Ok(style) = ProgressStyle::with_template("{bar:32} {human_pos}/{human_len} candidates  {per_sec}  {eta} left  {msg}") {
+    if let Ok(style) = ProgressStyle::with_template(
+        "{bar:32} {human_pos}/{human_len} candidates  {per_sec}  {eta} left  {msg}",
+    ) {
         bar.set_style(style);
     }
     bar

@@ -13,27 +13,49 @@ use gripfast::results::{Comparison, GripSet, RankedGrip};
 type Column<'a> = (&'static str, bool, Box<dyn Fn(&RankedGrip) -> String + 'a>);
 
 /// Summary and table; `shown` are grips of the set.
-pub(super) fn print(out: &mut impl Write, set: &GripSet, shown: &[&RankedGrip], gripper: &Gripper, force: f64) -> anyhow::Result<()> {
+pub(super) fn print(
+    out: &mut impl Write,
+    set: &GripSet,
+    shown: &[&RankedGrip],
+    gripper: &Gripper,
+    force: f64,
+) -> anyhow::Result<()> {
     summary(out, set, gripper, force)?;
     if set.grips.is_empty() {
         writeln!(out, "\nno grip holds this part: see the reasons above")?;
         if set.summary.pairs == 0 {
-            writeln!(out, "no two opposite planar faces lie within the stroke of {:.1} to {:.1} mm", gripper.stroke[0] * 1e3, gripper.stroke[1] * 1e3)?;
+            writeln!(
+                out,
+                "no two opposite planar faces lie within the stroke of {:.1} to {:.1} mm",
+                gripper.stroke[0] * 1e3,
+                gripper.stroke[1] * 1e3
+            )?;
         }
         return Ok(());
     }
     writeln!(out, "\n{}", grid(&columns(set, shown), shown))?;
     let friction = set.provenance.settings.get("pad_friction").and_then(serde_json::Value::as_f64);
-    writeln!(out, "\nmu_s: smallest friction coefficient that holds the worst load. Slip centre from the grip's middle in the pad plane.")?;
+    writeln!(
+        out,
+        "\nmu_s: smallest friction coefficient that holds the worst load. Slip centre from the grip's middle in the pad plane."
+    )?;
     if let Some(friction) = friction {
-        writeln!(out, "Pads with a friction of {friction}: gripping force needed for the worst load, and how far all of that load may grow (multiple).")?;
+        writeln!(
+            out,
+            "Pads with a friction of {friction}: gripping force needed for the worst load, and how far all of that load may grow (multiple)."
+        )?;
     }
     writeln!(out, "Position of the grip's middle in the part frame.")?;
     if shown.iter().any(|grip| !grip.merged.is_empty()) {
-        writeln!(out, "Rank (+n): stands for n more grips that a symmetry of the part maps to it (`merged` in the result file).")?;
+        writeln!(
+            out,
+            "Rank (+n): stands for n more grips that a symmetry of the part maps to it (`merged` in the result file)."
+        )?;
     }
     let number = |name: &str| set.provenance.settings.get(name).and_then(serde_json::Value::as_f64);
-    if let (Some(shift), Some(turn), Some(samples)) = (number("pose_noise_m"), number("pose_noise_rad"), number("noise_samples")) {
+    if let (Some(shift), Some(turn), Some(samples)) =
+        (number("pose_noise_m"), number("pose_noise_rad"), number("noise_samples"))
+    {
         let (shift, turn) = (shift * 1e3, turn.to_degrees());
         writeln!(
             out,
@@ -46,7 +68,12 @@ pub(super) fn print(out: &mut impl Write, set: &GripSet, shown: &[&RankedGrip], 
     Ok(())
 }
 
-fn summary(out: &mut impl Write, set: &GripSet, gripper: &Gripper, force: f64) -> std::io::Result<()> {
+fn summary(
+    out: &mut impl Write,
+    set: &GripSet,
+    gripper: &Gripper,
+    force: f64,
+) -> std::io::Result<()> {
     let mass = &set.part.mass;
     let size = (set.part.bbox_max - set.part.bbox_min) * 1e3;
     writeln!(
@@ -72,12 +99,25 @@ fn summary(out: &mut impl Write, set: &GripSet, gripper: &Gripper, force: f64) -
         set.summary.ranked
     )?;
     if let Some(outranked) = set.summary.rejections.get(OUTRANKED) {
-        writeln!(out, "{outranked} more were not solved: their bounds put them behind the best {}", set.grips.len())?;
+        writeln!(
+            out,
+            "{outranked} more were not solved: their bounds put them behind the best {}",
+            set.grips.len()
+        )?;
     }
-    let mut reasons: Vec<_> = set.summary.rejections.iter().filter(|(reason, _)| *reason != OUTRANKED).collect();
+    let mut reasons: Vec<_> =
+        set.summary.rejections.iter().filter(|(reason, _)| *reason != OUTRANKED).collect();
     if !reasons.is_empty() {
         reasons.sort_by(|a, b| b.1.cmp(a.1));
-        writeln!(out, "rejected: {}", reasons.iter().map(|(reason, count)| format!("{count} {}", reason.replace('_', " "))).collect::<Vec<_>>().join(", "))?;
+        writeln!(
+            out,
+            "rejected: {}",
+            reasons
+                .iter()
+                .map(|(reason, count)| format!("{count} {}", reason.replace('_', " ")))
+                .collect::<Vec<_>>()
+                .join(", ")
+        )?;
     }
     Ok(())
 }
@@ -86,30 +126,92 @@ fn columns<'a>(set: &'a GripSet, shown: &[&RankedGrip]) -> Vec<Column<'a>> {
     let mut columns: Vec<Column<'a>> = vec![
         ("rank", true, Box::new(rank)),
         ("id", true, Box::new(|grip| grip.grip.id.to_string())),
-        ("mu_s", true, Box::new(|grip| format!("{}{}", option(grip.worst.mu_s, 5), if grip.worst.status == Status::Ambiguous { "?" } else { "" }))),
+        (
+            "mu_s",
+            true,
+            Box::new(|grip| {
+                format!(
+                    "{}{}",
+                    option(grip.worst.mu_s, 5),
+                    if grip.worst.status == Status::Ambiguous { "?" } else { "" }
+                )
+            }),
+        ),
         ("safety", true, Box::new(|grip| option(grip.safety, 2))),
-        ("force needed", true, Box::new(|grip| grip.force_needed.map_or_else(|| "-".into(), |force| format!("{force:.2} N")))),
+        (
+            "force needed",
+            true,
+            Box::new(|grip| {
+                grip.force_needed.map_or_else(|| "-".into(), |force| format!("{force:.2} N"))
+            }),
+        ),
         ("multiple", true, Box::new(|grip| option(grip.load_multiple, 2))),
         ("worst load", false, Box::new(|grip| set.loads[grip.worst.load as usize].name.clone())),
         ("slip centre mm", false, Box::new(slip)),
         ("contact", true, Box::new(|grip| format!("{:.0} %", grip.contact_share * 100.0))),
         ("alpha", true, Box::new(|grip| format!("{:.1} deg", grip.alpha.to_degrees()))),
         ("score", true, Box::new(|grip| option(grip.score, 3))),
-        ("width mm", true, Box::new(|grip| format!("{}{:.2}", if grip.grip.inside { "inside " } else { "" }, grip.grip.width * 1e3))),
-        ("position mm", false, Box::new(|grip| tuple(&(grip.grip.part_from_grip.origin * 1e3).to_array()))),
+        (
+            "width mm",
+            true,
+            Box::new(|grip| {
+                format!(
+                    "{}{:.2}",
+                    if grip.grip.inside { "inside " } else { "" },
+                    grip.grip.width * 1e3
+                )
+            }),
+        ),
+        (
+            "position mm",
+            false,
+            Box::new(|grip| tuple(&(grip.grip.part_from_grip.origin * 1e3).to_array())),
+        ),
     ];
     if shown.iter().any(|grip| grip.pose_noise.is_some()) {
-        let lost = |value: Option<f64>| value.map_or_else(|| "lost".into(), |mu| format!("{mu:.5}"));
+        let lost =
+            |value: Option<f64>| value.map_or_else(|| "lost".into(), |mu| format!("{mu:.5}"));
         columns.extend::<[Column<'a>; 3]>([
-            ("noise 95 %", true, Box::new(move |grip| grip.pose_noise.map_or_else(|| "-".into(), |noise| lost(noise.mu_s_95)))),
-            ("worst", true, Box::new(move |grip| grip.pose_noise.map_or_else(|| "-".into(), |noise| lost(noise.mu_s_worst)))),
-            ("lost", true, Box::new(|grip| grip.pose_noise.map_or_else(|| "-".into(), |noise| percent(noise.lost, noise.samples)))),
+            (
+                "noise 95 %",
+                true,
+                Box::new(move |grip| {
+                    grip.pose_noise.map_or_else(|| "-".into(), |noise| lost(noise.mu_s_95))
+                }),
+            ),
+            (
+                "worst",
+                true,
+                Box::new(move |grip| {
+                    grip.pose_noise.map_or_else(|| "-".into(), |noise| lost(noise.mu_s_worst))
+                }),
+            ),
+            (
+                "lost",
+                true,
+                Box::new(|grip| {
+                    grip.pose_noise
+                        .map_or_else(|| "-".into(), |noise| percent(noise.lost, noise.samples))
+                }),
+            ),
         ]);
     }
     if shown.iter().any(|grip| grip.earlier.is_some()) {
         columns.extend::<[Column<'a>; 2]>([
-            ("earlier", true, Box::new(|grip| option(grip.earlier.as_ref().map(|earlier| earlier.evaluation), 3))),
-            ("place", true, Box::new(|grip| grip.earlier.as_ref().map_or_else(|| "-".into(), |earlier| earlier.place.to_string()))),
+            (
+                "earlier",
+                true,
+                Box::new(|grip| option(grip.earlier.as_ref().map(|earlier| earlier.evaluation), 3)),
+            ),
+            (
+                "place",
+                true,
+                Box::new(|grip| {
+                    grip.earlier
+                        .as_ref()
+                        .map_or_else(|| "-".into(), |earlier| earlier.place.to_string())
+                }),
+            ),
         ]);
     }
     columns
@@ -132,13 +234,24 @@ fn grid(columns: &[Column<'_>], shown: &[&RankedGrip]) -> Table {
 
 /// How the earlier method orders the same grips, and where the two differ most.
 fn compared(out: &mut impl Write, set: &GripSet, comparison: &Comparison) -> std::io::Result<()> {
-    let Comparison { grips, k1, k2, k3, epsilon_m, spearman, kendall_tau_b, risen, fallen } = comparison;
-    writeln!(out, "\nEarlier method (slip centre at the centroid): ({k1} Delta_d + {k2} tau_s/(mu_s N))/(D + {} mm) + {k3} alpha", epsilon_m * 1e3)?;
+    let Comparison { grips, k1, k2, k3, epsilon_m, spearman, kendall_tau_b, risen, fallen } =
+        comparison;
+    writeln!(
+        out,
+        "\nEarlier method (slip centre at the centroid): ({k1} Delta_d + {k2} tau_s/(mu_s N))/(D + {} mm) + {k3} alpha",
+        epsilon_m * 1e3
+    )?;
     match (spearman, kendall_tau_b) {
         (Some(spearman), Some(kendall)) => {
-            writeln!(out, "rank correlation with the score over the {grips} grips kept: Spearman {spearman:.4}, Kendall tau-b {kendall:.4}")?;
+            writeln!(
+                out,
+                "rank correlation with the score over the {grips} grips kept: Spearman {spearman:.4}, Kendall tau-b {kendall:.4}"
+            )?;
         }
-        _ => writeln!(out, "rank correlation over the {grips} grips kept: none, as all of them tie in one of the orders")?,
+        _ => writeln!(
+            out,
+            "rank correlation over the {grips} grips kept: none, as all of them tie in one of the orders"
+        )?,
     }
     if *grips < set.summary.ranked {
         writeln!(out, "({} grips hold; raise --keep to compare more of them)", set.summary.ranked)?;
@@ -147,18 +260,52 @@ fn compared(out: &mut impl Write, set: &GripSet, comparison: &Comparison) -> std
     let find = |id: &u64| set.grips.iter().zip(&places).find(|(ranked, _)| ranked.grip.id == *id);
     let columns: Vec<Column<'_>> = vec![
         ("id", true, Box::new(|grip| grip.grip.id.to_string())),
-        ("place", true, Box::new(|grip| find(&grip.grip.id).map_or_else(String::new, |(_, place)| place.to_string()))),
-        ("earlier", true, Box::new(|grip| grip.earlier.as_ref().map_or_else(String::new, |earlier| earlier.place.to_string()))),
+        (
+            "place",
+            true,
+            Box::new(|grip| {
+                find(&grip.grip.id).map_or_else(String::new, |(_, place)| place.to_string())
+            }),
+        ),
+        (
+            "earlier",
+            true,
+            Box::new(|grip| {
+                grip.earlier.as_ref().map_or_else(String::new, |earlier| earlier.place.to_string())
+            }),
+        ),
         ("mu_s", true, Box::new(|grip| option(grip.worst.mu_s, 5))),
-        ("earlier mu_s", true, Box::new(|grip| option(grip.earlier.as_ref().map(|earlier| earlier.mu_s), 5))),
-        ("slip centre moved", true, Box::new(|grip| moved(grip).map_or_else(|| "-".into(), |moved| format!("{:.2} mm", moved * 1e3)))),
-        ("from centre of mass", true, Box::new(|grip| grip.earlier.as_ref().map_or_else(String::new, |earlier| format!("{:.2} mm", earlier.distance * 1e3)))),
+        (
+            "earlier mu_s",
+            true,
+            Box::new(|grip| option(grip.earlier.as_ref().map(|earlier| earlier.mu_s), 5)),
+        ),
+        (
+            "slip centre moved",
+            true,
+            Box::new(|grip| {
+                moved(grip).map_or_else(|| "-".into(), |moved| format!("{:.2} mm", moved * 1e3))
+            }),
+        ),
+        (
+            "from centre of mass",
+            true,
+            Box::new(|grip| {
+                grip.earlier
+                    .as_ref()
+                    .map_or_else(String::new, |earlier| format!("{:.2} mm", earlier.distance * 1e3))
+            }),
+        ),
         ("contact", true, Box::new(|grip| format!("{:.0} %", grip.contact_share * 100.0))),
         ("alpha", true, Box::new(|grip| format!("{:.1} deg", grip.alpha.to_degrees()))),
         ("worst load", false, Box::new(|grip| set.loads[grip.worst.load as usize].name.clone())),
     ];
-    for (title, ids) in [("ranked higher than by the earlier method", risen), ("ranked lower than by the earlier method", fallen)] {
-        let shown: Vec<&RankedGrip> = ids.iter().filter_map(|id| find(id).map(|(ranked, _)| ranked)).collect();
+    for (title, ids) in [
+        ("ranked higher than by the earlier method", risen),
+        ("ranked lower than by the earlier method", fallen),
+    ] {
+        let shown: Vec<&RankedGrip> =
+            ids.iter().filter_map(|id| find(id).map(|(ranked, _)| ranked)).collect();
         if !shown.is_empty() {
             writeln!(out, "\n{title}:\n{}", grid(&columns, &shown))?;
         }
@@ -166,7 +313,8 @@ fn compared(out: &mut impl Write, set: &GripSet, comparison: &Comparison) -> std
     Ok(())
 }
 
-/// How far the slip centre lies from where the earlier method puts it [m]; infinite for a translation.
+/// How far the slip centre lies from where the earlier method puts it [m]; infinite for a
+/// translation.
 fn moved(grip: &RankedGrip) -> Option<f64> {
     let [x, y] = grip.earlier.as_ref()?.slip_centre;
     match grip.worst.slip? {
@@ -177,10 +325,15 @@ fn moved(grip: &RankedGrip) -> Option<f64> {
 }
 
 fn rank(grip: &RankedGrip) -> String {
-    if grip.merged.is_empty() { grip.rank.to_string() } else { format!("{} (+{})", grip.rank, grip.merged.len()) }
+    if grip.merged.is_empty() {
+        grip.rank.to_string()
+    } else {
+        format!("{} (+{})", grip.rank, grip.merged.len())
+    }
 }
 
-/// A slip centre farther off than this [m] is no different from a translation to anybody who reads a table.
+/// A slip centre farther off than this [m] is no different from a translation to anybody who reads
+/// a table.
 const SLIDES: f64 = 1e3;
 
 fn slip(grip: &RankedGrip) -> String {
@@ -202,6 +355,10 @@ fn percent(count: u32, all: u32) -> String {
 
 /// Numbers to two places in brackets, without negative zeros.
 fn tuple(numbers: &[f64]) -> String {
-    let text = numbers.iter().map(|x| format!("{x:.2}")).map(|x| if x == "-0.00" { "0.00".into() } else { x }).collect::<Vec<_>>();
+    let text = numbers
+        .iter()
+        .map(|x| format!("{x:.2}"))
+        .map(|x| if x == "-0.00" { "0.00".into() } else { x })
+        .collect::<Vec<_>>();
     format!("({})", text.join(", "))
 }

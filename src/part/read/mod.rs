@@ -35,10 +35,16 @@ pub(super) fn read(path: &Path) -> Result<Soup> {
     let (suffix, zipped) = suffix(path);
     let step = matches!(suffix.as_str(), "step" | "stp");
     if (step && !cfg!(feature = "step")) || matches!(suffix.as_str(), "iges" | "igs" | "brep") {
-        let build = if step { ", or build gripfast with `--features step` (needs Open CASCADE: Debian's libocct-data-exchange-dev)" } else { "" };
+        let build = if step {
+            ", or build gripfast with `--features step` (needs Open CASCADE: Debian's libocct-data-exchange-dev)"
+        } else {
+            ""
+        };
         return Err(Error::input(
             place,
-            format!("'.{suffix}' holds exact surfaces, not triangles; this build has no CAD kernel to tessellate them"),
+            format!(
+                "'.{suffix}' holds exact surfaces, not triangles; this build has no CAD kernel to tessellate them"
+            ),
             format!(
                 "convert it first, for example with the PyPI package cascadio: \
                  python3 -c \"import cascadio; cascadio.step_to_glb('part.step', 'part.glb', tol_linear=0.01)\", or export STL from the CAD system{build}"
@@ -51,8 +57,13 @@ pub(super) fn read(path: &Path) -> Result<Soup> {
         return Err(Error::input(place, "is a folder", "name a mesh file"));
     }
     let size = (!zipped).then_some(meta.len());
-    let reader: Box<dyn Read> = if zipped { Box::new(flate2::read::MultiGzDecoder::new(BufReader::new(file))) } else { Box::new(file) };
-    let mut source = Source { place, path, size, reader: BufReader::with_capacity(1 << 18, reader) };
+    let reader: Box<dyn Read> = if zipped {
+        Box::new(flate2::read::MultiGzDecoder::new(BufReader::new(file)))
+    } else {
+        Box::new(file)
+    };
+    let mut source =
+        Source { place, path, size, reader: BufReader::with_capacity(1 << 18, reader) };
     if source.peek()?.is_empty() {
         return Err(Error::input(source.place, "the file is empty", "export the part again"));
     }
@@ -65,11 +76,27 @@ pub(super) fn read(path: &Path) -> Result<Soup> {
         "gltf" | "glb" => gltf::read(&mut source)?,
         #[cfg(feature = "step")]
         "step" | "stp" => step::read(&mut source)?,
-        "" => return Err(Error::input(source.place, "the file name has no suffix to tell its format", format!("name it with one of: {KNOWN}"))),
-        _ => return Err(Error::input(source.place, format!("unknown mesh format '.{suffix}'"), format!("convert it to one of: {KNOWN}"))),
+        "" => {
+            return Err(Error::input(
+                source.place,
+                "the file name has no suffix to tell its format",
+                format!("name it with one of: {KNOWN}"),
+            ));
+        }
+        _ => {
+            return Err(Error::input(
+                source.place,
+                format!("unknown mesh format '.{suffix}'"),
+                format!("convert it to one of: {KNOWN}"),
+            ));
+        }
     };
     if soup.read == 0 {
-        return Err(Error::input(source.place, "holds no triangle", "export the part as a surface mesh"));
+        return Err(Error::input(
+            source.place,
+            "holds no triangle",
+            "export the part as a surface mesh",
+        ));
     }
     Ok(soup)
 }
@@ -78,14 +105,23 @@ pub(super) fn read(path: &Path) -> Result<Soup> {
 pub(super) fn stem(path: &Path) -> String {
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let lower = name.to_ascii_lowercase();
-    let cut = lower.strip_suffix(".gz").unwrap_or(&lower).rfind('.').filter(|&dot| dot > 0).unwrap_or(name.len());
+    let cut = lower
+        .strip_suffix(".gz")
+        .unwrap_or(&lower)
+        .rfind('.')
+        .filter(|&dot| dot > 0)
+        .unwrap_or(name.len());
     name[..cut].to_string()
 }
 
 /// Format suffix in lower case, and whether `.gz` follows it.
 fn suffix(path: &Path) -> (String, bool) {
-    let name = path.file_name().map(|name| name.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    let (name, zipped) = name.strip_suffix(".gz").map_or((name.as_str(), false), |inner| (inner, true));
+    let name = path
+        .file_name()
+        .map(|name| name.to_string_lossy().to_ascii_lowercase())
+        .unwrap_or_default();
+    let (name, zipped) =
+        name.strip_suffix(".gz").map_or((name.as_str(), false), |inner| (inner, true));
     (name.rsplit_once('.').map_or(String::new(), |(_, suffix)| suffix.to_string()), zipped)
 }
 
@@ -108,11 +144,14 @@ impl Source<'_> {
         Ok(self.reader.buffer())
     }
 
-    /// A damaged or unreadable stream: a decompression fault is bad input, anything else the system's.
+    /// A damaged or unreadable stream: a decompression fault is bad input, anything else the
+    /// system's.
     fn fault(&self, source: std::io::Error) -> Error {
         use std::io::ErrorKind::{InvalidData, InvalidInput, UnexpectedEof};
         match source.kind() {
-            InvalidData | InvalidInput | UnexpectedEof => self.bad(format!("the data are damaged: {source}"), "export or copy the file again"),
+            InvalidData | InvalidInput | UnexpectedEof => {
+                self.bad(format!("the data are damaged: {source}"), "export or copy the file again")
+            }
             _ => Error::io(self.path, "read", source),
         }
     }
@@ -123,31 +162,51 @@ impl Source<'_> {
     }
 
     /// Bad input at `where_` (line, triangle, vertex) of this file.
-    fn bad_at(&self, where_: impl std::fmt::Display, problem: impl Into<String>, remedy: &str) -> Error {
+    fn bad_at(
+        &self,
+        where_: impl std::fmt::Display,
+        problem: impl Into<String>,
+        remedy: &str,
+    ) -> Error {
         Error::input(format!("{}, {where_}", self.place), problem, remedy)
     }
 
     /// Refuses more triangles than can be indexed.
     fn check_count(&self, welder: &Welder) -> Result<()> {
         if welder.count() > MAX_TRIANGLES {
-            return Err(self.bad(format!("more than {MAX_TRIANGLES} triangles"), "decimate the mesh"));
+            return Err(
+                self.bad(format!("more than {MAX_TRIANGLES} triangles"), "decimate the mesh")
+            );
         }
         Ok(())
     }
 
-    /// Adds polygon `number` (from 1) of an indexed format, cut into triangles. Points and lines bound no material.
-    fn polygon(&self, welder: &mut Welder, vertices: &[DVec3], corners: &[u32], number: usize) -> Result<()> {
+    /// Adds polygon `number` (from 1) of an indexed format, cut into triangles. Points and lines
+    /// bound no material.
+    fn polygon(
+        &self,
+        welder: &mut Welder,
+        vertices: &[DVec3],
+        corners: &[u32],
+        number: usize,
+    ) -> Result<()> {
         let corner = |index: u32| {
             vertices.get(index as usize).copied().ok_or_else(|| {
-                let problem = format!("refers to vertex {index} (counted from 0), but there are {}", vertices.len());
+                let problem = format!(
+                    "refers to vertex {index} (counted from 0), but there are {}",
+                    vertices.len()
+                );
                 self.bad_at(format!("face {number}"), problem, "repair the file or export it again")
             })
         };
         match *corners {
             [a, b, c] => welder.triangle([corner(a)?, corner(b)?, corner(c)?]),
             _ => {
-                let points = corners.iter().map(|&index| corner(index)).collect::<Result<Vec<DVec3>>>()?;
-                polygon::triangulate(&points, |triangle| welder.triangle(triangle.map(|k| points[k])));
+                let points =
+                    corners.iter().map(|&index| corner(index)).collect::<Result<Vec<DVec3>>>()?;
+                polygon::triangulate(&points, |triangle| {
+                    welder.triangle(triangle.map(|k| points[k]))
+                });
             }
         }
         self.check_count(welder)
@@ -158,7 +217,11 @@ impl Source<'_> {
         if position.is_finite() {
             Ok(position)
         } else {
-            Err(self.bad_at(format!("vertex {number}"), format!("coordinates {position} are not finite"), "repair the file or export it again"))
+            Err(self.bad_at(
+                format!("vertex {number}"),
+                format!("coordinates {position} are not finite"),
+                "repair the file or export it again",
+            ))
         }
     }
 }

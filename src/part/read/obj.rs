@@ -9,13 +9,19 @@ use crate::error::Result;
 use crate::part::weld::{Soup, Welder};
 
 pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
-    let options = tobj::LoadOptions { triangulate: false, single_index: false, ..Default::default() };
+    let options =
+        tobj::LoadOptions { triangulate: false, single_index: false, ..Default::default() };
     let mut lines = CountLines { inner: &mut source.reader, lines: 0 };
     // Materials say nothing about the shape: every material file is taken as empty.
     let loaded = tobj::load_obj_buf(&mut lines, &options, |_| Ok(Default::default()));
     let line = lines.lines;
-    let (models, _) = loaded
-        .map_err(|fault| source.bad_at(format!("line {line}"), format!("not a readable OBJ file: {fault}"), "repair the line or export the part again"))?;
+    let (models, _) = loaded.map_err(|fault| {
+        source.bad_at(
+            format!("line {line}"),
+            format!("not a readable OBJ file: {fault}"),
+            "repair the line or export the part again",
+        )
+    })?;
     let mut welder = Welder::default();
     let mut vertices = Vec::new();
     let (mut vertex, mut face) = (0, 0);
@@ -24,7 +30,8 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
         vertices.clear();
         for position in mesh.positions.chunks_exact(3) {
             vertex += 1;
-            let position = DVec3::new(f64::from(position[0]), f64::from(position[1]), f64::from(position[2]));
+            let position =
+                DVec3::new(f64::from(position[0]), f64::from(position[1]), f64::from(position[2]));
             vertices.push(source.finite(position, vertex)?);
         }
         let mut rest = mesh.indices.as_slice();

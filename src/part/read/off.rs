@@ -22,7 +22,11 @@ impl Lines<'_, '_> {
     fn next(&mut self, what: &str) -> Result<&str> {
         loop {
             let mut bytes = Vec::new();
-            let count = self.source.reader.read_until(b'\n', &mut bytes).map_err(|fault| self.source.fault(fault))?;
+            let count = self
+                .source
+                .reader
+                .read_until(b'\n', &mut bytes)
+                .map_err(|fault| self.source.fault(fault))?;
             if count == 0 {
                 return Err(self.source.bad_at(
                     format!("line {}", self.number),
@@ -31,7 +35,12 @@ impl Lines<'_, '_> {
                 ));
             }
             self.number += 1;
-            self.line = String::from_utf8_lossy(&bytes).split('#').next().unwrap_or_default().trim().to_string();
+            self.line = String::from_utf8_lossy(&bytes)
+                .split('#')
+                .next()
+                .unwrap_or_default()
+                .trim()
+                .to_string();
             if !self.line.is_empty() {
                 return Ok(&self.line);
             }
@@ -49,7 +58,10 @@ impl Lines<'_, '_> {
         if numbers.len() == count {
             Ok(numbers)
         } else {
-            Err(self.bad(format!("'{}' does not begin with {count} numbers", self.line.chars().take(40).collect::<String>())))
+            Err(self.bad(format!(
+                "'{}' does not begin with {count} numbers",
+                self.line.chars().take(40).collect::<String>()
+            )))
         }
     }
 }
@@ -59,10 +71,16 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
     let header = lines.next("'OFF'")?.to_string();
     let mut words = header.split_ascii_whitespace();
     let keyword = words.next().unwrap_or_default().trim_start_matches('\u{feff}');
-    // COFF, NOFF, STOFF and their mixtures carry more numbers after the coordinates; four and n dimensions are no solids.
-    let known = keyword.strip_suffix("OFF").is_some_and(|prefix| prefix.chars().all(|letter| "STCN".contains(letter)));
+    // COFF, NOFF, STOFF and their mixtures carry more numbers after the coordinates; four and n
+    // dimensions are no solids.
+    let known = keyword
+        .strip_suffix("OFF")
+        .is_some_and(|prefix| prefix.chars().all(|letter| "STCN".contains(letter)));
     if !known || words.clone().any(|word| word.eq_ignore_ascii_case("binary")) {
-        return Err(lines.source.bad("is no OFF text file in three dimensions", "export the part as OFF text, or as STL"));
+        return Err(lines.source.bad(
+            "is no OFF text file in three dimensions",
+            "export the part as OFF text, or as STL",
+        ));
     }
     if words.next().is_some() {
         lines.line = header.trim_start_matches('\u{feff}')[keyword.len()..].trim().to_string(); // the counts stand on the same line

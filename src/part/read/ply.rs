@@ -10,7 +10,9 @@ use crate::part::weld::{Soup, Welder};
 
 pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
     if !source.peek()?.starts_with(b"ply") {
-        return Err(source.bad("does not begin with 'ply': not a PLY file", "export the part as PLY again"));
+        return Err(
+            source.bad("does not begin with 'ply': not a PLY file", "export the part as PLY again")
+        );
     }
     let place = source.place.clone();
     let fault = |reader: &Reader<_>, fault: ParseError| {
@@ -22,23 +24,34 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
         )
     };
     let mut reader = Reader::new(&mut source.reader);
-    let header = Parser::<Skip>::new().read_header(&mut reader).map_err(|error| fault(&reader, error))?;
+    let header =
+        Parser::<Skip>::new().read_header(&mut reader).map_err(|error| fault(&reader, error))?;
     let (mut points, mut faces, mut has_faces) = (Vec::new(), Vec::new(), false);
     for (_, element) in &header.elements {
         match element.name.as_str() {
-            "vertex" => points = Parser::<Point>::new().read_payload_for_element(&mut reader, element, &header).map_err(|error| fault(&reader, error))?,
+            "vertex" => {
+                points = Parser::<Point>::new()
+                    .read_payload_for_element(&mut reader, element, &header)
+                    .map_err(|error| fault(&reader, error))?
+            }
             "face" | "tri" => {
                 has_faces = true;
-                faces = Parser::<Face>::new().read_payload_for_element(&mut reader, element, &header).map_err(|error| fault(&reader, error))?;
+                faces = Parser::<Face>::new()
+                    .read_payload_for_element(&mut reader, element, &header)
+                    .map_err(|error| fault(&reader, error))?;
             }
             _ => {
-                let skipped = Parser::<Skip>::new().read_payload_for_element(&mut reader, element, &header);
+                let skipped =
+                    Parser::<Skip>::new().read_payload_for_element(&mut reader, element, &header);
                 skipped.map_err(|error| fault(&reader, error))?;
             }
         }
     }
     if !has_faces {
-        return Err(source.bad("holds points but no 'face' element", "export a surface mesh, not a point cloud or triangle strips"));
+        return Err(source.bad(
+            "holds points but no 'face' element",
+            "export a surface mesh, not a point cloud or triangle strips",
+        ));
     }
     let mut vertices = Vec::with_capacity(points.len());
     for (index, point) in points.iter().enumerate() {
@@ -63,7 +76,9 @@ impl PropertyAccess for Point {
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let Some(axis) = ["x", "y", "z"].iter().position(|&axis| axis == name) else { return PropertyAccessResult::Ignored };
+        let Some(axis) = ["x", "y", "z"].iter().position(|&axis| axis == name) else {
+            return PropertyAccessResult::Ignored;
+        };
         self.0[axis] = match property {
             Property::Float(value) => f64::from(value),
             Property::Double(value) => value,
@@ -90,12 +105,17 @@ impl PropertyAccess for Face {
         if !matches!(name, "vertex_index" | "vertex_indices") {
             return PropertyAccessResult::Ignored;
         }
-        // A negative index becomes one that surely does not exist and is refused with the face's number.
+        // A negative index becomes one that surely does not exist and is refused with the face's
+        // number.
         let signed = |value: i64| u32::try_from(value).unwrap_or(u32::MAX);
         self.0 = match property {
-            Property::ListChar(list) => list.into_iter().map(|index| signed(index.into())).collect(),
+            Property::ListChar(list) => {
+                list.into_iter().map(|index| signed(index.into())).collect()
+            }
             Property::ListUChar(list) => list.into_iter().map(u32::from).collect(),
-            Property::ListShort(list) => list.into_iter().map(|index| signed(index.into())).collect(),
+            Property::ListShort(list) => {
+                list.into_iter().map(|index| signed(index.into())).collect()
+            }
             Property::ListUShort(list) => list.into_iter().map(u32::from).collect(),
             Property::ListInt(list) => list.into_iter().map(|index| signed(index.into())).collect(),
             Property::ListUInt(list) => list,

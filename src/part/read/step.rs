@@ -32,7 +32,10 @@ unsafe extern "C" {
     ) -> c_int;
 }
 
-#[allow(unsafe_code, reason = "called back with the welder and nine numbers that `read` and step.cpp own for the call")]
+#[allow(
+    unsafe_code,
+    reason = "called back with the welder and nine numbers that `read` and step.cpp own for the call"
+)]
 extern "C" fn take(user: *mut c_void, nine: *const c_double) {
     let (welder, nine) = unsafe { (&mut *user.cast::<Welder>(), &*nine.cast::<[[f64; 3]; 3]>()) };
     welder.triangle(nine.map(DVec3::from_array));
@@ -46,11 +49,17 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
     }
     let start = String::from_utf8_lossy(&bytes[..bytes.len().min(256)]);
     if !start.trim_start_matches(['\u{feff}', ' ', '\t', '\r', '\n']).starts_with("ISO-10303-21") {
-        return Err(source.bad("is not a STEP file: it does not begin with ISO-10303-21", "export the part again"));
+        return Err(source.bad(
+            "is not a STEP file: it does not begin with ISO-10303-21",
+            "export the part again",
+        ));
     }
     let mut welder = Welder::default();
     let mut message = [0_u8; 256];
-    #[allow(unsafe_code, reason = "pointers and lengths of live buffers; the callback gets the welder back")]
+    #[allow(
+        unsafe_code,
+        reason = "pointers and lengths of live buffers; the callback gets the welder back"
+    )]
     let left_out = unsafe {
         gripfast_step(
             bytes.as_ptr().cast(),
@@ -65,14 +74,20 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
         )
     };
     if left_out < 0 {
-        let message = CStr::from_bytes_until_nul(&message).map_or_else(|_| "unreadable".into(), CStr::to_string_lossy);
-        return Err(source.bad(format!("cannot be read as STEP: {message}"), "export the part again as STEP AP203, AP214 or AP242, or as a mesh"));
+        let message = CStr::from_bytes_until_nul(&message)
+            .map_or_else(|_| "unreadable".into(), CStr::to_string_lossy);
+        return Err(source.bad(
+            format!("cannot be read as STEP: {message}"),
+            "export the part again as STEP AP203, AP214 or AP242, or as a mesh",
+        ));
     }
     source.check_count(&welder)?;
     let warnings = match left_out {
         0 => Vec::new(),
         1 => vec!["1 face of the STEP file could not be tessellated and is missing".to_string()],
-        many => vec![format!("{many} faces of the STEP file could not be tessellated and are missing")],
+        many => {
+            vec![format!("{many} faces of the STEP file could not be tessellated and are missing")]
+        }
     };
     Ok(welder.finish(Some(Unit::Millimetre), warnings))
 }

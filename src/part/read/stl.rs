@@ -1,5 +1,5 @@
-//! STL: binary records by `stl_io`; the text form here, because the library stops at the first `endsolid`, refuses
-//! upper case and cannot say the line of a fault.
+//! STL: binary records by `stl_io`; the text form here, because the library stops at the first
+//! `endsolid`, refuses upper case and cannot say the line of a fault.
 
 use std::io::{BufRead, Read, Seek, SeekFrom};
 
@@ -20,35 +20,52 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
     let start = &start[..start.len().min(1024)];
     let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start).trim_ascii_start();
     let is_solid = text.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
-    // Binary files from some systems begin with `solid` too, but text has no control bytes, and the size tells exactly.
+    // Binary files from some systems begin with `solid` too, but text has no control bytes, and the
+    // size tells exactly.
     let is_text = !start.iter().any(|&byte| byte < 9 || (14..32).contains(&byte));
-    let exact = start.len() >= HEADER && size == Some(HEADER as u64 + RECORD * u64::from(stated_count(start)));
+    let exact = start.len() >= HEADER
+        && size == Some(HEADER as u64 + RECORD * u64::from(stated_count(start)));
     if is_solid && is_text && !exact {
         ascii(source)
     } else if is_text && !exact {
-        Err(source.bad("is a text file, but does not begin with 'solid': not an STL file", "export the part as STL again"))
+        Err(source.bad(
+            "is a text file, but does not begin with 'solid': not an STL file",
+            "export the part as STL again",
+        ))
     } else {
         binary(source)
     }
 }
 
 fn stated_count(start: &[u8]) -> u32 {
-    start.get(80..84).map_or(0, |bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
+    start
+        .get(80..84)
+        .map_or(0, |bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
 }
 
 fn binary(source: &mut Source<'_>) -> Result<Soup> {
     let start = source.peek()?;
     if start.len() < HEADER {
         let length = start.len();
-        return Err(source.bad(format!("{length} bytes are no STL file (a binary one has at least {HEADER})"), "export the part again"));
+        return Err(source.bad(
+            format!("{length} bytes are no STL file (a binary one has at least {HEADER})"),
+            "export the part again",
+        ));
     }
     let count = stated_count(start);
     let mut warnings = Vec::new();
     if let Some(size) = source.size {
         let held = (size - HEADER as u64) / RECORD;
-        let remedy = "the export or the copy was cut short, or the file is no STL: export the part again";
+        let remedy =
+            "the export or the copy was cut short, or the file is no STL: export the part again";
         if held < u64::from(count) {
-            return Err(source.bad(format!("states {count} triangles but ends within triangle {} (byte {size})", held + 1), remedy));
+            return Err(source.bad(
+                format!(
+                    "states {count} triangles but ends within triangle {} (byte {size})",
+                    held + 1
+                ),
+                remedy,
+            ));
         }
         if count == 0 && held > 0 {
             return Err(source.bad(format!("states 0 triangles but holds data for {held}"), remedy));
@@ -69,7 +86,13 @@ fn binary(source: &mut Source<'_>) -> Result<Soup> {
                     None => break None,
                     Some(Err(fault)) => break Some(Fault::Read(fault)),
                     Some(Ok(triangle)) => {
-                        let corners = triangle.vertices.map(|vertex| DVec3::new(f64::from(vertex.0[0]), f64::from(vertex.0[1]), f64::from(vertex.0[2])));
+                        let corners = triangle.vertices.map(|vertex| {
+                            DVec3::new(
+                                f64::from(vertex.0[0]),
+                                f64::from(vertex.0[1]),
+                                f64::from(vertex.0[2]),
+                            )
+                        });
                         if let Some(&corner) = corners.iter().find(|corner| !corner.is_finite()) {
                             break Some(Fault::NotFinite(corner));
                         }
@@ -87,11 +110,20 @@ fn binary(source: &mut Source<'_>) -> Result<Soup> {
         None => Ok(welder.finish(None, warnings)),
         Some(Fault::NotFinite(corner)) => {
             let byte = HEADER as u64 + RECORD * (triangle as u64 - 1);
-            Err(source.bad_at(format!("triangle {triangle} (byte {byte})"), format!("corner {corner} is not finite"), "repair the mesh or export it again"))
+            Err(source.bad_at(
+                format!("triangle {triangle} (byte {byte})"),
+                format!("corner {corner} is not finite"),
+                "repair the mesh or export it again",
+            ))
         }
-        Some(Fault::TooMany) => Err(source.bad(format!("more than {} triangles", triangle - 1), "decimate the mesh")),
+        Some(Fault::TooMany) => {
+            Err(source.bad(format!("more than {} triangles", triangle - 1), "decimate the mesh"))
+        }
         Some(Fault::Read(fault)) if fault.kind() == std::io::ErrorKind::UnexpectedEof => {
-            Err(source.bad(format!("states {count} triangles but ends within triangle {triangle}"), "export or copy the file again"))
+            Err(source.bad(
+                format!("states {count} triangles but ends within triangle {triangle}"),
+                "export or copy the file again",
+            ))
         }
         Some(Fault::Read(fault)) => Err(source.fault(fault)),
     }
@@ -103,8 +135,9 @@ enum Fault {
     TooMany,
 }
 
-/// Gives `stl_io` the stream with a line end as first header byte, so that it never takes a binary file whose header
-/// begins with `solid` for text, and with the rewind that its look at the first line needs.
+/// Gives `stl_io` the stream with a line end as first header byte, so that it never takes a binary
+/// file whose header begins with `solid` for text, and with the rewind that its look at the first
+/// line needs.
 struct Rewind<'a, R> {
     inner: &'a mut R,
     /// First bytes, kept for the rewind.
@@ -175,40 +208,74 @@ fn ascii(source: &mut Source<'_>) -> Result<Soup> {
             "vertex" => {
                 let mut values = [0.0; 3];
                 for value in &mut values {
-                    let word = words.next().ok_or_else(|| source.bad_at(place(), "a vertex needs three numbers", REMEDY))?;
-                    *value = number_of(word).ok_or_else(|| source.bad_at(place(), format!("'{}' is not a number", shorten(word)), REMEDY))?;
+                    let word = words.next().ok_or_else(|| {
+                        source.bad_at(place(), "a vertex needs three numbers", REMEDY)
+                    })?;
+                    *value = number_of(word).ok_or_else(|| {
+                        source.bad_at(
+                            place(),
+                            format!("'{}' is not a number", shorten(word)),
+                            REMEDY,
+                        )
+                    })?;
                     if !value.is_finite() {
-                        return Err(source.bad_at(place(), format!("coordinate '{}' is not finite", shorten(word)), REMEDY));
+                        return Err(source.bad_at(
+                            place(),
+                            format!("coordinate '{}' is not finite", shorten(word)),
+                            REMEDY,
+                        ));
                     }
                 }
-                let count: &mut usize = filled.as_mut().ok_or_else(|| source.bad_at(place(), "'vertex' outside of 'outer loop'", REMEDY))?;
-                *corners.get_mut(*count).ok_or_else(|| source.bad_at(place(), "more than three vertices in a facet", REMEDY))? = DVec3::from_array(values);
+                let count: &mut usize = filled.as_mut().ok_or_else(|| {
+                    source.bad_at(place(), "'vertex' outside of 'outer loop'", REMEDY)
+                })?;
+                *corners.get_mut(*count).ok_or_else(|| {
+                    source.bad_at(place(), "more than three vertices in a facet", REMEDY)
+                })? = DVec3::from_array(values);
                 *count += 1;
             }
             "outer" => filled = Some(0),
             "endloop" => {
                 if filled.take() != Some(3) {
-                    return Err(source.bad_at(place(), "a facet with fewer than three vertices", REMEDY));
+                    return Err(source.bad_at(
+                        place(),
+                        "a facet with fewer than three vertices",
+                        REMEDY,
+                    ));
                 }
                 source.check_count(&welder)?;
                 welder.triangle(corners);
             }
             "solid" | "facet" | "endfacet" | "endsolid" | "color" => {}
-            _ => return Err(source.bad_at(place(), format!("'{}' is no word of the STL format", shorten(keyword)), REMEDY)),
+            _ => {
+                return Err(source.bad_at(
+                    place(),
+                    format!("'{}' is no word of the STL format", shorten(keyword)),
+                    REMEDY,
+                ));
+            }
         }
     }
     if filled.is_some() {
-        return Err(source.bad_at(format!("line {number}"), "the file ends within a facet", "the file was cut short: export or copy it again"));
+        return Err(source.bad_at(
+            format!("line {number}"),
+            "the file ends within a facet",
+            "the file was cut short: export or copy it again",
+        ));
     }
     Ok(welder.finish(None, Vec::new()))
 }
 
-/// A coordinate. Nine significant digits or fewer are a 32-bit value as writers print it: it is rounded back, so that the
-/// text and the binary form of a mesh are the same mesh.
+/// A coordinate. Nine significant digits or fewer are a 32-bit value as writers print it: it is
+/// rounded back, so that the text and the binary form of a mesh are the same mesh.
 fn number_of(word: &str) -> Option<f64> {
     let value: f64 = word.parse().ok()?;
     let mantissa = word.split(['e', 'E']).next().unwrap_or(word);
-    let digits = mantissa.trim_start_matches(['+', '-', '0', '.']).bytes().filter(u8::is_ascii_digit).count();
+    let digits = mantissa
+        .trim_start_matches(['+', '-', '0', '.'])
+        .bytes()
+        .filter(u8::is_ascii_digit)
+        .count();
     Some(if digits <= 9 { f64::from(value as f32) } else { value })
 }
 

@@ -5,8 +5,8 @@ use glam::DVec2;
 use crate::geometry::{Bounds2, ring_area};
 use crate::model::Ring;
 
-/// Boundary within this share of the pad's size inside the pad's outline counts as flush with it: above all rounding of
-/// the arithmetic, below anything that could be felt (0.02 nm on 20 mm).
+/// Boundary within this share of the pad's size inside the pad's outline counts as flush with it:
+/// above all rounding of the arithmetic, below anything that could be felt (0.02 nm on 20 mm).
 pub(super) const FLUSH: f64 = 1e-9;
 
 /// A pad outline turned to an approach angle, about the grip origin.
@@ -16,7 +16,8 @@ pub(in crate::propose) struct TurnedPad {
     pub(super) ring: Ring,
     /// The outline drawn in by the flush tolerance: the clip window.
     pub(super) window: Ring,
-    /// Unit outward normals and distances of the window's sides; side `k` runs from corner `k` to `k + 1`.
+    /// Unit outward normals and distances of the window's sides; side `k` runs from corner `k` to
+    /// `k + 1`.
     pub(super) sides: Vec<(DVec2, f64)>,
     pub(super) bounds: Bounds2,
     pub(super) area: f64,
@@ -87,5 +88,11 @@ pub(super) fn clip_edge(edge: u32, a: DVec2, b: DVec2, sides: &[(DVec2, f64)]) -
         }
     }
     let at = |t: f64| a + (b - a) * t;
-    Some(Piece { edge, start: if entry.is_some() { at(low) } else { a }, end: if exit.is_some() { at(high) } else { b }, entry, exit })
+    Some(Piece {
+        edge,
+        start: if entry.is_some() { at(low) } else { a },
+        end: if exit.is_some() { at(high) } else { b },
+        entry,
+        exit,
+    })
 }

@@ -8,9 +8,10 @@ use crate::geometry::{Bounds2, contains, ring_area};
 use crate::model::{Patch, Polygon, Ring};
 
 impl PatchIndex {
-    /// Area of the patch in the window from the collected pieces, by Green's theorem: the pieces, and the stretches of the
-    /// window's outline between an exit and the next entry. `None` when the crossings do not alternate or two of them
-    /// coincide, where rounding could have mixed them up.
+    /// Area of the patch in the window from the collected pieces, by Green's theorem: the pieces,
+    /// and the stretches of the window's outline between an exit and the next entry. `None` when
+    /// the crossings do not alternate or two of them coincide, where rounding could have mixed them
+    /// up.
     pub(super) fn area(&self, pad: &TurnedPad, place: DVec2, scratch: &mut Scratch) -> Option<f64> {
         scratch.events.clear();
         let along = |side: usize, point: DVec2| {
@@ -18,9 +19,16 @@ impl PatchIndex {
             (point - a).dot(b - a) / (b - a).length_squared()
         };
         for (index, piece) in scratch.pieces.iter().enumerate() {
-            for (side, point, entry) in [(piece.entry, piece.start, true), (piece.exit, piece.end, false)] {
+            for (side, point, entry) in
+                [(piece.entry, piece.start, true), (piece.exit, piece.end, false)]
+            {
                 if let Some(side) = side {
-                    scratch.events.push(Event { side, along: along(side, point), piece: index as u32, entry });
+                    scratch.events.push(Event {
+                        side,
+                        along: along(side, point),
+                        piece: index as u32,
+                        entry,
+                    });
                 }
             }
         }
@@ -28,12 +36,15 @@ impl PatchIndex {
         let count = scratch.events.len();
         for index in 0..count {
             let (event, following) = (scratch.events[index], scratch.events[(index + 1) % count]);
-            let tied = count > 1 && event.side == following.side && (event.along - following.along).abs() < 1e-12;
+            let tied = count > 1
+                && event.side == following.side
+                && (event.along - following.along).abs() < 1e-12;
             if event.entry == following.entry || tied {
                 return None;
             }
         }
-        let mut twice: f64 = scratch.pieces.iter().map(|piece| piece.start.perp_dot(piece.end)).sum();
+        let mut twice: f64 =
+            scratch.pieces.iter().map(|piece| piece.start.perp_dot(piece.end)).sum();
         for (index, from) in scratch.events.iter().enumerate().filter(|(_, event)| !event.entry) {
             let to = &scratch.events[(index + 1) % count];
             let mut at = scratch.pieces[from.piece as usize].end;
@@ -43,15 +54,16 @@ impl PatchIndex {
             }
             twice += at.perp_dot(scratch.pieces[to.piece as usize].start);
         }
-        // Without a crossing, the outline itself bounds the contact when its corner lies on the face.
+        // Without a crossing, the outline itself bounds the contact when its corner lies on the
+        // face.
         if count == 0 && self.contains(pad.window[0] + place) {
             twice += 2.0 * ring_area(&pad.window);
         }
         Some(twice / 2.0)
     }
 
-    /// Joins the pieces that [`PatchIndex::area`] has sorted along the window's outline to closed loops; `false` where they do
-    /// not join.
+    /// Joins the pieces that [`PatchIndex::area`] has sorted along the window's outline to closed
+    /// loops; `false` where they do not join.
     pub(super) fn walk(&self, pad: &TurnedPad, place: DVec2, scratch: &mut Scratch) -> bool {
         scratch.points.clear();
         scratch.ends.clear();
@@ -68,7 +80,11 @@ impl PatchIndex {
             loop {
                 // From a piece with an exit, on along the outline to the next entry.
                 let Some(last) = self.follow(piece, scratch) else { return false };
-                let Some(exit) = scratch.events.iter().position(|event| !event.entry && event.piece == last) else { return false };
+                let Some(exit) =
+                    scratch.events.iter().position(|event| !event.entry && event.piece == last)
+                else {
+                    return false;
+                };
                 let (from, to) = (scratch.events[exit], scratch.events[(exit + 1) % count]);
                 scratch.points.extend(corners_between(pad, &from, &to));
                 piece = to.piece;
@@ -88,13 +104,15 @@ impl PatchIndex {
             if scratch.visited[index as usize] {
                 continue;
             }
-            if scratch.pieces[index as usize].entry.is_some() || !self.follow_closed(index, scratch) {
+            if scratch.pieces[index as usize].entry.is_some() || !self.follow_closed(index, scratch)
+            {
                 return false;
             }
             scratch.ends.push(scratch.points.len());
             has_inner = true;
         }
-        // Without a crossing, the outline itself bounds the contact when its corner lies on the face.
+        // Without a crossing, the outline itself bounds the contact when its corner lies on the
+        // face.
         if !crossed && has_inner && self.contains(pad.window[0] + place) {
             scratch.points.extend_from_slice(&pad.window);
             scratch.ends.push(scratch.points.len());
@@ -123,7 +141,10 @@ impl PatchIndex {
         let mut piece = first;
         loop {
             let current = scratch.pieces[piece as usize];
-            if current.entry.is_some() || current.exit.is_some() || std::mem::replace(&mut scratch.visited[piece as usize], true) {
+            if current.entry.is_some()
+                || current.exit.is_some()
+                || std::mem::replace(&mut scratch.visited[piece as usize], true)
+            {
                 return false;
             }
             scratch.points.push(current.start);
@@ -144,7 +165,11 @@ impl PatchIndex {
 }
 
 /// Corners of the window passed on the way along its outline from one crossing to another.
-fn corners_between<'p>(pad: &'p TurnedPad, from: &Event, to: &Event) -> impl Iterator<Item = DVec2> + use<'p> {
+fn corners_between<'p>(
+    pad: &'p TurnedPad,
+    from: &Event,
+    to: &Event,
+) -> impl Iterator<Item = DVec2> + use<'p> {
     let sides = pad.window.len();
     let mut steps = (to.side + sides - from.side) % sides;
     if steps == 0 && to.along < from.along {
@@ -154,24 +179,37 @@ fn corners_between<'p>(pad: &'p TurnedPad, from: &Event, to: &Event) -> impl Ite
     (1..=steps).map(move |step| pad.window[(first + step) % sides])
 }
 
-/// The loops of the last walk, or the library's outline, as proper polygons, relative to the pad's origin and turned by `-angle`,
-/// that is in the grip frame.
+/// The loops of the last walk, or the library's outline, as proper polygons, relative to the pad's
+/// origin and turned by `-angle`, that is in the grip frame.
 pub(super) fn outline(scratch: &Scratch, angle: f64) -> Patch {
     let turn = DVec2::from_angle(-angle);
-    let turned = |ring: &[DVec2]| -> Ring { ring.iter().map(|&point| turn.rotate(point)).collect() };
+    let turned =
+        |ring: &[DVec2]| -> Ring { ring.iter().map(|&point| turn.rotate(point)).collect() };
     if let Some(patch) = &scratch.fallback {
-        return patch.iter().map(|polygon| Polygon { outer: turned(&polygon.outer), holes: polygon.holes.iter().map(|hole| turned(hole)).collect() }).collect();
+        return patch
+            .iter()
+            .map(|polygon| Polygon {
+                outer: turned(&polygon.outer),
+                holes: polygon.holes.iter().map(|hole| turned(hole)).collect(),
+            })
+            .collect();
     }
     let solid = |ring: &&[DVec2]| {
         let size = Bounds2::of(*ring).size().max_element();
         ring_area(ring).abs() > SLIVER * size * size
     };
-    let (outer, holes): (Vec<&[DVec2]>, Vec<&[DVec2]>) = loops(scratch).filter(solid).partition(|ring| ring_area(ring) > 0.0);
-    let mut patch: Patch = outer.iter().map(|ring| Polygon { outer: ring.to_vec(), holes: Vec::new() }).collect();
+    let (outer, holes): (Vec<&[DVec2]>, Vec<&[DVec2]>) =
+        loops(scratch).filter(solid).partition(|ring| ring_area(ring) > 0.0);
+    let mut patch: Patch =
+        outer.iter().map(|ring| Polygon { outer: ring.to_vec(), holes: Vec::new() }).collect();
     for hole in holes {
         // The smallest outer loop around it: islands may lie in holes.
-        let around = (0..patch.len()).filter(|&index| contains(&Polygon { outer: outer[index].to_vec(), holes: Vec::new() }, hole[0]));
-        if let Some(index) = around.min_by(|&a, &b| ring_area(outer[a]).total_cmp(&ring_area(outer[b]))) {
+        let around = (0..patch.len()).filter(|&index| {
+            contains(&Polygon { outer: outer[index].to_vec(), holes: Vec::new() }, hole[0])
+        });
+        if let Some(index) =
+            around.min_by(|&a, &b| ring_area(outer[a]).total_cmp(&ring_area(outer[b])))
+        {
             patch[index].holes.push(hole.to_vec());
         }
     }

@@ -8,15 +8,16 @@ use crate::geometry::polygon::{self, rings};
 use crate::model::Polygon;
 use crate::propose::ProposeOptions;
 
-/// Corners of the overlap that turn by less are points of a tessellated curve, not places of their own.
+/// Corners of the overlap that turn by less are points of a tessellated curve, not places of their
+/// own.
 const CORNER: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// At most this many corners of one site become positions.
 const MOST_CORNERS: usize = 200;
 /// At most this many edge directions of one site become approach angles (four each).
 const MOST_EDGE_DIRECTIONS: usize = 4;
 
-/// Directions of the boundary modulo a right angle, in `(-45, 45]` degrees, with the length that runs along each,
-/// longest first.
+/// Directions of the boundary modulo a right angle, in `(-45, 45]` degrees, with the length that
+/// runs along each, longest first.
 fn edge_directions(patch: &[Polygon]) -> Vec<(f64, f64)> {
     let right_angle = std::f64::consts::FRAC_PI_2;
     let mut found: Vec<(f64, f64)> = Vec::new();
@@ -51,7 +52,8 @@ fn edge_directions(patch: &[Polygon]) -> Vec<(f64, f64)> {
     merged
 }
 
-/// Angle of the site's `x` in the axes of the direction: along the boundary's main direction, when it has one.
+/// Angle of the site's `x` in the axes of the direction: along the boundary's main direction, when
+/// it has one.
 pub(super) fn main_direction(overlap: &[Polygon]) -> f64 {
     let perimeter: f64 = edge_directions(overlap).iter().map(|direction| direction.1).sum();
     match edge_directions(overlap).first() {
@@ -83,10 +85,16 @@ pub(super) fn angles(overlap: &[Polygon], options: &ProposeOptions, pad: f64) ->
     angles
 }
 
-/// A grid over the overlap, its corners and centroids, and the point nearest the centre of mass. `reach` is half the pad's longer side:
-/// where the overlap is lower than the pad, the grid goes on beyond its edges until the pad leaves as much of it uncovered as it
-/// covers: a low wall is held from above by pads that stand clear of the floor.
-pub(super) fn positions(overlap: &[Polygon], spacing: f64, reach: f64, centre_of_mass: DVec2) -> Vec<DVec2> {
+/// A grid over the overlap, its corners and centroids, and the point nearest the centre of mass.
+/// `reach` is half the pad's longer side: where the overlap is lower than the pad, the grid goes on
+/// beyond its edges until the pad leaves as much of it uncovered as it covers: a low wall is held
+/// from above by pads that stand clear of the floor.
+pub(super) fn positions(
+    overlap: &[Polygon],
+    spacing: f64,
+    reach: f64,
+    centre_of_mass: DVec2,
+) -> Vec<DVec2> {
     let bounds = polygon::bounds(overlap);
     let index = PatchIndex::new(overlap.to_vec(), bounds.grown(1.6 * reach), reach / 2.0);
     let beyond = (DVec2::splat(2.0 * reach) - bounds.size()).max(DVec2::ZERO) / 2.0;
@@ -130,7 +138,14 @@ pub(super) fn positions(overlap: &[Polygon], spacing: f64, reach: f64, centre_of
     };
     for point in extra {
         let useful = point.is_finite() && !index.is_far(point, reach / 2.0);
-        if useful && !on_grid(point) && !positions.iter().rev().take(2 * MOST_CORNERS + 8).any(|known| known.distance(point) < near) {
+        if useful
+            && !on_grid(point)
+            && !positions
+                .iter()
+                .rev()
+                .take(2 * MOST_CORNERS + 8)
+                .any(|known| known.distance(point) < near)
+        {
             positions.push(point);
         }
     }
@@ -196,13 +211,24 @@ mod tests {
     fn the_main_direction_is_that_of_the_edges() {
         for degrees in [-44.0_f64, -10.0, 0.0, 10.0, 44.0] {
             let angle = degrees.to_radians();
-            let turned: Vec<DVec2> = rectangle(DVec2::new(3.0, 1.0)).iter().map(|&point| DVec2::from_angle(angle).rotate(point)).collect();
+            let turned: Vec<DVec2> = rectangle(DVec2::new(3.0, 1.0))
+                .iter()
+                .map(|&point| DVec2::from_angle(angle).rotate(point))
+                .collect();
             assert!((main_direction(&[shape(turned)]) - angle).abs() < 1e-9, "{degrees}");
         }
-        let circle: Vec<DVec2> = (0..64).map(|k| DVec2::from_angle(f64::from(k) * std::f64::consts::TAU / 64.0)).collect();
+        let circle: Vec<DVec2> = (0..64)
+            .map(|k| DVec2::from_angle(f64::from(k) * std::f64::consts::TAU / 64.0))
+            .collect();
         assert_eq!(main_direction(&[shape(circle)]), 0.0);
-        let square = [shape(rectangle(DVec2::ONE).iter().map(|&point| DVec2::from_angle(0.2).rotate(point)).collect())];
-        let options = ProposeOptions { angle_step: std::f64::consts::FRAC_PI_2, ..ProposeOptions::default() };
+        let square = [shape(
+            rectangle(DVec2::ONE)
+                .iter()
+                .map(|&point| DVec2::from_angle(0.2).rotate(point))
+                .collect(),
+        )];
+        let options =
+            ProposeOptions { angle_step: std::f64::consts::FRAC_PI_2, ..ProposeOptions::default() };
         let found = angles(&square, &options, 0.5);
         assert_eq!(found.len(), 8, "{found:?}");
     }

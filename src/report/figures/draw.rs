@@ -7,7 +7,10 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::shapes;
-use super::studies::{BAR_MASS, BarRow, DistanceSweep, FORCE, LINE_SHARE, LineRow, SHAPE_MOMENT, SIDE, SeparationSweep, ShapeRow, Trend};
+use super::studies::{
+    BAR_MASS, BarRow, DistanceSweep, FORCE, LINE_SHARE, LineRow, SHAPE_MOMENT, SIDE,
+    SeparationSweep, ShapeRow, Trend,
+};
 use crate::error::{Error, Result};
 use crate::model::Patch;
 
@@ -28,7 +31,8 @@ const SHAPE: RGBColor = RGBColor(205, 220, 232);
 
 const FONT: &str = "sans-serif";
 
-/// Drawing units per pixel: plotters rounds to whole units, which shows as steps in a curve drawn at one.
+/// Drawing units per pixel: plotters rounds to whole units, which shows as steps in a curve drawn
+/// at one.
 const FINE: i32 = 8;
 const FINE_U: u32 = FINE as u32;
 
@@ -37,7 +41,8 @@ fn svg((width, height): (u32, u32), draw: impl FnOnce(&Area<'_>) -> Outcome) -> 
     let mut text = String::new();
     let (fine_width, fine_height) = (width * FINE_U, height * FINE_U);
     {
-        let root = SVGBackend::with_string(&mut text, (fine_width, fine_height)).into_drawing_area();
+        let root =
+            SVGBackend::with_string(&mut text, (fine_width, fine_height)).into_drawing_area();
         let drawn = root.fill(&PAPER).and_then(|()| draw(&root)).and_then(|()| root.present());
         drawn.map_err(|error| Error::input("figure", error.to_string(), "report this"))?;
     }
@@ -85,7 +90,9 @@ fn chart(area: &Area<'_>, axes: Axes<'_>, curves: &[Curve<'_>]) -> Outcome {
         let style = ShapeStyle::from(curve.colour).stroke_width(curve.width * FINE_U);
         let series = chart.draw_series(LineSeries::new(curve.points.iter().copied(), style))?;
         if !curve.label.is_empty() {
-            series.label(curve.label).legend(move |(x, y)| PathElement::new([(x, y), (x + 20 * FINE, y)], style));
+            series
+                .label(curve.label)
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 20 * FINE, y)], style));
         }
     }
     if curves.iter().any(|curve| !curve.label.is_empty()) {
@@ -108,7 +115,9 @@ fn shape_panel(area: &Area<'_>, patch: &Patch, title: &str, caption: &str) -> Ou
     let scale = 0.62 * width / SIDE;
     let at = |x: DVec2| fine(width / 2.0 + scale * x.x, 38.0 + 0.31 * width - scale * x.y);
     for polygon in patch {
-        for (ring, fill) in std::iter::once((&polygon.outer, SHAPE)).chain(polygon.holes.iter().map(|hole| (hole, PAPER))) {
+        for (ring, fill) in std::iter::once((&polygon.outer, SHAPE))
+            .chain(polygon.holes.iter().map(|hole| (hole, PAPER)))
+        {
             let mut points: Vec<(i32, i32)> = ring.iter().map(|&x| at(x)).collect();
             area.draw(&Polygon::new(points.clone(), fill.filled()))?;
             points.extend_from_within(..2);
@@ -127,7 +136,9 @@ fn fine(x: f64, y: f64) -> (i32, i32) {
 /// Text centred below a point given in pixels.
 fn text(area: &Area<'_>, text: &str, (x, y): (f64, f64), size: i32) -> Outcome {
     use plotters::style::text_anchor::{HPos, Pos, VPos};
-    let style = TextStyle::from((FONT, size * FINE).into_font()).color(&INK).pos(Pos::new(HPos::Center, VPos::Top));
+    let style = TextStyle::from((FONT, size * FINE).into_font())
+        .color(&INK)
+        .pos(Pos::new(HPos::Center, VPos::Top));
     area.draw(&Text::new(text.to_owned(), fine(x, y), style))
 }
 
@@ -136,31 +147,46 @@ pub(super) fn figure_5(rows: &[ShapeRow]) -> Result<String> {
     svg((900, 700), |root| {
         let (top, bottom) = root.split_vertically(270 * FINE);
         let panels = top.split_evenly((1, 3));
-        let near = |shape: &str, parameter: f64| rows.iter().find(|row| row.shape == shape && (row.parameter - parameter).abs() < 1e-9);
+        let near = |shape: &str, parameter: f64| {
+            rows.iter().find(|row| row.shape == shape && (row.parameter - parameter).abs() < 1e-9)
+        };
         let shown = [
             ("a: square", shapes::square(SIDE), near("square", 0.0)),
             ("b: hollow square, hole 1/2", shapes::hollow(SIDE, 0.5), near("hollow", 0.5)),
             ("c: cross, arms 1/3", shapes::cross(SIDE, 1.0 / 3.0), near("cross", 1.0 / 3.0)),
         ];
         for (panel, (title, patch, row)) in panels.iter().zip(shown) {
-            let caption = row.map_or(String::new(), |row| format!("mu_s = {:.4} ({:+.1} %)", row.mu_s, 100.0 * (row.ratio - 1.0)));
+            let caption = row.map_or(String::new(), |row| {
+                format!("mu_s = {:.4} ({:+.1} %)", row.mu_s, 100.0 * (row.ratio - 1.0))
+            });
             shape_panel(panel, &patch, title, &caption)?;
         }
         let curve = |shape: &str, label, colour| Curve {
             label,
             colour,
             width: 3,
-            points: rows.iter().filter(|row| row.shape == shape).map(|row| (row.parameter, row.ratio)).collect(),
+            points: rows
+                .iter()
+                .filter(|row| row.shape == shape)
+                .map(|row| (row.parameter, row.ratio))
+                .collect(),
         };
-        let title = format!("mu_s over the square's, under a moment of {SHAPE_MOMENT} N m about the closing axis ({FORCE} N, side 20 mm)");
+        let title = format!(
+            "mu_s over the square's, under a moment of {SHAPE_MOMENT} N m about the closing axis ({FORCE} N, side 20 mm)"
+        );
         let axes = Axes {
             title: &title,
             x: ("side of the hole, or width of the arms, over the side of the square", 0.0..1.0),
             y: ("mu_s / mu_s of the square", 0.6..1.6),
             legend: SeriesLabelPosition::UpperRight,
         };
-        let square = Curve { label: "square", colour: INK, width: 1, points: vec![(0.0, 1.0), (1.0, 1.0)] };
-        chart(&bottom, axes, &[square, curve("hollow", "hollow square", BLUE), curve("cross", "cross", ORANGE)])
+        let square =
+            Curve { label: "square", colour: INK, width: 1, points: vec![(0.0, 1.0), (1.0, 1.0)] };
+        chart(
+            &bottom,
+            axes,
+            &[square, curve("hollow", "hollow square", BLUE), curve("cross", "cross", ORANGE)],
+        )
     })
 }
 
@@ -180,7 +206,14 @@ pub(super) fn figure_6(rows: &[BarRow]) -> Result<String> {
             y: ("mu_s", 0.0..0.7),
             legend: SeriesLabelPosition::UpperLeft,
         };
-        chart(root, axes, &[curve("slip centre at the centroid (earlier method)", ORANGE, 4, |row| row.old), curve("true slip centre", BLUE, 2, |row| row.new)])
+        chart(
+            root,
+            axes,
+            &[
+                curve("slip centre at the centroid (earlier method)", ORANGE, 4, |row| row.old),
+                curve("true slip centre", BLUE, 2, |row| row.new),
+            ],
+        )
     })
 }
 
@@ -197,7 +230,9 @@ pub(super) fn figure_4(rows: &[LineRow]) -> Result<String> {
         text(&left, "face I: the pad is lifted below each line", (210.0, 40.0), 15)?;
         text(&left, "axis of the out-of-plane moment: horizontal", (210.0, 402.0), 13)?;
         for (moment, colour) in shown.iter().zip(colours) {
-            let Some(row) = rows.iter().find(|row| (row.moment - moment).abs() < 1e-9) else { continue };
+            let Some(row) = rows.iter().find(|row| (row.moment - moment).abs() < 1e-9) else {
+                continue;
+            };
             if let Some([a, b]) = zero_line(row.pressure) {
                 left.draw(&PathElement::new([at(a), at(b)], colour.stroke_width(3 * FINE_U)))?;
             }
@@ -207,7 +242,10 @@ pub(super) fn figure_4(rows: &[LineRow]) -> Result<String> {
         left.draw(&PathElement::new(outline, INK.stroke_width(2 * FINE_U)))?;
         for (k, (moment, colour)) in shown.iter().zip(colours).enumerate() {
             let x = 44.0 + 76.0 * k as f64;
-            left.draw(&PathElement::new([fine(x, 444.0), fine(x + 20.0, 444.0)], colour.stroke_width(3 * FINE_U)))?;
+            left.draw(&PathElement::new(
+                [fine(x, 444.0), fine(x + 20.0, 444.0)],
+                colour.stroke_width(3 * FINE_U),
+            ))?;
             text(&left, &format!("{moment} N m"), (x + 10.0, 452.0), 12)?;
         }
         let title = format!("M1 = {LINE_SHARE} of twist-out, faces one side apart, {FORCE} N");
@@ -227,8 +265,10 @@ fn zero_line([a0, a1, a2]: [f64; 3]) -> Option<[DVec2; 2]> {
     let ring = &shapes::square(SIDE)[0].outer;
     let value = |x: DVec2| a0 + a1 * x.x + a2 * x.y;
     let edges = ring.iter().zip(ring.iter().cycle().skip(1));
-    let cuts: Vec<DVec2> =
-        edges.filter(|(a, b)| (value(**a) < 0.0) != (value(**b) < 0.0)).map(|(a, b)| a.lerp(*b, value(*a) / (value(*a) - value(*b)))).collect();
+    let cuts: Vec<DVec2> = edges
+        .filter(|(a, b)| (value(**a) < 0.0) != (value(**b) < 0.0))
+        .map(|(a, b)| a.lerp(*b, value(*a) / (value(*a) - value(*b))))
+        .collect();
     <[DVec2; 2]>::try_from(cuts).ok()
 }
 
@@ -245,15 +285,35 @@ pub(super) fn distance(sweeps: &[DistanceSweep]) -> Result<String> {
                 values().fold(0.0, f64::max) / values().fold(f64::INFINITY, f64::min)
             };
             let mut of_kind = sweeps.iter().filter(|sweep| sweep.trend == trend);
-            let most = if trend == Trend::Constant { of_kind.next() } else { of_kind.max_by(|a, b| change(a).total_cmp(&change(b))) };
-            shown.extend(most.map(|sweep| (sweep, format!("{}, {}, {:.2}", sweep.shape, sweep.load, sweep.moment_share))));
+            let most = if trend == Trend::Constant {
+                of_kind.next()
+            } else {
+                of_kind.max_by(|a, b| change(a).total_cmp(&change(b)))
+            };
+            shown.extend(most.map(|sweep| {
+                (sweep, format!("{}, {}, {:.2}", sweep.shape, sweep.load, sweep.moment_share))
+            }));
         }
         let curves = |value: fn(&DistanceSweep, usize) -> f64| -> Vec<Curve<'_>> {
-            let of = |sweep: &DistanceSweep| (0..sweep.points.len()).map(|i| (sweep.points[i][0], value(sweep, i))).collect();
-            shown.iter().zip(colours).map(|((sweep, label), colour)| Curve { label, colour, width: 2, points: of(sweep) }).collect()
+            let of = |sweep: &DistanceSweep| {
+                (0..sweep.points.len()).map(|i| (sweep.points[i][0], value(sweep, i))).collect()
+            };
+            shown
+                .iter()
+                .zip(colours)
+                .map(|((sweep, label), colour)| Curve {
+                    label,
+                    colour,
+                    width: 2,
+                    points: of(sweep),
+                })
+                .collect()
         };
         let ratio = curves(|sweep, i| sweep.points[i][1] / sweep.points[0][1]);
-        let (low, high) = ratio.iter().flat_map(|curve| &curve.points).fold((1.0_f64, 1.0_f64), |(low, high), point| (low.min(point.1), high.max(point.1)));
+        let (low, high) = ratio
+            .iter()
+            .flat_map(|curve| &curve.points)
+            .fold((1.0_f64, 1.0_f64), |(low, high), point| (low.min(point.1), high.max(point.1)));
         let margin = 0.05 * (high - low);
         let axes = Axes {
             title: "mu_s (shape, load in the pad plane, share of twist-out)",

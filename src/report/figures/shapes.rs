@@ -25,20 +25,39 @@ pub fn square(side: f64) -> Patch {
 /// A square with a square hole whose side is `share` of its own.
 pub fn hollow(side: f64, share: f64) -> Patch {
     let hole = rectangle_ring(share * side, share * side);
-    vec![Polygon { outer: rectangle_ring(side, side), holes: vec![hole.into_iter().rev().collect()] }]
+    vec![Polygon {
+        outer: rectangle_ring(side, side),
+        holes: vec![hole.into_iter().rev().collect()],
+    }]
 }
 
 /// A cross of two bars of width `share` of the side: the square with its corners removed.
 pub fn cross(side: f64, share: f64) -> Patch {
     let (a, b) = (share * side / 2.0, side / 2.0);
-    let outer = ring(&[(a, -b), (a, -a), (b, -a), (b, a), (a, a), (a, b), (-a, b), (-a, a), (-b, a), (-b, -a), (-a, -a), (-a, -b)]);
+    let outer = ring(&[
+        (a, -b),
+        (a, -a),
+        (b, -a),
+        (b, a),
+        (a, a),
+        (a, b),
+        (-a, b),
+        (-a, a),
+        (-b, a),
+        (-b, -a),
+        (-a, -a),
+        (-a, -b),
+    ]);
     vec![Polygon { outer, holes: vec![] }]
 }
 
 /// An L: the square without its upper right quarter.
 pub fn ell(side: f64) -> Patch {
     let h = side / 2.0;
-    vec![Polygon { outer: ring(&[(-h, -h), (h, -h), (h, 0.0), (0.0, 0.0), (0.0, h), (-h, h)]), holes: vec![] }]
+    vec![Polygon {
+        outer: ring(&[(-h, -h), (h, -h), (h, 0.0), (0.0, 0.0), (0.0, h), (-h, h)]),
+        holes: vec![],
+    }]
 }
 
 /// A triangle on the square's lower side, its apex off the middle.

@@ -1,4 +1,5 @@
-//! The numbers behind the figures: each study of the paper's section 5 and its figure 4, computed anew.
+//! The numbers behind the figures: each study of the paper's section 5 and its figure 4, computed
+//! anew.
 
 use glam::{DVec2, DVec3};
 
@@ -45,7 +46,13 @@ pub const SHAPE_MOMENT: f64 = 0.2;
 pub fn figure_5() -> Result<Vec<ShapeRow>> {
     let row = |shape, parameter, patch: Patch| -> Result<ShapeRow> {
         let score = solve(&shapes::both(&patch), SIDE, [0.0; 3], [0.0, 0.0, SHAPE_MOMENT])?;
-        Ok(ShapeRow { shape, parameter, area_share: score.contact_area_i / (SIDE * SIDE), mu_s: score.mu_s.unwrap_or(f64::NAN), ratio: 1.0 })
+        Ok(ShapeRow {
+            shape,
+            parameter,
+            area_share: score.contact_area_i / (SIDE * SIDE),
+            mu_s: score.mu_s.unwrap_or(f64::NAN),
+            ratio: 1.0,
+        })
     };
     let mut rows = vec![row("square", 0.0, shapes::square(SIDE))?];
     let mut shares: Vec<f64> = (1..=19).map(|i| f64::from(i) / 20.0).chain([1.0 / 3.0]).collect();
@@ -88,7 +95,11 @@ pub fn figure_6() -> Result<Vec<BarRow>> {
         let (force, moment) = ([0.0, -weight, 0.0], [0.0, 0.0, -weight * distance]);
         let wrench = Wrench { force: DVec3::from_array(force), moment: DVec3::from_array(moment) };
         let old = wolter::solve(&contact, SIDE, FORCE, &wrench)?;
-        Ok(BarRow { distance, new: solve(&contact, SIDE, force, moment)?.mu_s.unwrap_or(f64::NAN), old: old.mu_s.unwrap_or(f64::NAN) })
+        Ok(BarRow {
+            distance,
+            new: solve(&contact, SIDE, force, moment)?.mu_s.unwrap_or(f64::NAN),
+            old: old.mu_s.unwrap_or(f64::NAN),
+        })
     };
     (0..=200).map(|i| row(5e-4 * f64::from(i))).collect()
 }
@@ -118,7 +129,10 @@ pub const LINE_SHARE: f64 = 0.6;
 pub fn figure_4() -> Result<Vec<LineRow>> {
     let contact = shapes::both(&shapes::square(SIDE));
     let mut rows = Vec::new();
-    for moment in [0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8] {
+    for moment in [
+        0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7,
+        0.75, 0.8,
+    ] {
         let score = solve(&contact, SIDE, [0.0; 3], [LINE_SHARE * FORCE * SIDE, 0.0, moment])?;
         let (Some(mu_s), Some(p)) = (score.mu_s, score.pressure) else { continue };
         rows.push(LineRow {
@@ -154,7 +168,8 @@ pub struct DistanceSweep {
     pub moment_share: f64,
     /// The load in the pad plane.
     pub load: &'static str,
-    /// Distance over the side, `mu_s`, share of the smaller contact; ends where no limit state exists.
+    /// Distance over the side, `mu_s`, share of the smaller contact; ends where no limit state
+    /// exists.
     pub points: Vec<[f64; 3]>,
     /// What happened to `mu_s`.
     pub trend: Trend,
@@ -177,8 +192,9 @@ const IN_PLANE: [(&str, [f64; 3]); 6] = [
 /// Relative change that counts as a change.
 const CHANGE: f64 = 1e-9;
 
-/// Paper 5.1: 108 sweeps of the distance between the faces from 0 to 5 sides: six shapes, out-of-plane moments about
-/// `x1` of 0.25, 0.5 and 0.75 of twist-out, six loads in the pad plane about the area's centroid.
+/// Paper 5.1: 108 sweeps of the distance between the faces from 0 to 5 sides: six shapes,
+/// out-of-plane moments about `x1` of 0.25, 0.5 and 0.75 of twist-out, six loads in the pad plane
+/// about the area's centroid.
 ///
 /// # Errors
 /// As [`figure_5`].
@@ -197,9 +213,21 @@ pub fn distance_sweeps() -> Result<Vec<DistanceSweep>> {
                     let Some(mu_s) = score.mu_s else { break };
                     ambiguous += usize::from(score.status == Status::Ambiguous);
                     residual = residual.max(score.residual);
-                    points.push([ratio, mu_s, score.contact_area_i.min(score.contact_area_ii) / area(&patch)]);
+                    points.push([
+                        ratio,
+                        mu_s,
+                        score.contact_area_i.min(score.contact_area_ii) / area(&patch),
+                    ]);
                 }
-                sweeps.push(DistanceSweep { shape, moment_share, load, trend: trend(&points), points, ambiguous, residual });
+                sweeps.push(DistanceSweep {
+                    shape,
+                    moment_share,
+                    load,
+                    trend: trend(&points),
+                    points,
+                    ambiguous,
+                    residual,
+                });
             }
         }
     }
@@ -223,15 +251,18 @@ pub struct SeparationSweep {
     pub shape: &'static str,
     /// Direction in the pad plane in which the pressure resultants are displaced [rad].
     pub direction: f64,
-    /// Moment over the one that twists the part out, share of the smaller contact, rounds of the paper's iteration.
+    /// Moment over the one that twists the part out, share of the smaller contact, rounds of the
+    /// paper's iteration.
     pub points: Vec<(f64, f64, u32)>,
 }
 
 /// Moments of the separation sweeps, over twist-out.
-const MOMENT_SHARES: [f64; 14] = [0.1, 0.2, 0.3, 0.34, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.999];
+const MOMENT_SHARES: [f64; 14] =
+    [0.1, 0.2, 0.3, 0.34, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.999];
 
-/// Paper 3.6: 30 sweeps of an out-of-plane moment up to twist-out, six shapes in five directions, with the number of
-/// rounds that the paper's iteration (solve, clip at the zero-pressure line, solve again) takes to settle.
+/// Paper 3.6: 30 sweeps of an out-of-plane moment up to twist-out, six shapes in five directions,
+/// with the number of rounds that the paper's iteration (solve, clip at the zero-pressure line,
+/// solve again) takes to settle.
 ///
 /// # Errors
 /// As [`figure_5`].
@@ -256,13 +287,16 @@ pub fn separation_sweeps() -> Result<Vec<SeparationSweep>> {
     Ok(sweeps)
 }
 
-/// Rounds of the paper's iteration for the scaled moment `target`, until the pressure stays to 1e-10.
+/// Rounds of the paper's iteration for the scaled moment `target`, until the pressure stays to
+/// 1e-10.
 fn clip_and_solve(pads: &Pads, target: DVec2) -> u32 {
     let wanted = nalgebra::Vector4::new(1.0, 1.0, target.x, target.y);
     let mut areas = pads.areas.clone();
     let mut before = nalgebra::Vector4::zeros();
     for round in 1..=1000 {
-        let Some(q) = stiffness(&areas.each_ref().map(moments)).lu().solve(&wanted) else { return round };
+        let Some(q) = stiffness(&areas.each_ref().map(moments)).lu().solve(&wanted) else {
+            return round;
+        };
         if (q - before).amax() <= 1e-10 * q.amax() {
             return round;
         }
@@ -281,7 +315,11 @@ fn centred(patch: &Patch) -> Contact {
     let m = moments(&Loops::new(patch));
     let centroid = DVec2::new(m[1], m[2]) / m[0];
     let mut patch = patch.clone();
-    for point in patch.iter_mut().flat_map(|polygon| std::iter::once(&mut polygon.outer).chain(&mut polygon.holes)).flatten() {
+    for point in patch
+        .iter_mut()
+        .flat_map(|polygon| std::iter::once(&mut polygon.outer).chain(&mut polygon.holes))
+        .flatten()
+    {
         *point -= centroid;
     }
     shapes::both(&patch)
