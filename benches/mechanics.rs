@@ -11,8 +11,9 @@ use std::time::Duration;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DVec2, DVec3};
 use gripfast::contact::Loops;
+use gripfast::lab::{earlier, paper};
 use gripfast::mechanics::slip::{self, Field};
-use gripfast::mechanics::{Options, Pads, Refiner, paper, solve, solve_pads, wolter};
+use gripfast::mechanics::{Options, Pads, Refiner, solve, solve_pads};
 use gripfast::model::{Contact, Patch, Polygon, Score, Status, Wrench};
 use nalgebra::Vector3;
 
@@ -288,7 +289,7 @@ fn methods(criterion: &mut Criterion) {
         (
             "centroid method",
             Box::new(|case| {
-                wolter::solve(&case.contact, case.distance, FORCE, &case.wrench).unwrap()
+                earlier::solve(&case.contact, case.distance, FORCE, &case.wrench).unwrap()
             }),
         ),
     ];

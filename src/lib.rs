@@ -6,12 +6,14 @@
 
 pub mod backend;
 pub mod case;
+pub(crate) mod clash;
 pub mod contact;
 pub mod error;
 pub mod export;
 pub mod file;
 pub mod geometry;
 pub mod gripper;
+pub mod lab;
 pub mod load;
 pub mod mechanics;
 pub mod model;

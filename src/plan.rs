@@ -4,7 +4,6 @@
 //! [`Settings::keep`] stay.
 
 pub mod checkpoint;
-pub mod compare;
 pub mod noise;
 
 use std::collections::BTreeMap;

@@ -54,11 +54,11 @@ export GRIPFAST_PYTHON="$PWD/target/readers/bin/python"
 export GRIPFAST_GPU=require GRIPFAST_READERS=require
 
 cargo fmt --check
-cargo clippy --all-targets --features full --quiet -- -D warnings
+cargo clippy --workspace --all-targets --features full --quiet -- -D warnings
 features=full
 if [ -f /usr/include/opencascade/Standard_Version.hxx ] && command -v c++ >/dev/null; then
     features=full,step
 else
-    echo "SKIPPED: STEP files: install libocct-data-exchange-dev, libocct-modeling-algorithms-dev and g++ (cargo test --features step)"
+    echo "SKIPPED: STEP files: install libocct-data-exchange-dev, libocct-modeling-algorithms-dev and g++ (cargo test --workspace --features step)"
 fi
-cargo test --features "$features" --no-fail-fast
+cargo test --workspace --features "$features" --no-fail-fast

@@ -5,13 +5,11 @@
 pub mod equilibrium;
 pub mod inverse;
 pub mod pads;
-pub mod paper;
 pub mod pressure;
 pub mod shanno;
 pub mod slip;
 pub mod states;
 pub mod twist_out;
-pub mod wolter;
 
 use nalgebra::Vector3;
 
@@ -122,7 +120,7 @@ pub fn limit_states(
         .collect())
 }
 
-fn check(contact: &Contact, distance: f64, force: f64, wrench: &Wrench) -> Result<()> {
+pub(crate) fn check(contact: &Contact, distance: f64, force: f64, wrench: &Wrench) -> Result<()> {
     let bad = |what: &str, value: String, allowed: &str| {
         Err(Error::input(what, format!("is {value}"), format!("give {allowed}")))
     };

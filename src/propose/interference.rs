@@ -10,8 +10,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::sweep::Sweep;
-use super::tree::Tree;
+use crate::clash::sweep::Sweep;
+use crate::clash::tree::Tree;
 
 /// The part as seen from the grip axes at one angle: tree axes turned by the angle about the
 /// closing axis.

@@ -11,14 +11,10 @@ mod displace;
 mod environment;
 mod explain;
 mod interference;
-pub(crate) mod nearby;
-pub(crate) mod obstacle;
 mod options;
 mod patch;
 mod progress;
 mod site;
-mod sweep;
-mod tree;
 mod work;
 
 use std::collections::BTreeMap;
@@ -33,6 +29,8 @@ pub use explain::{Check, Explanation, SiteInfo};
 pub use options::{Cone, Ground, ProposeOptions, Rejection};
 pub use progress::Progress;
 
+use crate::clash::sweep::{Motion, Sweep, sweeps};
+use crate::clash::tree::{Topology, Tree};
 use crate::error::{Error, Result};
 use crate::gripper::Gripper;
 use crate::model::{Contact, Grip, Polygon};
@@ -40,8 +38,6 @@ use crate::part::{FacePair, PairKind, Part};
 use environment::Environment;
 use patch::PatchIndex;
 use site::Site;
-use sweep::{Motion, Sweep, sweeps};
-use tree::{Topology, Tree};
 
 /// Positions per work item: large enough to share what an angle determines, small enough to spread
 /// over the threads. Fixed, because contacts are shared within an item: results must not depend on

@@ -5,7 +5,6 @@
 //! committed, so that building this crate needs no Node. A test proves that it is current.
 
 pub mod contact_svg;
-pub mod figures;
 
 mod decimate;
 mod display;

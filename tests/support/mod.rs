@@ -2,11 +2,21 @@
 
 #![allow(dead_code, reason = "each suite uses a part of it")]
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+pub(crate) mod grips;
+pub(crate) mod report;
+
+/// The root of the checkout, from whichever package the suite belongs to.
+pub(crate) fn root() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let above = here.parent().unwrap_or(here);
+    if here.join("data").is_dir() { here.into() } else { above.into() }
+}
 
 /// A file of the reference data beside the checkout; `None`, said aloud, when it is not there.
 pub(crate) fn reference(path: &str) -> Option<PathBuf> {
-    let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared").join(path);
+    let file = root().join("../shared").join(path);
     if file.exists() {
         return Some(file);
     }

@@ -1,0 +1,125 @@
+//! The `gripfast` program: flags to options, options to calls of the library, answers to text. Thin.
+
+mod backend;
+mod bench;
+mod candidates;
+mod defaults;
+mod devices;
+mod export;
+mod figures;
+mod gripper;
+mod part;
+mod pick;
+mod plan;
+mod report;
+mod score;
+mod shell;
+mod solve;
+mod why;
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser, Subcommand};
+
+/// Finds and ranks every two-finger grip on a CAD part by the smallest friction coefficient that
+/// holds it.
+#[derive(Debug, Parser)]
+#[command(name = "gripfast", version, about, propagate_version = true, args_override_self = true)]
+#[command(
+    after_help = "EXAMPLES:\n  gripfast plan bracket.stl --gripper robotiq-2f85 --mass 350g --accel 2g -o grips.json --report bracket.html\n  \
+gripfast why grips.json 962\n  gripfast export grips.json -o grips.csv\n  gripfast pick grips.json --scene cell.toml\n\nEXIT CODES:\n  0  done    1  done, but nothing found    2  bad input, bad usage or a failed run\n\n\
+PROJECT DEFAULTS:\n  A file gripfast.toml in the current folder sets flags, one table for each subcommand, e.g.\n    [plan]\n    gripper = \"robotiq-2f85\"\n    mass = \"350g\""
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Plan(Box<plan::Args>),
+    Part(part::Args),
+    Solve(solve::Args),
+    Why(why::Args),
+    Score(score::Args),
+    Devices(devices::Args),
+    Bench(bench::Args),
+    Report(report::Args),
+    Gripper(gripper::Args),
+    Figures(figures::Args),
+    Export(export::Args),
+    Pick(pick::Args),
+    Completions(shell::CompletionsArgs),
+    Man(shell::ManArgs),
+}
+
+fn main() -> ExitCode {
+    quiet_vulkan();
+    run()
+}
+
+/// Parses the command line and runs the subcommand.
+fn run() -> ExitCode {
+    let outcome =
+        defaults::apply(&Cli::command(), std::env::args_os().collect(), Path::new(defaults::FILE))
+            .and_then(|line| match Cli::parse_from(line).command {
+                Command::Part(args) => part::run(args),
+                Command::Plan(args) => plan::run(*args),
+                Command::Solve(args) => solve::run(args),
+                Command::Why(args) => why::run(args),
+                Command::Score(args) => score::run(args),
+                Command::Devices(args) => devices::run(args),
+                Command::Bench(args) => bench::run(args),
+                Command::Report(args) => report::run(args),
+                Command::Gripper(args) => gripper::run(args),
+                Command::Figures(args) => figures::run(args),
+                Command::Export(args) => export::run(args),
+                Command::Pick(args) => pick::run(args),
+                Command::Completions(args) => shell::completions(args),
+                Command::Man(args) => shell::man(args),
+            });
+    match outcome {
+        Ok(code) => code,
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {}", message(&error));
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// The error with its causes, without those that it already names.
+fn message(error: &anyhow::Error) -> String {
+    error.chain().skip(1).map(ToString::to_string).fold(error.to_string(), |text, cause| {
+        if text.contains(&cause) { text } else { format!("{text}: {cause}") }
+    })
+}
+
+/// Whether the reader of our output has gone (`gripfast .. | head`): no failure of ours.
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    let kind = |cause: &(dyn std::error::Error + 'static)| {
+        let plain = cause.downcast_ref::<std::io::Error>().map(std::io::Error::kind);
+        plain.or_else(|| cause.downcast_ref::<serde_json::Error>()?.io_error_kind())
+    };
+    error.chain().any(|cause| kind(cause) == Some(std::io::ErrorKind::BrokenPipe))
+}
+
+/// Without a desktop, Mesa's Vulkan layer that asks the display server for the preferred adapter
+/// prints an error for every look at the adapters. gripfast ranks them itself, so the layer is
+/// switched off there.
+fn quiet_vulkan() {
+    let absent = |name: &str| std::env::var_os(name).is_none();
+    if cfg!(all(feature = "gpu", target_os = "linux"))
+        && absent("XDG_RUNTIME_DIR")
+        && absent("NODEVICE_SELECT")
+    {
+        #[allow(
+            unsafe_code,
+            reason = "the first statement of the program: no other thread reads the environment"
+        )]
+        unsafe {
+            std::env::set_var("NODEVICE_SELECT", "1");
+        }
+    }
+}

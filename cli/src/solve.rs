@@ -1,0 +1,349 @@
+//! `gripfast solve`: one contact pair at a time, with everything visible.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args as ClapArgs, ValueEnum};
+use gripfast::case::{self, Case};
+use gripfast::lab::{earlier, paper};
+use gripfast::mechanics::{self, Options, Pads, Refiner, Separation, inverse};
+use gripfast::model::{Score, Slip, Status};
+use gripfast::report::contact_svg;
+
+/// Scores contact pairs: the smallest friction coefficient that holds each one's load.
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "EXAMPLES:\n  gripfast solve case.json\n  gripfast solve case.json --json\n  gripfast solve case.json --explain --pad-friction 0.5\n  gripfast solve case.json --plot case.svg\n  gripfast solve case.json --method paper --explain\n\n\
+A case is {\"A_I\":[{\"outer\":[[x,y],..],\"holes\":[]}],\"A_II\":[..],\"d\":..,\"Fn\":..,\"F\":[..],\"M\":[..]} in metres and newtons,\n\
+the load on the body about the point midway between the faces. A file may hold one case, a list, {\"cases\":[..]} or JSON Lines."
+)]
+pub(crate) struct Args {
+    /// Case file; `-` for standard input.
+    case: PathBuf,
+    /// One JSON object per case on standard output.
+    #[arg(long)]
+    json: bool,
+    /// Also the iterations, the certificate and what each number means.
+    #[arg(long)]
+    explain: bool,
+    /// Also draws the contact pair as SVG: pads, pressure, separation line, slip centre, friction
+    /// directions.
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Pads that separate under the load: solve with the contact left, or discard as the paper
+    /// does.
+    #[arg(long, value_enum, default_value = "solve")]
+    separation: SeparationArg,
+    /// Minimiser that polishes the solution.
+    #[arg(long, value_enum, default_value = "newton")]
+    refiner: RefinerArg,
+    /// How to solve: our method, the paper's error function, or the earlier method with the slip
+    /// centre at the centroid.
+    #[arg(long, value_enum, default_value = "gripfast")]
+    method: Method,
+    /// Friction coefficient of the pads: also tells the force needed and the load multiple held.
+    #[arg(long, value_name = "MU")]
+    pad_friction: Option<f64>,
+    /// Safety factor on the pad friction for the force needed.
+    #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
+    safety: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Method {
+    /// Convex slip problem and coupled equilibrium, certified.
+    Gripfast,
+    /// E of equations (17)(18), minimised by Shanno's method from several starts, checked.
+    Paper,
+    /// Slip centre at the centroid, uniform pressure (the paper's section 2).
+    Centroid,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum SeparationArg {
+    Solve,
+    Discard,
+}
+
+impl From<SeparationArg> for Separation {
+    fn from(arg: SeparationArg) -> Self {
+        match arg {
+            SeparationArg::Solve => Self::Solve,
+            SeparationArg::Discard => Self::Discard,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum RefinerArg {
+    Newton,
+    Shanno,
+}
+
+impl From<RefinerArg> for Refiner {
+    fn from(arg: RefinerArg) -> Self {
+        match arg {
+            RefinerArg::Newton => Self::Newton,
+            RefinerArg::Shanno => Self::Shanno,
+        }
+    }
+}
+
+/// Answers of the questions asked the other way round.
+#[derive(serde::Serialize)]
+struct Inverse {
+    force_needed: Option<f64>,
+    /// `None`: any multiple is held.
+    load_multiple: Option<f64>,
+}
+
+#[derive(serde::Serialize)]
+struct Answer<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    id: Option<&'a str>,
+    #[serde(flatten)]
+    score: Score,
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    inverse: Option<Inverse>,
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if let Some(mu) = args.pad_friction
+        && !(mu.is_finite() && mu > 0.0)
+    {
+        anyhow::bail!("--pad-friction {mu}: give a positive number");
+    }
+    if !(args.safety.is_finite() && args.safety > 0.0) {
+        anyhow::bail!("--safety {}: give a positive number", args.safety);
+    }
+    let options = Options {
+        separation: args.separation.into(),
+        refiner: args.refiner.into(),
+        ..Options::default()
+    };
+    let mut out = std::io::stdout().lock();
+    let cases = case::read(&args.case)?;
+    let mut any = false;
+    for (index, case) in cases.iter().enumerate() {
+        let place = || case.id.clone().unwrap_or_else(|| format!("case {}", index + 1));
+        let (contact, distance, force, wrench) =
+            (&case.contact, case.distance, case.force, &case.wrench);
+        let answer = match args.method {
+            Method::Gripfast => mechanics::solve(contact, distance, force, wrench, &options)
+                .map(|score| (score, None)),
+            Method::Paper => {
+                let all_starts =
+                    paper::Options { all_starts: args.explain, ..paper::Options::default() };
+                paper::solve(contact, distance, force, wrench, &all_starts)
+                    .map(|report| (report.score, Some(report)))
+            }
+            Method::Centroid => {
+                earlier::solve(contact, distance, force, wrench).map(|score| (score, None))
+            }
+        };
+        let (score, report) = answer
+            .map_err(|error| anyhow::anyhow!("{}: {}: {error}", args.case.display(), place()))?;
+        any |= score.status.holds();
+        if let Some(path) = &args.plot {
+            let path = if cases.len() > 1 {
+                path.with_file_name(format!(
+                    "{}-{}.svg",
+                    path.file_stem().unwrap_or_default().to_string_lossy(),
+                    place()
+                ))
+            } else {
+                path.clone()
+            };
+            let svg = contact_svg::draw(&place(), &case.contact, &score);
+            gripfast::file::write(&path, |writer| writer.write_all(svg.as_bytes()))?;
+        }
+        let inverse = args.pad_friction.and_then(|friction| {
+            let pads = Pads::new(&case.contact)?;
+            let multiple = inverse::load_multiple(
+                &pads,
+                case.distance,
+                case.force,
+                &case.wrench,
+                friction,
+                &options,
+            );
+            Some(Inverse {
+                force_needed: inverse::force_needed(
+                    &pads,
+                    case.distance,
+                    &case.wrench,
+                    friction / args.safety,
+                    &options,
+                ),
+                load_multiple: multiple.is_finite().then_some(multiple),
+            })
+        });
+        if args.json {
+            writeln!(
+                out,
+                "{}",
+                serde_json::to_string(&Answer { id: case.id.as_deref(), score, inverse })?
+            )?;
+        } else {
+            if cases.len() > 1 {
+                writeln!(out, "{}{}", if index > 0 { "\n" } else { "" }, place())?;
+            }
+            print(&mut out, case, &score, inverse.as_ref(), &args)?;
+            if let Some(report) = report.filter(|_| args.explain) {
+                print_runs(&mut out, &report)?;
+            }
+        }
+    }
+    Ok(if any { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+fn print(
+    out: &mut impl Write,
+    case: &Case,
+    score: &Score,
+    inverse: Option<&Inverse>,
+    args: &Args,
+) -> anyhow::Result<()> {
+    let mm = 1e3;
+    match score.mu_s {
+        Some(mu) => writeln!(
+            out,
+            "smallest friction coefficient that holds  {mu:.6}{}",
+            note(score.status)
+        )?,
+        None => writeln!(out, "no answer: {}", reason(score.status))?,
+    }
+    match score.slip {
+        Some(Slip::Rotation { c, sense }) => {
+            let turn = if sense > 0 { "counter-clockwise" } else { "clockwise" };
+            // Rounded first: no negative zeros.
+            let [x, y] = c.map(|value| (value * mm * 1e4).round() / 1e4 + 0.0);
+            writeln!(
+                out,
+                "about to turn                             {turn} about ({x:.4}, {y:.4}) mm"
+            )?;
+        }
+        Some(Slip::Translation { direction }) => writeln!(
+            out,
+            "about to slide                            along ({:.4}, {:.4})",
+            direction[0], direction[1]
+        )?,
+        Some(Slip::None) => writeln!(
+            out,
+            "nothing slips                             the load has no part in the pad plane"
+        )?,
+        None => {}
+    }
+    if let Some(p) = score.pressure {
+        let per_mm = 1e-3;
+        writeln!(
+            out,
+            "pressure on face I  [Pa, x in mm]         {:.6e} {:+.6e} x1 {:+.6e} x2",
+            p.a_i0,
+            p.a1 * per_mm,
+            p.a2 * per_mm
+        )?;
+        writeln!(
+            out,
+            "pressure on face II [Pa, x in mm]         {:.6e} {:+.6e} x1 {:+.6e} x2",
+            p.a_ii0,
+            0.0 - p.a1 * per_mm,
+            0.0 - p.a2 * per_mm
+        )?;
+        let area = |patch: &[gripfast::model::Polygon]| gripfast::geometry::patch_area(patch);
+        let share = |left: f64, patch: &[gripfast::model::Polygon]| 100.0 * left / area(patch);
+        writeln!(
+            out,
+            "contact left                              I {:.4} mm2 ({:.2} %), II {:.4} mm2 ({:.2} %)",
+            score.contact_area_i * mm * mm,
+            share(score.contact_area_i, &case.contact.face_i),
+            score.contact_area_ii * mm * mm,
+            share(score.contact_area_ii, &case.contact.face_ii)
+        )?;
+    }
+    if let Some(inverse) = inverse {
+        match inverse.force_needed {
+            Some(force) => writeln!(
+                out,
+                "gripping force needed                     {force:.4} N (pad friction {}, safety {})",
+                args.pad_friction.unwrap_or_default(),
+                args.safety
+            )?,
+            None => writeln!(
+                out,
+                "gripping force needed                     none is enough at this pad friction"
+            )?,
+        }
+        let multiple = inverse
+            .load_multiple
+            .map_or("any: there is no load".into(), |multiple| format!("{multiple:.4}"));
+        writeln!(out, "load multiple held                        {multiple}")?;
+    }
+    if args.explain {
+        let solver = match (args.method, args.refiner) {
+            (Method::Paper, _) => "the paper's method, all starts",
+            (Method::Centroid, _) => "centroid method",
+            (_, RefinerArg::Newton) => "refiner newton",
+            (_, RefinerArg::Shanno) => "refiner shanno",
+        };
+        if let Some(bounds) = score.bounds {
+            writeln!(
+                out,
+                "certificate for this pressure             {:.15} <= mu_s <= {:.15}",
+                bounds.lower, bounds.upper
+            )?;
+        }
+        writeln!(
+            out,
+            "largest residual of the seven equations   {:.2e}  (forces over Fn, moments over Fn sqrt(A))",
+            score.residual
+        )?;
+        writeln!(
+            out,
+            "evaluations of the integrals              {}  ({solver})",
+            score.evaluations
+        )?;
+    }
+    Ok(())
+}
+
+/// What each start of the paper's method came to.
+fn print_runs(out: &mut impl Write, report: &paper::Report) -> anyhow::Result<()> {
+    for (index, run) in report.runs.iter().enumerate() {
+        let taken =
+            if report.published == Some(index) { "  <- taken by the paper's rule" } else { "" };
+        writeln!(
+            out,
+            "start {}: {:?}, mu {:.9}, E {:.1e}, residual {:.1e}, {} evaluations{taken}",
+            index + 1,
+            run.outcome,
+            run.mu,
+            run.error,
+            run.residual,
+            run.evaluations
+        )?;
+    }
+    Ok(())
+}
+
+fn note(status: Status) -> &'static str {
+    match status {
+        Status::Ambiguous => {
+            "   (ambiguous: another limit state exists; this is the one on the branch from d = 0, or the smallest)"
+        }
+        Status::Separating => "   (discarded: the pads separate)",
+        Status::NotConverged => "   (NOT a solution: the seven equations do not hold)",
+        _ => "",
+    }
+}
+
+fn reason(status: Status) -> &'static str {
+    match status {
+        Status::TwistedOut => "no slip limit exists for this load: the contact twists out",
+        Status::NoNormalForce => "the load pulls one pad off: |F3| is not below 2 Fn",
+        Status::NoContact => "a contact area is empty",
+        Status::NotConverged => "the method did not reach a solution of the seven equations",
+        _ => "the solver found no solution",
+    }
+}

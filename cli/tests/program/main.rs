@@ -1,0 +1,20 @@
+//! The program as a user runs it.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod backend;
+mod command_line;
+mod docs_commands;
+mod export;
+mod figures;
+mod gripper;
+mod part_dirty;
+mod part_drawing;
+mod pick;
+mod plan_inside;
+mod plan_more;
+#[cfg(unix)]
+mod plan_resume;
+mod report_page;
+#[path = "../../../tests/support/mod.rs"]
+mod support;

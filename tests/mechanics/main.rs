@@ -1,0 +1,14 @@
+//! The mechanics: exact values, invariances, reference cases, random cases against a second derivation.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod brute;
+mod earlier_method;
+mod exact;
+mod invariances;
+mod named;
+mod paper_method;
+mod random;
+mod reference_cases;
+#[path = "../support/mod.rs"]
+mod support;

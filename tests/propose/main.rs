@@ -1,0 +1,10 @@
+//! Proposals: what is proposed, what is rejected and why.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod bodies;
+mod interference;
+mod options;
+mod parts;
+#[path = "../support/mod.rs"]
+mod support;

@@ -1,0 +1,13 @@
+//! Around the ranking: loads in, results out, picking, the page in a browser.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod export_native;
+mod export_readers;
+mod load_cases;
+mod load_files;
+mod pick_rank;
+mod pick_scene;
+mod report_browser;
+#[path = "../support/mod.rs"]
+mod support;
