@@ -203,7 +203,8 @@ fn devices_and_bench_write_json() {
 /// `--polish top` prints the table of `--polish worst` and says how many grips it left out.
 #[test]
 fn polish_top_gives_the_same_best_grips() {
-    let bracket = concat!(env!("CARGO_MANIFEST_DIR"), "/data/parts/l_bracket.stl");
+    let bracket = crate::support::root().join("data/parts/l_bracket.stl");
+    let bracket = bracket.to_str().unwrap();
     let plan = |more: &[&str]| {
         let common = [
             "plan",
