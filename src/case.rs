@@ -67,7 +67,7 @@ pub fn read(path: &Path) -> Result<Vec<Case>> {
     while let Some(value) = stream.next() {
         let line = text[..stream.byte_offset().min(text.len())].lines().count();
         let value =
-            value.map_err(|error| Error::input(&name, format!("is not JSON: {error}"), SHAPE))?;
+            value.map_err(|error| Error::format(&name, format!("is not JSON: {error}"), SHAPE))?;
         let mut take = |place: String, value: serde_json::Value| -> Result<()> {
             cases.push(parse(&place, value)?);
             Ok(())
@@ -80,7 +80,7 @@ pub fn read(path: &Path) -> Result<Vec<Case>> {
                             take(format!("{name}: cases[{index}]"), item)?;
                         }
                     }
-                    _ => return Err(Error::input(&name, "\"cases\" is not a list", SHAPE)),
+                    _ => return Err(Error::format(&name, "\"cases\" is not a list", SHAPE)),
                 }
             }
             serde_json::Value::Array(list) => {
@@ -92,7 +92,7 @@ pub fn read(path: &Path) -> Result<Vec<Case>> {
         }
     }
     if cases.is_empty() {
-        return Err(Error::input(&name, "holds no case", SHAPE));
+        return Err(Error::format(&name, "holds no case", SHAPE));
     }
     Ok(cases)
 }
@@ -103,7 +103,7 @@ pub fn read(path: &Path) -> Result<Vec<Case>> {
 /// When the value is not of the form.
 pub fn parse(place: &str, value: serde_json::Value) -> Result<Case> {
     let raw: Raw = serde_json::from_value(value)
-        .map_err(|error| Error::input(place, error.to_string(), SHAPE))?;
+        .map_err(|error| Error::format(place, error.to_string(), SHAPE))?;
     let id = raw.id.map(|id| id.as_str().map_or_else(|| id.to_string(), str::to_string));
     let contact = Contact { face_i: raw.a_i, face_ii: raw.a_ii };
     Ok(Case {

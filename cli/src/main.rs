@@ -7,6 +7,7 @@ mod defaults;
 mod devices;
 mod export;
 mod figures;
+mod flags;
 mod gripper;
 mod part;
 mod pick;
@@ -83,17 +84,10 @@ fn run() -> ExitCode {
         Ok(code) => code,
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", message(&error));
+            eprintln!("error: {}", flags::message(&error));
             ExitCode::from(2)
         }
     }
-}
-
-/// The error with its causes, without those that it already names.
-fn message(error: &anyhow::Error) -> String {
-    error.chain().skip(1).map(ToString::to_string).fold(error.to_string(), |text, cause| {
-        if text.contains(&cause) { text } else { format!("{text}: {cause}") }
-    })
 }
 
 /// Whether the reader of our output has gone (`gripfast .. | head`): no failure of ours.

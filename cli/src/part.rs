@@ -12,6 +12,8 @@ use gripfast::part::{FacePair, Part, PlanarFace, ReadOptions, Unit, drawing};
 use gripfast::units::Quantity;
 use serde_json::json;
 
+use crate::flags;
+
 /// Reads a part, checks its mesh, and lists its planar faces and the pairs of them that can be
 /// gripped.
 #[derive(Debug, ClapArgs)]
@@ -118,7 +120,7 @@ fn to_text(part: &Part, pairs: &[FacePair], density: Option<f64>, rows: usize) -
         format!("{}, {} vertices", part.mesh.triangles.len(), part.mesh.vertices.len()),
     );
     for (index, finding) in part.health.lines().into_iter().enumerate() {
-        line(if index == 0 { "surface" } else { "" }, finding);
+        line(if index == 0 { "surface" } else { "" }, flags::warning(&finding));
     }
     let mass = part.mass_properties(density.unwrap_or(1.0));
     line("volume", format!("{:.3} cm3", mass.volume * 1e6));

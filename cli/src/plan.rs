@@ -247,7 +247,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 
     let part = Part::read(&args.part, &ReadOptions { unit: args.unit })?;
     for line in part.health.warnings.iter() {
-        note(&format!("warning: {line}"));
+        note(&format!("warning: {}", crate::flags::warning(line)));
     }
     if !part.health.watertight {
         note(

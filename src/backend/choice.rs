@@ -1,9 +1,9 @@
 //! Which backend: what was asked for, what was taken, and why.
 
 use super::Backend;
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 
-/// What `--backend` asks for.
+/// Which backend is asked for.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Choice {
     /// A GPU where there is one, else the processor. A GPU lost on the way is replaced by the
@@ -25,10 +25,11 @@ impl std::str::FromStr for Choice {
             "cpu" => Ok(Self::Cpu),
             "gpu" => Ok(Self::Gpu),
             _ => Err(Error::input(
-                "--backend",
+                "backend",
                 format!("`{text}` is not a backend"),
                 "use auto, cpu or gpu",
-            )),
+            )
+            .with_options(&["backend"])),
         }
     }
 }
@@ -46,14 +47,17 @@ pub struct Selection {
 /// environment variable `GRIPFAST_ADAPTER` does.
 ///
 /// # Errors
-/// [`Error::Backend`] when `gpu` was asked for and there is none, or a named adapter does not exist
-/// or does not work (whatever the choice: a name is never silently ignored); [`Error::Input`] for
-/// an adapter named with `cpu`.
+/// A device error when `gpu` was asked for and there is none, or a named adapter does not exist
+/// or does not work (whatever the choice: a name is never silently ignored); a bad value
+/// for an adapter named with `cpu`.
 pub fn select(choice: Choice, adapter: Option<&str>) -> Result<Selection> {
     match choice {
-        Choice::Cpu if adapter.is_some() => {
-            Err(Error::input("--adapter", "is given with --backend cpu", "leave out one of them"))
-        }
+        Choice::Cpu if adapter.is_some() => Err(Error::input(
+            "adapter",
+            "is named together with the backend cpu",
+            "leave out one of them",
+        )
+        .with_options(&["adapter", "backend"])),
         Choice::Cpu => Ok(Selection { backend: Backend::Cpu, reason: "cpu: asked for".to_owned() }),
         Choice::Auto | Choice::Gpu => open(choice, adapter),
     }
@@ -72,10 +76,16 @@ fn open(choice: Choice, adapter: Option<&str>) -> Result<Selection> {
                 backend: Backend::Gpu(Box::new(gpu)),
             })
         }
-        Err(Error::Backend(why))
-            if choice == Choice::Auto && adapter.is_none() && !named_in_environment() =>
+        Err(error)
+            if error.kind() == ErrorKind::Device
+                && choice == Choice::Auto
+                && adapter.is_none()
+                && !named_in_environment() =>
         {
-            Ok(Selection { backend: Backend::Cpu, reason: format!("cpu: auto, {why}") })
+            Ok(Selection {
+                backend: Backend::Cpu,
+                reason: format!("cpu: auto, {}", error.problem()),
+            })
         }
         Err(error) => Err(error),
     }
@@ -94,5 +104,6 @@ fn open(choice: Choice, adapter: Option<&str>) -> Result<Selection> {
             reason: "cpu: auto, this build has no GPU support".to_owned(),
         });
     }
-    Err(Error::Backend("this build has no GPU support (cargo feature `gpu`)".to_owned()))
+    Err(Error::device("this build has no GPU support (cargo feature `gpu`)")
+        .with_kind(ErrorKind::Unsupported))
 }

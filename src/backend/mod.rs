@@ -156,8 +156,8 @@ impl Backend {
     /// whatever the number of threads, and however the batch is cut or permuted.
     ///
     /// # Errors
-    /// [`Error::Input`] for numbers that are not finite or a gripping force that is not positive;
-    /// [`Error::Backend`] when the GPU fails.
+    /// A bad value for numbers that are not finite or a gripping force that is not positive;
+    /// A device error when the GPU fails.
     pub fn seed(&self, batch: &Batch<'_>, seeds: &SeedSet) -> Result<Vec<Seed>> {
         let job = Job::new(batch, seeds)?;
         let mut answers = vec![not_searched(SeedStatus::NoContact); job.loads];
@@ -324,10 +324,7 @@ impl<'a> Job<'a> {
             for piece in pieces {
                 let count = piece.scales.iter().filter(|&&scale| scale > 0.0).count();
                 let Some((mine, others)) = rest.split_at_checked(count) else {
-                    return Err(Error::Backend(format!(
-                        "only {} answers came back",
-                        records.len()
-                    )));
+                    return Err(Error::device(format!("only {} answers came back", records.len())));
                 };
                 jobs.push((contact, piece, mine));
                 rest = others;

@@ -99,7 +99,7 @@ impl Prepared {
     /// `None` when a face has no area.
     ///
     /// # Errors
-    /// [`Error::Input`] when a coordinate is not finite.
+    /// A bad value when a coordinate is not finite.
     pub(crate) fn new(contact: &Contact, place: &str) -> Result<Option<Self>> {
         for (name, patch) in [("A_I", &contact.face_i), ("A_II", &contact.face_ii)] {
             for point in patch
@@ -246,14 +246,14 @@ impl Prepared {
     /// The answer in SI about the grip origin from the search's record and the load's scale.
     ///
     /// # Errors
-    /// [`Error::Backend`] when the kernel did not write the record.
+    /// A device error when the kernel did not write the record.
     pub(crate) fn answer(&self, record: &SeedRecord, scale: f64) -> Result<Seed> {
         let status = match record.status {
             BOUNDED => SeedStatus::Bounded,
             COUPLED => SeedStatus::Coupled,
             UNBOUNDED => SeedStatus::Unbounded,
             other => {
-                return Err(Error::Backend(format!(
+                return Err(Error::device(format!(
                     "a load came back with status {other}: the kernel did not write it"
                 )));
             }

@@ -37,7 +37,7 @@ impl SeedSet {
     /// 1` twists.
     ///
     /// # Errors
-    /// [`Error::Input`] when `frequency` is not in `1..=64`.
+    /// A bad value when `frequency` is not in `1..=64`.
     pub fn new(frequency: u32) -> Result<Self> {
         if !(1..=Self::MAX_FREQUENCY).contains(&frequency) {
             return Err(Error::input(
@@ -52,7 +52,7 @@ impl SeedSet {
     /// The smallest set with at least `count` twists.
     ///
     /// # Errors
-    /// [`Error::Input`] when `count` is zero or above 20,481.
+    /// A bad value when `count` is zero or above 20,481.
     pub fn with_at_least(count: usize) -> Result<Self> {
         let largest = 5 * (Self::MAX_FREQUENCY as usize).pow(2) + 1;
         match (1..=Self::MAX_FREQUENCY).find(|&f| 5 * (f as usize).pow(2) + 1 >= count) {

@@ -179,9 +179,7 @@ fn container(
     let chunk = if binary.is_empty() { 0 } else { 8 + binary.len() };
     let word = |length: usize| {
         u32::try_from(length).map(u32::to_le_bytes).map_err(|_| {
-            std::io::Error::other(
-                "the scene passes glTF's limit of 4 GiB; export fewer grips with --top",
-            )
+            std::io::Error::other("the scene passes glTF's limit of 4 GiB; export fewer grips")
         })
     };
     writer.write_all(b"glTF\x02\x00\x00\x00")?;

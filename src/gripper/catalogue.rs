@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{Gripper, parse, read};
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 
 /// Short name and text of each shipped gripper file (`data/grippers/`).
 pub const CATALOGUE: &[(&str, &str)] = &[
@@ -104,11 +104,13 @@ fn unknown(name: &str) -> Error {
         .filter(|(distance, short)| *distance <= 1 + short.len() / 3)
         .map_or(String::new(), |(_, short)| format!("did you mean '{short}'? "));
     let names: Vec<&str> = CATALOGUE.iter().map(|entry| entry.0).collect();
-    Error::input(
-        format!("--gripper {name}"),
+    Error::new(
+        ErrorKind::NotFound,
+        format!("gripper '{name}'"),
         "no shipped gripper and no file of this name",
         format!("{close}Shipped: {}; or give a gripper file (.toml)", names.join(", ")),
     )
+    .with_options(&["gripper"])
 }
 
 /// Levenshtein distance.

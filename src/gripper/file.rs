@@ -111,7 +111,7 @@ pub fn read(path: &Path) -> Result<Gripper> {
     let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read", source))?;
     let place = path.display().to_string();
     let text = String::from_utf8(bytes).map_err(|_| {
-        Error::input(
+        Error::format(
             &place,
             "not a text file",
             "give a gripper file in TOML; `gripfast gripper list` shows shipped ones",
@@ -137,7 +137,7 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
         let line = error.span().map_or(String::new(), |span| {
             format!(":{}", text[..span.start.min(text.len())].matches('\n').count() + 1)
         });
-        Error::input(
+        Error::format(
             format!("{place}{line}"),
             error.message().to_string(),
             "compare with a shipped file: `gripfast gripper show generic`",

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::model::{Frame, Polygon};
 
 mod boundary;
@@ -187,14 +187,16 @@ impl Part {
             let mut corners = [DVec3::ZERO; 3];
             for (corner, &index) in corners.iter_mut().zip(triangle) {
                 *corner = *vertices.get(index as usize).ok_or_else(|| {
-                    Error::input(
+                    Error::new(
+                        ErrorKind::Geometry,
                         format!("{name}, triangle {number}"),
                         format!("vertex {index} does not exist"),
                         "number vertices from 0",
                     )
                 })?;
                 if !corner.is_finite() {
-                    return Err(Error::input(
+                    return Err(Error::new(
+                        ErrorKind::Geometry,
                         format!("{name}, triangle {number}"),
                         format!("vertex {index} is not finite"),
                         "correct the coordinates",

@@ -10,7 +10,7 @@ use super::orient::{self, Role, Shell};
 use super::topology::{self, Edges, NONE, ends};
 use super::weld::Soup;
 use super::{Health, MassProperties, Mesh};
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 
 /// Distance within which corners at an opening are taken for one, as a share of the bounding box's
 /// diagonal: 1 um on 100 mm.
@@ -66,7 +66,8 @@ pub(super) fn repair(soup: Soup, scale: f64, place: &str) -> Result<Repaired> {
     let (low, high) = mesh.bounding_box();
     let diagonal = (high - low).length();
     if mesh.triangles.is_empty() || diagonal <= 0.0 || !diagonal.is_finite() {
-        return Err(Error::input(
+        return Err(Error::new(
+            ErrorKind::Geometry,
             place,
             "no triangle has an area",
             "export the part as a surface mesh; check that its coordinates were not all rounded to the same value",
@@ -86,7 +87,8 @@ pub(super) fn repair(soup: Soup, scale: f64, place: &str) -> Result<Repaired> {
     let mut edges = topology::edges(&mesh);
     mend(&mut mesh, &mut edges, tolerance, &mut health);
     if mesh.triangles.is_empty() {
-        return Err(Error::input(
+        return Err(Error::new(
+            ErrorKind::Geometry,
             place,
             "no triangle has an area above rounding",
             "export the part as a surface mesh",

@@ -40,7 +40,7 @@ impl Unit {
         }
     }
 
-    /// Symbol as accepted by `--unit`.
+    /// Symbol as users write it.
     pub fn symbol(self) -> &'static str {
         match self {
             Self::Metre => "m",
@@ -59,10 +59,11 @@ impl FromStr for Unit {
     fn from_str(text: &str) -> Result<Self, Error> {
         Self::ALL.into_iter().find(|unit| unit.symbol() == text).ok_or_else(|| {
             Error::input(
-                "--unit",
+                "unit",
                 format!("unknown unit '{text}'"),
                 "use one of: mm, cm, m, um, in, ft",
             )
+            .with_options(&["unit"])
         })
     }
 }
@@ -99,7 +100,7 @@ pub(super) fn implausible_size(extents: DVec3, unit: Unit, stated: bool) -> Opti
     if let Some(likely) = likely {
         let size = extents / unit.metres() * likely.metres() * 1e3;
         text += &format!(
-            "; --unit {likely} would give {:.4} x {:.4} x {:.4} mm",
+            "; the unit {likely} would give {:.4} x {:.4} x {:.4} mm",
             size.x, size.y, size.z
         );
     }
@@ -114,10 +115,10 @@ mod tests {
     fn warns_of_metres_taken_for_millimetres() {
         let extents = DVec3::new(0.04, 0.04, 0.02) * 1e-3;
         let warning = implausible_size(extents, Unit::Millimetre, false).unwrap();
-        assert!(warning.contains("--unit m "), "{warning}");
+        assert!(warning.contains("the unit m "), "{warning}");
         assert!(implausible_size(extents * 1e3, Unit::Metre, true).is_none());
         let warning = implausible_size(DVec3::splat(2e4) * 1e-3, Unit::Millimetre, false).unwrap();
-        assert!(warning.contains("--unit um"), "{warning}");
+        assert!(warning.contains("the unit um "), "{warning}");
     }
 
     #[test]

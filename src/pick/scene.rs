@@ -189,7 +189,7 @@ impl Scene {
             let line = error
                 .span()
                 .map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
-            Error::input(
+            Error::format(
                 format!("{place}:{line}"),
                 error.message().to_owned(),
                 "docs/formats.md shows a scene file with all its fields",

@@ -387,7 +387,7 @@ fn chosen_faces(part: &Part, options: &ProposeOptions) -> Result<Option<Vec<bool
             return Err(Error::input(
                 "box of faces",
                 problem,
-                "make it larger; `gripfast part --faces` lists where the faces lie",
+                "make it larger; the list of the part's faces says where they lie",
             ));
         }
     }

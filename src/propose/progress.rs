@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Cursor, Proposer, Tally};
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 
 /// Where the next chunk starts and what was counted so far. It fits the same part, gripper and
 /// options only.
@@ -47,7 +47,13 @@ impl Proposer<'_> {
                 "the place at which it stopped (face pair {}, angle {}, position {}) is not there",
                 next.site, next.angle, next.position
             );
-            return Err(Error::input("unfinished run", problem, "start anew without --resume"));
+            return Err(Error::new(
+                ErrorKind::Mismatch,
+                "unfinished run",
+                problem,
+                "start from the beginning",
+            )
+            .with_options(&["resume"]));
         }
         (self.next, self.corners, self.tally) = (*next, *corners, tally.clone());
         Ok(())

@@ -29,7 +29,7 @@ const DATA_MARK: &str = "@@gripfast-data@@";
 /// The page for `set`. Without a mesh the part is drawn as its bounding box, and the page says so.
 ///
 /// # Errors
-/// [`Error::Input`] when `set` contradicts itself (a grip under a load that is not listed).
+/// A mismatch when `set` contradicts itself (a grip under a load that is not listed).
 pub fn render(set: &GripSet, mesh: Option<&Mesh>) -> Result<String> {
     let payload = Payload::new(set, mesh)?;
     let damaged = || {
@@ -47,7 +47,7 @@ pub fn render(set: &GripSet, mesh: Option<&Mesh>) -> Result<String> {
 /// Writes the page for `set` to `path`: whole or not at all.
 ///
 /// # Errors
-/// As [`render`]; [`Error::Io`] when the file cannot be written.
+/// As [`render`]; a file error when the file cannot be written.
 pub fn write(set: &GripSet, mesh: Option<&Mesh>, path: &Path) -> Result<()> {
     let page = render(set, mesh)?;
     file::write(path, |writer| writer.write_all(page.as_bytes()))

@@ -17,7 +17,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::display::{Display, TRIANGLE_BUDGET};
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::gripper::{Body, Gripper, Shape};
 use crate::model::{Contact, Slip};
 use crate::part::Mesh;
@@ -67,10 +67,11 @@ impl Payload {
     /// Encodes `set` and the part.
     ///
     /// # Errors
-    /// [`Error::Input`] when a grip names a load that is not in the list.
+    /// A mismatch when a grip names a load that is not in the list.
     pub(super) fn new(set: &GripSet, mesh: Option<&Mesh>) -> Result<Self> {
         if cfg!(target_endian = "big") {
-            return Err(Error::input(
+            return Err(Error::new(
+                ErrorKind::Unsupported,
                 "report",
                 "this machine stores numbers big-endian first",
                 "write the page on a little-endian machine",
@@ -85,7 +86,12 @@ impl Payload {
                 grip.worst.load,
                 set.loads.len()
             );
-            return Err(Error::input("result file", problem, "use a file that gripfast wrote"));
+            return Err(Error::new(
+                ErrorKind::Mismatch,
+                "result file",
+                problem,
+                "use a file that gripfast wrote",
+            ));
         }
         let statuses = poses_and_scores(&mut columns, grips);
         contacts(&mut columns, grips);

@@ -7,6 +7,7 @@ mod command_line;
 mod docs_commands;
 mod export;
 mod figures;
+mod flag_names;
 mod gripper;
 mod part_dirty;
 mod part_drawing;

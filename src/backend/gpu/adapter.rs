@@ -91,7 +91,7 @@ pub fn list() -> Vec<AdapterSummary> {
 /// `GRIPFAST_ADAPTER` and `WGPU_ADAPTER_NAME`), or else the best that counts as a GPU.
 ///
 /// # Errors
-/// [`Error::Backend`] when there is none; the message lists what there is.
+/// A device error when there is none; the message lists what there is.
 pub(crate) fn choose(asked: Option<&str>) -> Result<wgpu::Adapter> {
     let from_environment = || {
         [ADAPTER_VARIABLE, "WGPU_ADAPTER_NAME"]
@@ -125,12 +125,13 @@ pub(crate) fn choose(asked: Option<&str>) -> Result<wgpu::Adapter> {
     } else {
         format!("found: {}", found.join(", "))
     };
-    Err(Error::Backend(match asked {
+    Err(Error::device(match asked {
         Some(name) => format!("no adapter is called `{name}`; {found}"),
         None => format!(
-            "no graphics processor; {found}. A software adapter is used only when named with --adapter"
+            "no graphics processor; {found}. A software adapter is used only when its name is asked for"
         ),
-    }))
+    })
+    .with_options(&["adapter"]))
 }
 
 /// An index, or else the first name that contains `asked` whatever the case.

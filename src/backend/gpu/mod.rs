@@ -31,8 +31,8 @@ pub(crate) enum Failure {
 impl From<Failure> for Error {
     fn from(failure: Failure) -> Self {
         match failure {
-            Failure::Lost(why) => Self::Backend(format!("the graphics processor was lost: {why}")),
-            Failure::Fault(why) => Self::Backend(why),
+            Failure::Lost(why) => Self::device(format!("the graphics processor was lost: {why}")),
+            Failure::Fault(why) => Self::device(why),
         }
     }
 }
@@ -91,11 +91,11 @@ impl Gpu {
     /// on the processor.
     ///
     /// # Errors
-    /// [`Error::Backend`] when there is no such adapter or it cannot run the kernels.
+    /// A device error when there is no such adapter or it cannot run the kernels.
     pub fn open(asked: Option<&str>, strict: bool) -> Result<Self> {
         let adapter = adapter::choose(asked)?;
         let (info, available) = (adapter.get_info(), adapter.limits());
-        let refused = |why: String| Error::Backend(format!("{}: {why}", info.name));
+        let refused = |why: String| Error::device(format!("{}: {why}", info.name));
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("gripfast"),
             required_limits: available.clone(),

@@ -17,7 +17,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::weld::{MAX_TRIANGLES, Soup, Welder};
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 
 /// Suffixes that are read, for messages.
 const KNOWN: &str = if cfg!(feature = "step") {
@@ -36,11 +36,12 @@ pub(super) fn read(path: &Path) -> Result<Soup> {
     let step = matches!(suffix.as_str(), "step" | "stp");
     if (step && !cfg!(feature = "step")) || matches!(suffix.as_str(), "iges" | "igs" | "brep") {
         let build = if step {
-            ", or build gripfast with `--features step` (needs Open CASCADE: Debian's libocct-data-exchange-dev)"
+            ", or build gripfast with the feature `step` (needs Open CASCADE: Debian's libocct-data-exchange-dev)"
         } else {
             ""
         };
-        return Err(Error::input(
+        return Err(Error::new(
+            ErrorKind::Unsupported,
             place,
             format!(
                 "'.{suffix}' holds exact surfaces, not triangles; this build has no CAD kernel to tessellate them"
@@ -54,7 +55,7 @@ pub(super) fn read(path: &Path) -> Result<Soup> {
     let file = File::open(path).map_err(|source| Error::io(path, "read", source))?;
     let meta = file.metadata().map_err(|source| Error::io(path, "read", source))?;
     if meta.is_dir() {
-        return Err(Error::input(place, "is a folder", "name a mesh file"));
+        return Err(Error::format(place, "is a folder", "name a mesh file"));
     }
     let size = (!zipped).then_some(meta.len());
     let reader: Box<dyn Read> = if zipped {
@@ -65,7 +66,7 @@ pub(super) fn read(path: &Path) -> Result<Soup> {
     let mut source =
         Source { place, path, size, reader: BufReader::with_capacity(1 << 18, reader) };
     if source.peek()?.is_empty() {
-        return Err(Error::input(source.place, "the file is empty", "export the part again"));
+        return Err(Error::format(source.place, "the file is empty", "export the part again"));
     }
     let soup = match suffix.as_str() {
         "stl" => stl::read(&mut source)?,
@@ -77,14 +78,16 @@ pub(super) fn read(path: &Path) -> Result<Soup> {
         #[cfg(feature = "step")]
         "step" | "stp" => step::read(&mut source)?,
         "" => {
-            return Err(Error::input(
+            return Err(Error::new(
+                ErrorKind::Unsupported,
                 source.place,
                 "the file name has no suffix to tell its format",
                 format!("name it with one of: {KNOWN}"),
             ));
         }
         _ => {
-            return Err(Error::input(
+            return Err(Error::new(
+                ErrorKind::Unsupported,
                 source.place,
                 format!("unknown mesh format '.{suffix}'"),
                 format!("convert it to one of: {KNOWN}"),
@@ -92,7 +95,8 @@ pub(super) fn read(path: &Path) -> Result<Soup> {
         }
     };
     if soup.read == 0 {
-        return Err(Error::input(
+        return Err(Error::new(
+            ErrorKind::Geometry,
             source.place,
             "holds no triangle",
             "export the part as a surface mesh",
@@ -158,7 +162,7 @@ impl Source<'_> {
 
     /// Bad input in this file as a whole.
     fn bad(&self, problem: impl Into<String>, remedy: &str) -> Error {
-        Error::input(self.place.clone(), problem, remedy)
+        Error::format(self.place.clone(), problem, remedy)
     }
 
     /// Bad input at `where_` (line, triangle, vertex) of this file.
@@ -168,15 +172,15 @@ impl Source<'_> {
         problem: impl Into<String>,
         remedy: &str,
     ) -> Error {
-        Error::input(format!("{}, {where_}", self.place), problem, remedy)
+        Error::format(format!("{}, {where_}", self.place), problem, remedy)
     }
 
     /// Refuses more triangles than can be indexed.
     fn check_count(&self, welder: &Welder) -> Result<()> {
         if welder.count() > MAX_TRIANGLES {
-            return Err(
-                self.bad(format!("more than {MAX_TRIANGLES} triangles"), "decimate the mesh")
-            );
+            return Err(self
+                .bad(format!("more than {MAX_TRIANGLES} triangles"), "decimate the mesh")
+                .with_kind(ErrorKind::Limit));
         }
         Ok(())
     }

@@ -17,7 +17,7 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
     let place = source.place.clone();
     let fault = |reader: &Reader<_>, fault: ParseError| {
         let line = fault.line().unwrap_or(reader.line());
-        Error::input(
+        Error::format(
             format!("{place}, line {line}"),
             format!("not a readable PLY file: {}", first_line(&fault.to_string())),
             "repair the file or export it again",

@@ -6,7 +6,7 @@ use std::io::{BufRead, Read, Seek, SeekFrom};
 use glam::DVec3;
 
 use super::Source;
-use crate::error::Result;
+use crate::error::{ErrorKind, Result};
 use crate::part::weld::{Soup, Welder};
 
 /// Bytes before the first record of the binary form: a free header and the count.
@@ -116,9 +116,9 @@ fn binary(source: &mut Source<'_>) -> Result<Soup> {
                 "repair the mesh or export it again",
             ))
         }
-        Some(Fault::TooMany) => {
-            Err(source.bad(format!("more than {} triangles", triangle - 1), "decimate the mesh"))
-        }
+        Some(Fault::TooMany) => Err(source
+            .bad(format!("more than {} triangles", triangle - 1), "decimate the mesh")
+            .with_kind(ErrorKind::Limit)),
         Some(Fault::Read(fault)) if fault.kind() == std::io::ErrorKind::UnexpectedEof => {
             Err(source.bad(
                 format!("states {count} triangles but ends within triangle {triangle}"),
