@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 use super::display::{Display, TRIANGLE_BUDGET};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gripper::{Body, Gripper, Shape};
-use crate::model::{Contact, Slip};
+use crate::model::{Contact, Frame, Slip};
 use crate::part::Mesh;
 use crate::results::{GripSet, RankedGrip};
 
@@ -108,7 +108,7 @@ impl Payload {
             "format": "gripfast-report", "version": 1, "provenance": set.provenance, "part": set.part, "display": display,
             "gripper": gripper, "gripper_problem": gripper_problem, "loads": set.loads, "summary": set.summary,
             "grips": { "total": set.grips.len(), "shown": grips.len() }, "statuses": statuses, "by_load": by_load,
-            "sections": columns.sections,
+            "asked": asked(set), "sections": columns.sections,
         });
         Ok(Self { header: script_safe(&header)?, data: packed(&columns.bytes)? })
     }
@@ -150,6 +150,7 @@ fn poses_and_scores(columns: &mut Columns, grips: &[RankedGrip]) -> Vec<Value> {
     columns.f32("twist_margin", grips.iter().map(|g| g.twist_margin));
     columns.f32("safety", grips.iter().map(|g| g.safety.unwrap_or(nan)));
     columns.f32("force_needed", grips.iter().map(|g| g.force_needed.unwrap_or(nan)));
+    columns.f32("load_multiple", grips.iter().map(|g| g.load_multiple.unwrap_or(nan)));
     columns.u32("load", grips.iter().map(|g| g.worst.load));
     columns.f32("mu", grips.iter().map(|g| g.worst.mu_s.unwrap_or(nan)));
     columns.f32(
@@ -314,14 +315,32 @@ fn surface(columns: &mut Columns, display: Display) -> Value {
     })
 }
 
+/// What the run was asked for, under the page's own names, so that the page does not depend on how
+/// the result file keeps it; null where the file does not say.
+fn asked(set: &GripSet) -> Value {
+    let setting = |name: &str| set.provenance.settings.get(name).cloned().unwrap_or(Value::Null);
+    json!({
+        "force": setting("force_n"), "pad_friction": setting("pad_friction"),
+        "k1": setting("k1"), "k2": setting("k2"),
+        "spacing": setting("spacing_m"), "angle_step": setting("angle_step_rad"),
+        "min_contact": setting("min_contact_share"), "max_offset": setting("max_offset_m"),
+        "opening": setting("opening_m"), "clearance": setting("clearance_m"),
+        "inside": setting("inside"), "approach_cone": setting("approach_cone"),
+        "ground": setting("ground"), "keep_out": setting("keep_out_m"),
+        "complete": setting("complete"),
+    })
+}
+
+/// A frame as a column-major 4x4 matrix.
+fn matrix(frame: &Frame) -> Vec<f64> {
+    let (r, o) = (frame.rotation, frame.origin);
+    let column = |axis: glam::DVec3, w: f64| [axis.x, axis.y, axis.z, w];
+    [column(r.x_axis, 0.0), column(r.y_axis, 0.0), column(r.z_axis, 0.0), column(o, 1.0)].concat()
+}
+
 /// The gripper with each body's placement as a column-major 4x4 matrix.
 fn gripper_json(gripper: &Gripper) -> Value {
     let body = |body: &Body| {
-        let (r, o) = (body.grip_from_body.rotation, body.grip_from_body.origin);
-        let column = |axis: glam::DVec3, w: f64| [axis.x, axis.y, axis.z, w];
-        let matrix =
-            [column(r.x_axis, 0.0), column(r.y_axis, 0.0), column(r.z_axis, 0.0), column(o, 1.0)]
-                .concat();
         let shape = match &body.shape {
             Shape::Box { half } => json!({ "type": "box", "half": half }),
             Shape::Cylinder { radius, half_height } => {
@@ -329,11 +348,12 @@ fn gripper_json(gripper: &Gripper) -> Value {
             }
             Shape::Hull { points } => json!({ "type": "hull", "points": points }),
         };
-        json!({ "name": body.name, "matrix": matrix, "shape": shape })
+        json!({ "name": body.name, "matrix": matrix(&body.grip_from_body), "shape": shape })
     };
     json!({
         "name": gripper.name, "stroke": gripper.stroke, "force": gripper.force, "pad": gripper.pad,
         "pad_friction": gripper.pad_friction, "pad_thickness": gripper.pad_thickness, "outer_pad": gripper.outer_pad,
+        "flange": gripper.grip_from_flange.as_ref().map(matrix), "tool": gripper.grip_from_tool.as_ref().map(matrix),
         "fingers": gripper.fingers.iter().map(body).collect::<Vec<_>>(), "palm": gripper.palm.iter().map(body).collect::<Vec<_>>(),
     })
 }

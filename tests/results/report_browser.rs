@@ -4,6 +4,7 @@
 //! or fails when the environment variable `GRIPFAST_BROWSER` is `require`. `GRIPFAST_SCREENSHOTS`
 //! names a folder for pictures.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 use std::process::Command;
@@ -33,18 +34,33 @@ fn the_page_works_in_a_browser() {
     let folder = tempfile::tempdir().unwrap();
     let part = part(&data("parts/l_bracket.stl"));
     let mut set = plan(&part, "robotiq-2f85", "ball:60:5N", 0.35, (3, 6), 200);
-    let (small_page, large_page) =
-        (folder.path().join("small.html"), folder.path().join("large.html"));
+    let page = |name: &str| folder.path().join(name);
     let fine = refined(&part.mesh, 6);
     let mut many = large(&set, 10_000);
     many.part.triangles = fine.triangles.len();
-    report::write(&many, Some(&fine), &large_page).unwrap();
+    report::write(&many, Some(&fine), &page("large.html")).unwrap();
     set.part.file = "</script><img src=x onerror=alert(1)>.stl".into();
-    report::write(&set, Some(&part.mesh), &small_page).unwrap();
+    report::write(&set, Some(&part.mesh), &page("small.html")).unwrap();
+    let mut none = set.clone();
+    none.grips.clear();
+    none.summary.ranked = 0;
+    none.summary.rejections = BTreeMap::from([
+        ("part_interference:fingertip".into(), 120),
+        ("contact_too_small".into(), 30),
+        ("twisted_out".into(), 9),
+    ]);
+    report::write(&none, Some(&part.mesh), &page("none.html")).unwrap();
+    let mut slipping = set;
+    slipping.provenance.settings.insert("pad_friction".into(), 1e-4.into());
+    for grip in &mut slipping.grips {
+        grip.safety = grip.worst.mu_s.map(|mu| 1e-4 / mu);
+    }
+    slipping.grips.retain(|grip| grip.safety.is_some_and(|safety| safety < 1.0));
+    report::write(&slipping, Some(&part.mesh), &page("slipping.html")).unwrap();
     let mut command = Command::new("node");
     command
         .arg(viewer.join("test/browser.mjs"))
-        .args([&small_page, &large_page])
+        .arg(folder.path())
         .args(std::env::var_os("GRIPFAST_SCREENSHOTS"));
     let output = command.env("CHROMIUM", browser).output().unwrap();
     let text = [output.stdout, output.stderr]

@@ -41,6 +41,8 @@ export class Report {
     this.header = header;
     this.column = column;
     this.n = header.grips.shown;
+    /** Friction of the pads that the run reckoned with, where one is known. */
+    this.friction = header.asked.pad_friction ?? header.gripper?.pad_friction ?? null;
     this.rowOf = new Map(Array.from(column.by_load_grip, (grip, row) => [grip, row]));
     this.indexOfId = new Map(Array.from(column.id, (id, i) => [id, i]));
   }

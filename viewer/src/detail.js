@@ -20,7 +20,7 @@ export const statusOf = (name) => STATUS[name] ?? [words(name), 'fair', ''];
 /** What the status means with the pads' friction, where that is known: name, kind, explanation. */
 export function verdict(report, i) {
   const known = statusOf(report.status(i));
-  if (report.status(i) !== 'ok' || !report.header.gripper?.pad_friction) return known;
+  if (report.status(i) !== 'ok' || !report.friction) return known;
   const [mu, safety] = [report.column.mu[i], report.column.safety[i]];
   if (mu === 0 || safety >= 1) return ['Holds', 'good', ''];
   return ['Slips', 'bad', 'The worst load needs more friction than the pads have at this gripping force.'];
@@ -85,8 +85,7 @@ export class Detail {
   }
 
   numbers(i) {
-    const { column: c, header } = this.report;
-    const padFriction = header.gripper?.pad_friction;
+    const { column: c, friction: padFriction } = this.report;
     const tile = (id, value, note) => {
       const place = this.find(`[data-value="${id}"]`);
       place.querySelector('.value').textContent = value;
@@ -96,13 +95,13 @@ export class Detail {
     const safety = c.safety[i];
     tile('safety', Number.isFinite(safety) ? `${number(safety)}\u00d7` : c.mu[i] === 0 ? '\u221e' : NONE, padFriction ? `pad friction ${chosen(padFriction)}` : 'pad friction not stated');
     tile('squeeze', newtons(c.force_needed[i]), padFriction ? `for pad friction ${chosen(padFriction)}` : 'pad friction not stated');
-    tile('opening', mm(c.width[i]), c.inside[i] ? 'between the faces, from inside' : 'between the pads');
+    tile('width', mm(c.width[i]), c.inside[i] ? 'from face to face, held from inside' : 'from face to face');
     this.find('.more').replaceChildren(
       facts([
         ['Contact left', percent(c.contact_share[i])],
         ['Twist-out margin', percent(c.twist_margin[i])],
         ['Self-aligning tilt \u03b1', degrees(c.alpha[i])],
-        ['Opening to twist out \u0394d', mm(c.delta_d[i])],
+        ['Spread to twist out \u0394d', mm(c.delta_d[i])],
         ['Score', number(c.score[i], 4)],
         ['Approach angle', degrees(c.angle[i])],
       ]),

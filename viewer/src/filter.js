@@ -11,7 +11,7 @@ export function sortKeys(report) {
     rank: { name: 'Rank', value: (i) => c.rank[i], best: 1 },
     mu: { name: 'Friction needed', value: (i) => missing(c.mu[i]), best: 1 },
     squeeze: { name: 'Squeeze force', value: (i) => missing(c.force_needed[i]), best: 1 },
-    opening: { name: 'Opening', value: (i) => c.width[i], best: 1 },
+    width: { name: 'Width', value: (i) => c.width[i], best: 1 },
     faces: { name: 'Face pair', value: (i) => c.face_i[i] * 65536 + c.face_ii[i], best: 1 },
     alpha: { name: 'Self-aligning tilt', value: (i) => c.alpha[i], best: -1 },
     margin: { name: 'Twist-out margin', value: (i) => c.twist_margin[i], best: -1 },

@@ -1,7 +1,7 @@
 // The gripper as three.js objects, in metres, in the grip frame (x1 approach, x3 closing).
 
 import {
-  BoxGeometry, BufferGeometry, CylinderGeometry, EdgesGeometry, ExtrudeGeometry, Float32BufferAttribute, Group, LineSegments,
+  Box3, BoxGeometry, BufferGeometry, CylinderGeometry, EdgesGeometry, ExtrudeGeometry, Float32BufferAttribute, Group, LineSegments,
   Matrix4, Mesh, Path, Shape, ShapeGeometry, Vector3,
 } from 'three';
 import { ConvexGeometry } from 'three/examples/jsm/geometries/ConvexGeometry.js';
@@ -60,6 +60,16 @@ export class Jaws {
     this.fingers[1].position.z = -opening / 2;
     this.contacts[0].position.z = width / 2;
     this.contacts[1].position.z = -width / 2;
+  }
+
+  /** Corners of the box about fingers and palm, in the frame that this stands in [m]. */
+  corners() {
+    this.root.updateMatrixWorld(true);
+    const scale = this.root.parent?.matrixWorld.clone().invert() ?? new Matrix4();
+    const box = new Box3().setFromObject(this.solid).applyMatrix4(scale);
+    if (box.isEmpty()) return [];
+    const { min, max } = box;
+    return [min.x, max.x].flatMap((x) => [min.y, max.y].flatMap((y) => [min.z, max.z].map((z) => new Vector3(x, y, z))));
   }
 
   /** Shows the contact areas of a grip (rings of `Report.contact`). */

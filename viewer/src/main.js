@@ -12,8 +12,16 @@ import { drawRun, limits } from './run.js';
 import { View } from './scene.js';
 import { theme } from './theme.js';
 import { triad } from './triad.js';
+import { drawWhy } from './why.js';
 
 const $ = (selector) => document.querySelector(selector);
+
+/** The grip that the page's address names: `{ text, found, place }`, with no text where it names none. */
+function address(report) {
+  const text = /^#grip=(.*)$/.exec(location.hash)?.[1];
+  const place = text ? report.indexOfId.get(Number(text)) : undefined;
+  return { text, found: place !== undefined, place };
+}
 
 async function start() {
   const report = await load(document);
@@ -44,13 +52,14 @@ async function start() {
     ball.draw();
   });
 
+  const asked = address(report);
   const state = { filter: { ...EMPTY }, key: 'rank', direction: 1, order: [], chosen: -1 };
   const keys = sortKeys(report);
   const squeeze = report.column.force_needed.some(Number.isFinite);
   if (!squeeze) delete keys.squeeze;
   const third = squeeze ? 'squeeze' : 'alpha';
   $('#columns').querySelector('[data-key="squeeze"]').dataset.key = third;
-  if (!squeeze) $('#columns').querySelector('[data-key="alpha"]').textContent = 'Tilt, \u00b0';
+  if (!squeeze) $('#columns').querySelector('[data-key="alpha"]').innerHTML = 'Tilt<i>\u00b0</i>';
 
   // As many decimals as the middle grip needs for three digits.
   const middle = Float32Array.from(report.column.mu).filter((mu) => mu > 0).sort();
@@ -77,7 +86,7 @@ async function start() {
       cell('number', fixed(c.width[i] * 1e3, 1));
       cell('faces', pairName(report, i));
       cell(`dot ${kind}`, '').title = status;
-      row.setAttribute('aria-label', `Rank ${c.rank[i]}, friction needed ${number(mu)}, ${squeeze ? `squeeze ${number(value)} newtons` : `tilt ${number(value)} degrees`}, opening ${number(c.width[i] * 1e3)} millimetres, faces ${c.face_i[i]} and ${c.face_ii[i]}, ${status}`);
+      row.setAttribute('aria-label', `Rank ${c.rank[i]}, friction needed ${number(mu)}, ${squeeze ? `squeeze ${number(value)} newtons` : `tilt ${number(value)} degrees`}, width ${number(c.width[i] * 1e3)} millimetres, faces ${c.face_i[i]} and ${c.face_ii[i]}, ${status}`);
     },
     choose: (position) => choose(state.order[position]),
   });
@@ -105,6 +114,7 @@ async function start() {
     const all = state.order.length === report.n;
     $('#count').textContent = all ? `${count(report.n)} grips` : `${count(state.order.length)} of ${count(report.n)} grips`;
     $('#empty').hidden = state.order.length > 0;
+    $('#list').hidden = state.order.length === 0;
     const filtered = JSON.stringify(state.filter) !== JSON.stringify(EMPTY) || state.filter.low !== -Infinity || state.filter.high !== Infinity;
     $('#clear').disabled = !filtered;
     histogram.draw(all ? null : state.order);
@@ -130,7 +140,10 @@ async function start() {
   $('#sort').append(...Object.entries(keys).map(([key, { name }]) => option(key, name)));
   $('#pair').append(option('', 'All face pairs'), ...pairs(report).map(([pair, n]) => option(pair, `${pair.replace('/', ' / ')}  (${count(n)})`)));
   $('#status').append(option('', 'Any status'), ...header.statuses.map((name) => option(name, statusOf(name)[0])));
-  $('#columns').addEventListener('click', (event) => event.target.dataset.key && sortBy(event.target.dataset.key));
+  $('#columns').addEventListener('click', (event) => {
+    const { key } = event.target.closest('button')?.dataset ?? {};
+    if (key) sortBy(key);
+  });
   $('#sort').addEventListener('change', (event) => {
     state.key = '';
     sortBy(event.target.value);
@@ -142,15 +155,20 @@ async function start() {
       relist();
     });
   }
-  $('#clear').addEventListener('click', () => {
+  const clear = () => {
     state.filter = { ...EMPTY };
     for (const id of ['pair', 'status', 'text']) $(`#${id}`).value = '';
     histogram.reset();
     relist();
-  });
+  };
+  $('#clear').addEventListener('click', clear);
+  $('#empty button').addEventListener('click', clear);
 
   drawRun($('#run-content'), report);
-  $('#note').textContent = limits(report)[0] ?? '';
+  const why = drawWhy($('#panel-why'), report);
+  $('#tab-why').hidden = !why;
+  document.body.classList.toggle('no-grips', report.n === 0);
+  $('#note').textContent = report.n === 0 && header.gripper ? `${header.gripper.name} beside the part, to scale, its jaws at their widest.` : (limits(report)[0] ?? '');
   bindView();
   bindTabs();
 
@@ -201,11 +219,23 @@ async function start() {
     const wide = window.matchMedia('(min-width: 1000px)');
     const settle = () => {
       $('#filter-box').open = wide.matches;
-      open(tabs.find((tab) => tab.dataset.tab === (wide.matches ? 'grip' : 'list')));
+      const first = why && !asked.found ? 'why' : wide.matches ? 'grip' : 'list';
+      open(tabs.find((tab) => tab.dataset.tab === first));
     };
     wide.addEventListener('change', settle);
     settle();
   }
+
+  /** Says that the address names a grip that is not here. */
+  function missing({ text, found }) {
+    const box = $('#missing');
+    box.hidden = text === undefined || found;
+    if (box.hidden) return;
+    const listed = header.grips.shown < header.grips.total ? ` It lists the best ${count(header.grips.shown)} of ${count(header.grips.total)}.` : '';
+    const instead = report.n > 0 ? ` Grip ${count(report.column.rank[state.chosen])} is shown instead.` : ' It has no grips.';
+    box.firstElementChild.textContent = `The link names grip \u201c${decodeURIComponent(text).slice(0, 40)}\u201d, which is not on this page.${listed}${instead}`;
+  }
+  $('#missing button').addEventListener('click', () => ($('#missing').hidden = true));
 
   document.addEventListener('keydown', (event) => {
     if (event.key === '/' && !event.target.matches('input, select')) {
@@ -215,12 +245,17 @@ async function start() {
   });
 
   relist();
-  const asked = report.indexOfId.get(Number(/grip=(\d+)/.exec(location.hash)?.[1]));
-  if (report.n > 0) {
-    choose(asked ?? state.order[0], { glide: false });
-    view?.fit();
-  } else document.body.classList.add('no-grips');
+  if (report.n > 0) choose(asked.found ? asked.place : state.order[0], { glide: false });
+  else view?.setGrip(-1);
+  missing(asked);
+  view?.fit();
   view?.draw();
+  // A link opened in the same tab, or the address edited by hand.
+  window.addEventListener('hashchange', () => {
+    const next = address(report);
+    if (next.found) choose(next.place);
+    missing(next);
+  });
   document.documentElement.dataset.ready = String(Math.round(performance.now()));
   // For tests and for the curious: what is shown, as numbers.
   window.gripfast = {

@@ -1,8 +1,9 @@
 // What was proposed and why the others fell, the part, the gripper, settings and provenance.
 
-import { chosen, count, mass, mm, number, percent, words } from './format.js';
+import { chosen, count, mass, mm, number, percent } from './format.js';
+import { reasons } from './why.js';
 
-const node = (name, text, attributes = {}) => {
+export const node = (name, text, attributes = {}) => {
   const made = document.createElement(name);
   if (text !== undefined) made.textContent = text;
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
@@ -24,7 +25,7 @@ export function facts(entries, className = 'facts') {
   return list;
 }
 
-function bars(entries, total, label) {
+export function bars(entries, total, label) {
   const table = node('table', undefined, { class: 'bars' });
   table.append(node('caption', label, { class: 'hidden' }));
   const largest = Math.max(1, ...entries.map((entry) => entry[1]));
@@ -66,11 +67,11 @@ export function limits(report) {
 export function drawRun(root, report) {
   const { header } = report;
   const { summary, part, gripper, provenance, display } = header;
-  const rejections = Object.entries(summary.rejections).sort((a, b) => b[1] - a[1]);
-  const fallen = rejections.reduce((sum, entry) => sum + entry[1], 0);
+  const rejections = reasons(report);
+  const fallen = rejections.reduce((sum, entry) => sum + entry.n, 0);
   const funnel = bars([['Candidates', summary.candidates], ['Rejected', fallen, 'bad'], ['Ranked', summary.ranked, 'good']], summary.candidates, 'From candidates to ranked grips');
-  root.append(section('From candidates to grips', node('p', `${count(summary.pairs)} antiparallel face pairs within the stroke.`, { class: 'quiet' }), funnel));
-  root.append(section('Why candidates were rejected', rejections.length ? bars(rejections.map(([name, n]) => [words(name), n, 'bad']), fallen, 'Rejections by reason') : node('p', 'None was rejected.', { class: 'quiet' })));
+  root.append(section('From candidates to grips', node('p', `${count(summary.pairs)} pair${summary.pairs === 1 ? '' : 's'} of opposite faces within the stroke.`, { class: 'quiet' }), funnel));
+  root.append(section('Why candidates were rejected', rejections.length ? bars(rejections.map(({ title, n }) => [title, n, 'bad']), fallen, 'Rejections by reason') : node('p', 'None was rejected.', { class: 'quiet' })));
   const com = part.mass.centre_of_mass.map((v) => number(v * 1e3)).join(', ');
   root.append(
     section('Part', facts([
@@ -84,7 +85,7 @@ export function drawRun(root, report) {
     root.append(
       section('Gripper', facts([
         ['Name', gripper.name], ['Stroke', `${chosen(gripper.stroke[0] * 1e3)} to ${chosen(gripper.stroke[1] * 1e3)}\u00a0mm`], ['Force', `${chosen(gripper.force[0])} to ${chosen(gripper.force[1])}\u00a0N`],
-        ['Pad (x\u2081 \u00d7 x\u2082)', `${x} \u00d7 ${y}\u00a0mm`], ['Pad friction', gripper.pad_friction === null ? 'not stated' : chosen(gripper.pad_friction)],
+        ['Pad (x\u2081 \u00d7 x\u2082)', `${x} \u00d7 ${y}\u00a0mm`], ['Pad friction', report.friction ? chosen(report.friction) : 'not stated'],
         ['Rubber', gripper.pad_thickness === null ? 'not stated' : `${chosen(gripper.pad_thickness * 1e3)}\u00a0mm`],
       ])),
     );

@@ -1,8 +1,8 @@
 // The part with the chosen grip in three dimensions. Draws only when something changed. The world is in millimetres.
 
 import {
-  AmbientLight, Box3, Box3Helper, BufferAttribute, BufferGeometry, CanvasTexture, Color, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide,
-  Group, HemisphereLight, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Points,
+  AmbientLight, Box3, BoxGeometry, Box3Helper, BufferAttribute, BufferGeometry, CanvasTexture, Color, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide,
+  GridHelper, Group, HemisphereLight, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, PlaneGeometry, Points,
   PointsMaterial, Quaternion, Raycaster, Scene, SphereGeometry, Spherical, Vector2, Vector3, WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
@@ -11,11 +11,13 @@ import { Jaws } from './jaws.js';
 
 const MM = 1000;
 const MOVE_MS = 260;
+/** Share of the view's width that what is framed fills, and the height [px] that it leaves free above and below. */
+const [FILL, MARGIN] = [0.86, 52];
 const UP = new Vector3(0, 0, 1);
 
 const PALETTE = {
-  light: { part: '#b4bdc8', edge: '#4b5663', jaw: '#4a6785', jawEdge: '#2f4a66', pad: '#d9762b', load: '#a3158f', sky: '#ffffff', ground: '#9aa3ad' },
-  dark: { part: '#76828f', edge: '#11161b', jaw: '#9db4cc', jawEdge: '#c9d8e6', pad: '#f0964d', load: '#ef6bd8', sky: '#f2f6fa', ground: '#4a535d' },
+  light: { part: '#b4bdc8', edge: '#4b5663', jaw: '#4a6785', jawEdge: '#2f4a66', pad: '#d9762b', load: '#a3158f', fixture: '#8a6d00', sky: '#ffffff', ground: '#9aa3ad' },
+  dark: { part: '#76828f', edge: '#11161b', jaw: '#9db4cc', jawEdge: '#c9d8e6', pad: '#f0964d', load: '#ef6bd8', fixture: '#d9b84a', sky: '#f2f6fa', ground: '#4a535d' },
 };
 
 const vector = (list) => new Vector3(...list);
@@ -66,6 +68,7 @@ export class View {
     this.buildLoad();
     this.jaws = new Jaws(report.header.gripper, this.materials);
     this.world.add(this.jaws.root);
+    this.buildFixtures();
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.enableDamping = false;
     this.controls.zoomToCursor = true;
@@ -103,6 +106,8 @@ export class View {
       contact: new MeshBasicMaterial({ transparent: true, opacity: 0.85, depthWrite: false, side: DoubleSide }),
       contactEdge: new LineBasicMaterial(),
       load: new MeshBasicMaterial({ depthTest: false, transparent: true }),
+      fixture: new MeshBasicMaterial({ opacity: 0.14, ...glass }),
+      fixtureEdge: new LineBasicMaterial({ transparent: true, opacity: 0.5 }),
     };
   }
 
@@ -187,8 +192,9 @@ export class View {
 
   setTheme(dark) {
     const colours = PALETTE[dark ? 'dark' : 'light'];
-    for (const name of ['part', 'edge', 'jaw', 'jawEdge', 'pad', 'load']) this.materials[name].color.set(colours[name]);
+    for (const name of ['part', 'edge', 'jaw', 'jawEdge', 'pad', 'load', 'fixture']) this.materials[name].color.set(colours[name]);
     this.materials.palm.color.set(colours.jaw);
+    this.materials.fixtureEdge.color.set(colours.fixture);
     for (const name of ['padEdge', 'contact', 'contactEdge']) this.materials[name].color.set(colours.pad);
     this.sky.color.set(colours.sky);
     this.sky.groundColor.set(colours.ground);
@@ -209,9 +215,8 @@ export class View {
   setGrip(i, glide = true) {
     const known = this.grip >= 0;
     this.grip = i;
-    this.jaws.root.visible = i >= 0;
     this.load.visible = false;
-    if (i < 0) return this.render();
+    if (i < 0) return this.standAside();
     const { x1, x2, x3, origin } = this.report.pose(i);
     const to = { q: new Quaternion().setFromRotationMatrix(new Matrix4().makeBasis(vector(x1), vector(x2), vector(x3))), p: vector(origin) };
     this.jaws.setContact(this.report.contact(i));
@@ -274,6 +279,54 @@ export class View {
     this.render();
   }
 
+  /** Without a grip the gripper stands above the part, to scale, its jaws at their widest. */
+  standAside() {
+    const { gripper } = this.report.header;
+    this.jaws.root.visible = Boolean(gripper);
+    if (gripper) {
+      this.jaws.root.quaternion.identity();
+      this.jaws.root.position.set(0, 0, 0);
+      const reach = Math.max(...this.jaws.corners().map((point) => point.x));
+      const size = this.box.getSize(new Vector3());
+      const away = 1.4 * reach;
+      // Approach downwards, closing along the part's shorter side.
+      const closing = size.x < size.y ? new Vector3(1, 0, 0) : new Vector3(0, 1, 0);
+      const approach = new Vector3(0, 0, -1);
+      this.jaws.root.quaternion.setFromRotationMatrix(new Matrix4().makeBasis(approach, closing.clone().cross(approach), closing));
+      this.jaws.root.position.set(this.middle.x / MM, this.middle.y / MM, this.box.max.z / MM + away);
+      this.jaws.place(gripper.stroke[1], gripper.stroke[1]);
+    }
+    this.render();
+  }
+
+  /** The ground and the boxes to keep out of, where the run had some. */
+  buildFixtures() {
+    const { ground, keep_out: boxes } = this.report.header.asked;
+    this.gripperSize = 2 * MM * Math.max(0, ...this.jaws.corners().map((point) => point.length()));
+    this.fixtures = new Group();
+    if (ground) {
+      const normal = vector(ground.normal).normalize();
+      const centre = this.middle.clone().divideScalar(MM);
+      centre.addScaledVector(normal, ground.height_m - centre.dot(normal));
+      const size = (4 * this.radius) / MM;
+      const lines = new GridHelper(size, 16).rotateX(Math.PI / 2);
+      lines.material = this.materials.fixtureEdge;
+      const plane = new Group().add(new Mesh(new PlaneGeometry(size, size), this.materials.fixture), lines);
+      plane.quaternion.setFromUnitVectors(UP, normal);
+      plane.position.copy(centre);
+      this.fixtures.add(plane);
+    }
+    for (const [low, high] of boxes ?? []) {
+      const box = new Box3(vector(low), vector(high));
+      const helper = new Box3Helper(box);
+      helper.material = this.materials.fixtureEdge;
+      const solid = new Mesh(new BoxGeometry(...box.getSize(new Vector3()).toArray()), this.materials.fixture);
+      solid.position.copy(box.getCenter(new Vector3()));
+      this.fixtures.add(helper, solid);
+    }
+    this.world.add(this.fixtures);
+  }
+
   /** The whole part from a side on which grip `i`'s jaws are seen: across the closing axis, a little from its palm. */
   fit(i = this.grip) {
     let towards = new Vector3(1, -1.35, 0.85);
@@ -283,21 +336,46 @@ export class View {
       const worth = (look) => Math.abs(look.dot(vector(x2))) - 0.35 * look.dot(vector(x1)) + 0.25 * Math.abs(look.dot(vector(x3))) + (look.z > 0 ? 0.5 : 0) - (look.y > 0 ? 0.08 : 0);
       towards = looks.sort((a, b) => worth(b) - worth(a))[0];
     }
-    this.look(this.middle, towards, this.radius * 1.32);
+    const { min, max } = this.box;
+    const corners = [min.x, max.x].flatMap((x) => [min.y, max.y].flatMap((y) => [min.z, max.z].map((z) => new Vector3(x, y, z))));
+    if (i < 0 && this.jaws.root.visible) corners.push(...this.jaws.corners().map((point) => point.multiplyScalar(MM)));
+    this.frame(corners, towards);
   }
 
   /** The chosen grip from close by. */
   lookAtGrip() {
     if (this.grip < 0) return this.fit();
-    const { origin } = this.report.pose(this.grip);
-    const reach = this.report.header.gripper ? Math.max(...this.report.header.gripper.pad.flat().map(Math.abs)) : 0;
-    this.look(vector(origin).multiplyScalar(MM), this.camera.position.clone().sub(this.controls.target), Math.max(this.width, 2.5 * reach, 0.004) * 1.1 * MM);
+    const { x1, x2, x3, origin } = this.report.pose(this.grip);
+    const place = new Matrix4().makeBasis(vector(x1), vector(x2), vector(x3)).setPosition(...origin);
+    const outline = this.report.header.gripper?.pad ?? this.report.contact(this.grip).flatMap((ring) => ring.points);
+    const points = outline.flatMap(([x, y]) => [0.5, -0.5].map((side) => new Vector3(x, y, side * this.width).applyMatrix4(place).multiplyScalar(MM)));
+    this.frame(points, this.camera.position.clone().sub(this.controls.target));
   }
 
-  look(target, towards, radius) {
-    const half = (Math.min(this.camera.fov, 2 * Math.atan(Math.tan((this.camera.fov * Math.PI) / 360) * this.camera.aspect) * (180 / Math.PI)) * Math.PI) / 360;
-    this.controls.target.copy(target);
-    this.camera.position.copy(target).addScaledVector(towards.clone().normalize(), radius / Math.sin(half));
+  /** Moves the camera to the side `towards` and so near that `points` [mm] just fill the part of the view that is free. */
+  frame(points, towards) {
+    const out = towards.clone().normalize();
+    const right = UP.clone().cross(out);
+    if (right.lengthSq() < 1e-9) right.set(1, 0, 0);
+    right.normalize();
+    const up = out.clone().cross(right);
+    const tall = Math.tan((this.camera.fov * Math.PI) / 360);
+    // Above lie the buttons; below, as much is left for the note.
+    const free = Math.max(0.5, 1 - (2 * MARGIN) / Math.max(this.host.clientHeight, 1));
+    const half = [FILL * tall * this.camera.aspect, free * tall];
+    // The perspective makes the nearer points larger: the middle is looked for by steps.
+    const centre = new Box3().setFromPoints(points).getCenter(new Vector3());
+    let distance = 0;
+    for (let step = 0; step < 8; step++) {
+      const seen = points.map((point) => point.clone().sub(centre)).map((point) => [point.dot(right), point.dot(up), point.dot(out)]);
+      distance = Math.max(...seen.map(([x, y, z]) => z + Math.max(Math.abs(x) / half[0], Math.abs(y) / half[1])), 1e-3);
+      for (const [k, axis] of [right, up].entries()) {
+        const places = seen.map((point) => point[k] / (distance - point[2]));
+        centre.addScaledVector(axis, ((Math.min(...places) + Math.max(...places)) / 2) * distance);
+      }
+    }
+    this.controls.target.copy(centre);
+    this.camera.position.copy(centre).addScaledVector(out, distance);
     this.controls.update();
     this.render();
   }
@@ -345,6 +423,7 @@ export class View {
       else if (event.key === '+' || event.key === '=') this.zoom(1 / 1.15);
       else if (event.key === '-') this.zoom(1.15);
       else if (event.key === 'f' || event.key === 'F') this.fit();
+      else if (event.key === 'g' || event.key === 'G') this.lookAtGrip();
       else return;
       event.preventDefault();
     });
@@ -401,7 +480,7 @@ export class View {
     if (this.pending) cancelAnimationFrame(this.pending);
     this.pending = undefined;
     const distance = this.camera.position.distanceTo(this.middle);
-    const reach = this.radius * 8;
+    const reach = this.radius * 8 + this.gripperSize;
     this.camera.near = Math.max(distance - reach, distance * 0.01, this.radius * 0.002);
     this.camera.far = distance + reach;
     this.camera.updateProjectionMatrix();

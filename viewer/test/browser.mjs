@@ -1,14 +1,16 @@
-// Drives pages in a real browser: node test/browser.mjs SMALL.html LARGE.html [FOLDER FOR SCREENSHOTS]
-// SMALL: some dozens of grips with a hostile part name; LARGE: 10,000 grips on a part that was simplified.
+// Drives pages in a real browser: node test/browser.mjs FOLDER [FOLDER FOR SCREENSHOTS]
+// In the folder: small.html, some dozens of grips with a hostile part name; large.html, 10,000 grips on a part that was
+// simplified; none.html, no grip; slipping.html, grips that all slip.
 // Exits with 1 and says what failed. CHROMIUM names the browser (default /usr/bin/chromium).
 
-import { mkdtempSync, rmSync } from 'node:fs';
+import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { chromium } from 'playwright-core';
 
-const [small, large, shots] = process.argv.slice(2).map((path) => resolve(path));
+const [folder, shots] = process.argv.slice(2).map((path) => resolve(path));
+const [small, large, none, slipping] = ['small', 'large', 'none', 'slipping'].map((name) => join(folder, `${name}.html`));
 const FLAGS = ['--headless', '--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update',
   '--disable-sync', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
 const failures = [];
@@ -73,6 +75,86 @@ async function colours(page, selector) {
   }, picture);
 }
 
+/** Pairs of texts that lie over each other, as far as they are in sight. */
+const overlaps = (page) => page.evaluate(() => {
+  const shown = (rect, element) => {
+    let [left, top, right, bottom] = [rect.left, rect.top, rect.right, rect.bottom];
+    for (let up = element; up && up !== document.body; up = up.parentElement) {
+      const style = getComputedStyle(up);
+      if (style.visibility === 'hidden' || style.display === 'none' || style.clipPath !== 'none' && up.classList.contains('hidden')) return null;
+      if (style.overflowX === 'visible' && style.overflowY === 'visible') continue;
+      const clip = up.getBoundingClientRect();
+      [left, top, right, bottom] = [Math.max(left, clip.left), Math.max(top, clip.top), Math.min(right, clip.right), Math.min(bottom, clip.bottom)];
+    }
+    [left, top, right, bottom] = [Math.max(left, 0), Math.max(top, 0), Math.min(right, innerWidth), Math.min(bottom, innerHeight)];
+    return right - left > 0.5 && bottom - top > 0.5 ? { left, top, right, bottom } : null;
+  };
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  const texts = [];
+  while (walker.nextNode()) {
+    const node = walker.currentNode;
+    const { parentElement: element, data } = node;
+    if (!data.trim() || element.closest('script, style, noscript, option, title, .hidden') || !element.checkVisibility({ visibilityProperty: true })) continue;
+    const range = document.createRange();
+    range.selectNodeContents(node);
+    for (const rect of range.getClientRects()) {
+      const box = shown(rect, element);
+      // Line boxes are taller than their letters.
+      const lean = box && 0.18 * (box.bottom - box.top);
+      if (box) texts.push({ ...box, top: box.top + lean, bottom: box.bottom - lean, text: data.trim().slice(0, 30), node });
+    }
+  }
+  const found = [];
+  texts.forEach((a, i) => texts.slice(i + 1).forEach((b) => {
+    const [x, y] = [Math.min(a.right, b.right) - Math.max(a.left, b.left), Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top)];
+    // A text cut short with dots has the boxes of both.
+    if (a.node !== b.node && x > 1 && y > 1) found.push(`"${a.text}" over "${b.text}" (${x.toFixed(0)} by ${y.toFixed(0)})`);
+  }));
+  return found;
+});
+
+/** Texts whose contrast with what lies behind them is below WCAG AA: 4.5, or 3 for large letters. */
+const faint = (page) => page.evaluate(() => {
+  const canvas = new OffscreenCanvas(1, 1).getContext('2d', { willReadFrequently: true });
+  const parse = (colour) => {
+    canvas.clearRect(0, 0, 1, 1);
+    canvas.fillStyle = colour;
+    canvas.fillRect(0, 0, 1, 1);
+    const [r, g, b, a] = canvas.getImageData(0, 0, 1, 1).data;
+    return [r, g, b, a / 255];
+  };
+  const over = (top, below) => [0, 1, 2].map((k) => top[k] * top[3] + below[k] * (1 - top[3]));
+  const light = (rgb) => rgb.map((v) => v / 255).map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)).reduce((sum, v, k) => sum + v * [0.2126, 0.7152, 0.0722][k], 0);
+  const found = new Set();
+  for (const element of document.querySelectorAll('body *')) {
+    if (![...element.childNodes].some((node) => node.nodeType === 3 && node.data.trim())) continue;
+    if (element.closest('script, style, noscript, option, title, .hidden, :disabled') || !element.checkVisibility({ visibilityProperty: true, opacityProperty: true })) continue;
+    const style = getComputedStyle(element);
+    const layers = [];
+    let opacity = 1;
+    for (let up = element; up; up = up.parentElement) {
+      const ground = getComputedStyle(up);
+      layers.push(parse(ground.backgroundColor));
+      opacity *= Number(ground.opacity);
+    }
+    const ground = layers.reverse().reduce((below, layer) => over(layer, below), [255, 255, 255]);
+    const svg = element instanceof SVGElement;
+    const ink = parse(svg ? style.fill : style.color);
+    const [a, b] = [light(over([ink[0], ink[1], ink[2], ink[3] * opacity], ground)), light(ground)];
+    const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    const size = parseFloat(style.fontSize);
+    if (ratio < (size >= 24 || (size >= 18.66 && Number(style.fontWeight) >= 700) ? 3 : 4.5)) found.add(`"${element.textContent.trim().slice(0, 24)}" ${ratio.toFixed(2)}`);
+  }
+  return [...found];
+});
+
+async function legible(page, where) {
+  const lying = await overlaps(page);
+  check(`no text lies over another ${where}`, lying.length === 0, lying.slice(0, 5).join('; '));
+  const pale = await faint(page);
+  check(`texts stand out from their ground ${where}`, pale.length === 0, pale.slice(0, 5).join('; '));
+}
+
 const shot = (page, name) => (shots ? page.screenshot({ path: join(shots, `${name}.png`) }) : null);
 const state = (page) => page.evaluate(() => ({
   order: window.gripfast.state.order.slice(0, 2000), chosen: window.gripfast.state.chosen, jaw: window.gripfast.jaw(0),
@@ -100,12 +182,17 @@ async function wholePage() {
   const ball = await colours(page, '.ball');
   check('the load ball is drawn', ball.different > 25, JSON.stringify(ball));
   await shot(page, 'laptop-light');
+  await legible(page, 'on a laptop');
+  for (const key of ['width', 'squeeze', 'mu', 'faces', 'rank']) {
+    await page.click(`#columns [data-key="${key}"]`);
+    check(`the heads keep apart sorted by ${key}`, (await overlaps(page)).length === 0, (await overlaps(page)).join('; '));
+  }
 
   // The list: order, filters, keyboard.
   check('grips come ranked', ascending(await column(page, 'rank')));
-  await page.click('#columns [data-key="opening"]');
+  await page.click('#columns [data-key="width"]');
   check('a column head sorts', ascending(await column(page, 'width')));
-  await page.click('#columns [data-key="opening"]');
+  await page.click('#columns [data-key="width"]');
   check('a second click reverses', ascending((await column(page, 'width')).reverse()));
   await page.selectOption('#sort', 'margin');
   check('the menu sorts, best first', ascending((await column(page, 'twist_margin')).reverse()));
@@ -119,8 +206,9 @@ async function wholePage() {
   await page.fill('#text', '#3 ');
   check('text filters', (await column(page, 'rank')).every((rank) => String(rank).startsWith('3')) && (await column(page, 'rank')).length > 0);
   await page.fill('#text', 'no such grip');
-  check('an empty list says so', await page.isVisible('#empty'));
-  await page.click('#clear');
+  check('an empty list says so', await page.isVisible('#empty') && !(await page.isVisible('#list')));
+  await legible(page, 'with an empty list');
+  await page.click('#empty button');
   await page.locator('#histogram input').nth(1).focus();
   for (let i = 0; i < 40; i++) await page.keyboard.press('ArrowLeft');
   const listed = await column(page, 'mu');
@@ -210,6 +298,13 @@ async function wholePage() {
 async function linkAndTheme() {
   const page = await open(small, { scheme: 'dark', hash: '#grip=5' });
   check('an address with a grip opens on it', (await state(page)).id === 5);
+  check('a link that is right says nothing', !(await page.isVisible('#missing')));
+  await page.evaluate(() => (location.hash = '#grip=123456'));
+  await page.waitForSelector('#missing:visible');
+  check('a link to a grip that is not there says so', /123456.*not on this page/.test(await page.textContent('#missing')), await page.textContent('#missing'));
+  check('and the grip shown stays', (await state(page)).id === 5);
+  await page.click('#missing button');
+  await legible(page, 'in the dark');
   const ground = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
   const dark = await ground();
   await shot(page, 'laptop-dark');
@@ -226,13 +321,43 @@ async function phone() {
   for (const tab of ['list', 'grip', 'run']) {
     await page.click(`#tab-${tab}`);
     check(`the ${tab} panel fits a phone`, (await wide()) <= 0 && (await page.isVisible(`#panel-${tab}`)), String(await wide()));
+    await legible(page, `on a phone, ${tab}`);
     await shot(page, `phone-${tab}`);
   }
   await page.click('#tab-list');
   await page.click('.row[data-position="2"]');
+  check('no note lies over the part on a phone', !(await page.isVisible('#note')));
   check('a tap chooses on a phone', (await state(page)).chosen === (await state(page)).order[2]);
   check('no layout shift on a phone', (await page.evaluate(() => window.shifts)) < 0.02, await page.evaluate(() => `${window.shifts.toFixed(4)} ${window.shifted.join()}`));
   await page.close();
+}
+
+async function nothing() {
+  const sizes = [['on a laptop', {}], ['on a tablet', { width: 820, height: 1180, scheme: 'dark' }], ['on a phone', { width: 390, height: 844 }]];
+  for (const [where, size] of sizes) {
+    const page = await open(none, size);
+    const text = await page.innerText('#panel-why');
+    check(`a page without grips opens with why ${where}`, /No grip holds this part/.test(text) && /Fingertip runs into the part/.test(text) && /What would help/.test(text), text.slice(0, 60));
+    check(`no empty panel ${where}`, !(await page.isVisible('#panel-list')) && !(await page.isVisible('#panel-grip')) && !(await page.isVisible('#tab-grip')));
+    const bars = await page.locator('#panel-why .bar').evaluateAll((list) => list.map((bar) => bar.getBoundingClientRect().width));
+    check(`the reasons come as bars, most first ${where}`, bars.length === 3 && bars[0] > bars[1] && bars[1] > bars[2], bars.join());
+    const view = await colours(page, '#view canvas');
+    check(`nothing fills the view ${where}`, view.different > 30 && view.commonest < 0.6, JSON.stringify(view));
+    await legible(page, `without grips ${where}`);
+    await shot(page, `none-${where.split(' ').pop()}`);
+    check(`no trouble without grips ${where}`, page.trouble.length === 0, page.trouble.join('; '));
+    await page.close();
+  }
+  const page = await open(none, { hash: '#grip=7' });
+  check('a link into a page without grips says so', /7.*not on this page.*no grips/.test(await page.textContent('#missing')));
+  await page.close();
+  const slips = await open(slipping);
+  const text = await slips.innerText('#panel-why');
+  check('a page whose grips all slip opens with why', /grips slip/.test(text) && /More force|Pads with more friction/.test(text), text.slice(0, 60));
+  check('its grips are listed all the same', (await slips.locator('.row').count()) > 3);
+  await legible(slips, 'where all slip');
+  await shot(slips, 'slipping');
+  await slips.close();
 }
 
 async function tenThousand() {
@@ -262,7 +387,8 @@ try {
   await wholePage();
   await linkAndTheme();
   await phone();
-  if (large) await tenThousand();
+  await nothing();
+  if (existsSync(large)) await tenThousand();
 } finally {
   await browser.close();
   rmSync(profile, { recursive: true, force: true });

@@ -1,0 +1,131 @@
+// Why no grip was found, or none holds: the reasons as bars, what each one means, and what would help.
+
+import { verdict } from './detail.js';
+import { chosen, count, degrees, inMm, mm, newtons, number, percent, words } from './format.js';
+import { bars, node } from './run.js';
+
+const upper = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** Sizes [m] that hardly any part has that a robot's gripper holds. */
+const [TINY, HUGE] = [1e-3, 2];
+
+const largestForce = (report) => Math.max(0, ...report.header.loads.map((load) => Math.hypot(...load.wrench.force)));
+
+/** An element with `text`, its flags of the program set as code, which no line break cuts. */
+function told(name, text) {
+  const made = node(name);
+  text.split(/(--[a-z-]+)/).forEach((piece, k) => made.append(k % 2 ? node('code', piece) : piece));
+  return made;
+}
+
+/** What to do about a force that is too small. */
+function moreForce({ header }) {
+  const { asked, gripper } = header;
+  if (gripper && asked.force < gripper.force[1]) return `More force: this gripper gives up to ${newtons(gripper.force[1])} (--force), and ${newtons(asked.force)} was asked for.`;
+  return `More force than this gripper has${gripper ? ` (${newtons(gripper.force[1])})` : ''}: a stronger gripper, or a lighter part and gentler motion (--mass, --accel).`;
+}
+
+/** A rejection in words: title, meaning, and advice. */
+export function reason(name, report) {
+  const { asked, gripper, part, loads } = report.header;
+  const [kind, of] = name.split(':');
+  const body = upper((of ?? '').replaceAll('_', ' '));
+  const known = {
+    face_pair_outside_stroke: () => {
+      const size = part.bbox_max.map((high, k) => high - part.bbox_min[k]);
+      const odd = Math.max(...size) > HUGE || Math.max(...size) < TINY;
+      return ['Width outside the stroke', gripper ? `The faces lie nearer together or farther apart than the jaws reach (${chosen(gripper.stroke[0] * 1e3)} to ${chosen(gripper.stroke[1] * 1e3)}\u00a0mm).` : '',
+        odd ? `Check the unit of the part file: the part measures ${size.map((v) => (v >= 1 ? count(v * 1e3) : inMm(v))).join(' \u00d7 ')}\u00a0mm (--unit).`
+          : 'A gripper with another stroke: gripfast gripper list names those of the catalogue.'];
+    },
+    face_pair_not_chosen: () => ['Faces not chosen', 'The choice of faces leaves these pairs out.', 'More faces: --faces and --faces-in, or neither.'],
+    approach_outside_cone: () => ['Approach outside the cone', 'The approach is not among the directions asked for.',
+      asked.approach_cone ? `A wider cone: --approach allows ${degrees(asked.approach_cone.half_angle_rad)} about (${asked.approach_cone.axis.map((v) => number(v)).join(', ')}).` : 'A wider cone (--approach).'],
+    too_far_from_centre_of_mass: () => ['Too far from the centre of mass', '', `A larger --max-offset${asked.max_offset ? ` than ${mm(asked.max_offset)}` : ''}.`],
+    contact_too_small: () => ['Contact too small', 'A pad would touch too little of its face.',
+      `A smaller share (--min-contact${asked.min_contact ? `, now ${percent(asked.min_contact)}` : ''}), or a finer grid (--spacing${asked.spacing ? `, now ${mm(asked.spacing)}` : ''}).`],
+    ground: () => [`${body} below the ground`, 'Drawn in the view: the ground that the gripper must stay above.',
+      `A lower --ground${asked.ground ? ` than ${mm(asked.ground.height_m)}` : ''}, a part that stands higher, or an approach from above (--approach).`],
+    keep_out: () => [`${body} in a box to keep out of`, 'The boxes are drawn in the view.', 'Smaller boxes (--keep-out), or another approach.'],
+    part_interference: () => [`${body} runs into the part`, '', `Places between the obstacles, with a finer grid (--spacing, --angle-step)${asked.clearance ? ` or less clearance (--clearance, now ${mm(asked.clearance)})` : ''}; else a gripper with slimmer fingers.`],
+    approach_blocked: () => [`${body} hits the part on its way in`, 'The pose itself is free; the opened jaws do not get there.', `A smaller --opening${asked.opening ? ` than ${mm(asked.opening)} per jaw` : ''}.`],
+    no_normal_force: () => ['Pulled off a pad', `A load pulls along the closing axis so hard that one pad no longer presses. The largest of the ${count(loads.length)} loads is ${newtons(largestForce(report))}, the gripping force ${newtons(asked.force)}.`, moreForce(report)],
+    twisted_out: () => ['Twisted out of the pads', `A load tilts the part out of the pads whatever their friction. The largest load is ${newtons(largestForce(report))}, the gripping force ${newtons(asked.force)}.`,
+      `Larger pads, or places nearer to the centre of mass. ${moreForce(report)}`],
+    separating: () => ['Pads lift off', 'Part of a pad lifts off under a load, and such grips were to be discarded.', 'Take the contact that is left: --separation solve.'],
+    no_contact: () => ['No contact', 'A contact area is empty.', ''],
+    duplicate: () => ['Same as another by symmetry', 'Another grip of the list stands for it.', ''],
+    outranked: () => ['Behind the best ones kept', 'Bounds put it behind the grips that are listed.', ''],
+  }[kind];
+  const [title, meaning, help] = known?.() ?? [words(name), '', ''];
+  return { title, meaning, help };
+}
+
+/** Reasons with their counts, most first. */
+export const reasons = (report) => Object.entries(report.header.summary.rejections).sort((a, b) => b[1] - a[1]).map(([name, n]) => ({ name, n, ...reason(name, report) }));
+
+/** Whether there is something to explain: no grip at all, or none that holds. */
+export function nothingHolds(report) {
+  for (let i = 0; i < report.n; i++) if (verdict(report, i)[1] !== 'bad') return false;
+  return true;
+}
+
+/** Advice where grips exist and all of them slip. */
+function allSlip(report) {
+  const { column: c, header } = report;
+  const { asked, gripper } = header;
+  const indices = [...Array(report.n).keys()];
+  const smallest = (values) => indices.reduce((best, i) => (values[i] < (best < 0 ? Infinity : values[best]) ? i : best), -1);
+  const [mu, force] = [smallest(c.mu), smallest(c.force_needed)];
+  const help = [];
+  if (mu >= 0) help.push(`Pads with more friction: grip ${count(c.rank[mu])} needs ${number(c.mu[mu])}, the pads have ${chosen(report.friction)}.`);
+  if (force >= 0 && gripper) {
+    const needed = c.force_needed[force];
+    help.push(needed <= gripper.force[1] ? `More force: grip ${count(c.rank[force])} holds its worst load with ${newtons(needed)} (--force).`
+      : `More force: grip ${count(c.rank[force])} would need ${newtons(needed)} for its worst load, the gripper has ${newtons(gripper.force[1])}.`);
+  }
+  const most = indices.reduce((best, i) => (c.load_multiple[i] > best ? c.load_multiple[i] : best), 0);
+  if (most > 0 && most < 1) help.push(`Smaller loads: ${percent(most)} of the worst load is held, by less mass or acceleration.`);
+  return { mu, force: asked.force, help };
+}
+
+/** Writes the panel and answers with its headline, or null where grips hold. */
+export function drawWhy(root, report) {
+  if (!nothingHolds(report)) return null;
+  const { summary, gripper } = report.header;
+  const list = reasons(report);
+  const fallen = list.reduce((sum, entry) => sum + entry.n, 0);
+  const advice = new Set(list.map((entry) => entry.help).filter(Boolean));
+  let [title, lead] = ['No grip holds this part', ''];
+  if (report.n > 0) {
+    const slip = allSlip(report);
+    title = report.n === 1 ? 'The one grip slips' : `All ${count(report.n)} grips slip`;
+    lead = slip.mu >= 0 ? `The best of them needs a friction of ${number(report.column.mu[slip.mu])}; the pads have ${chosen(report.friction)}${Number.isFinite(slip.force) ? ` at ${newtons(slip.force)}` : ''}.` : '';
+    advice.clear();
+    slip.help.forEach((text) => advice.add(text));
+    if (fallen) lead += ` ${count(fallen)} other candidates fell before that:`;
+  } else if (summary.candidates === 0) {
+    title = 'No two faces fit between the jaws';
+    lead = `${gripper?.name ?? 'The gripper'} found no pair of opposite flat faces to close on, so nothing could be tried.`;
+  } else {
+    lead = `${count(summary.pairs)} pair${summary.pairs === 1 ? '' : 's'} of opposite faces, ${count(summary.candidates)} candidates, and each of them fell:`;
+  }
+  root.replaceChildren(node('h2', title, { class: 'why-title' }), told('p', lead));
+  if (list.length) {
+    root.append(bars(list.map((entry) => [entry.title, entry.n, 'bad']), fallen, 'Candidates by the reason for which they fell'));
+    const meanings = node('dl', undefined, { class: 'meanings' });
+    for (const entry of list.filter((entry) => entry.meaning)) meanings.append(node('dt', entry.title), told('dd', entry.meaning));
+    if (meanings.children.length) root.append(meanings);
+  }
+  if (advice.size) {
+    const items = node('ul');
+    items.append(...[...advice].map((text) => told('li', text)));
+    root.append(node('h3', 'What would help'), items);
+  }
+  if (summary.candidates > 0) {
+    const hint = told('p', 'gripfast plan with --why X,Y,ANGLE,SITE explains a single pose, test by test.');
+    hint.className = 'quiet';
+    root.append(hint);
+  }
+  return title;
+}
