@@ -239,6 +239,31 @@ fn the_best_grips_have_every_load() {
     assert_eq!(paged.grips, bare.grips);
 }
 
+/// Nothing found is an answer to look at: exit code 1, and a page that says why.
+#[test]
+fn a_plan_without_grips_writes_its_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = cargo_bin_cmd!("gripfast")
+        .current_dir(folder.path())
+        .arg("plan")
+        .arg(data("parts/l_bracket.stl"))
+        .args(["--gripper", "robotiq-2f85", "--mass", "350g", "--ground", "+z:100mm"])
+        .args(["--spacing", "12mm", "--angle-step", "45deg", "--report", "none.html"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
+    let page = std::fs::read_to_string(folder.path().join("none.html")).unwrap();
+    let header = header(&page);
+    assert_eq!(header["grips"]["total"], 0);
+    assert!(header["summary"]["rejections"]["ground:fingertip"].as_u64() > Some(0));
+    assert!(
+        header["asked"]["ground"]["height_m"] == 0.1 && header["asked"]["force"].as_f64().is_some(),
+        "what was asked for travels with the page: {}",
+        header["asked"]
+    );
+    assert_eq!(header["gripper"]["flange"].as_array().map(Vec::len), Some(16));
+}
+
 #[test]
 fn a_grip_under_an_unknown_load_is_refused() {
     let (mut set, _) = fixture();
