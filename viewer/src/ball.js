@@ -36,6 +36,7 @@ export class LoadBall {
     if (!this.sparse) this.index();
     canvas.addEventListener('pointerdown', (event) => {
       canvas.setPointerCapture(event.pointerId);
+      this.down = [event.clientX, event.clientY];
       this.drag = [event.clientX, event.clientY];
     });
     canvas.addEventListener('pointermove', (event) => {
@@ -45,7 +46,21 @@ export class LoadBall {
       }
       this.hover?.(this.under(event));
     });
-    canvas.addEventListener('pointerup', () => (this.drag = null));
+    canvas.addEventListener('pointerup', (event) => {
+      this.drag = null;
+      const still = this.down && Math.hypot(event.clientX - this.down[0], event.clientY - this.down[1]) < 4;
+      const hit = still && this.under(event);
+      if (hit) this.onPick?.(hit.load);
+    });
+    // From the hardest load to the easiest, and back.
+    canvas.addEventListener('keydown', (event) => {
+      const step = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 }[event.key];
+      if (!step || !this.mu) return;
+      event.preventDefault();
+      const order = this.report.hardestFirst(this.grip);
+      const from = order.indexOf(this.picked >= 0 ? this.picked : this.report.column.load[this.grip]);
+      this.onPick?.(order[Math.min(Math.max(from + step, 0), order.length - 1)]);
+    });
     canvas.addEventListener('pointercancel', () => (this.drag = null));
     canvas.addEventListener('pointerleave', () => this.hover?.(null));
   }
@@ -101,6 +116,7 @@ export class LoadBall {
   /** Takes grip `i`'s table; answers with `{ low, high, missing }` over the loads, or null without a table. */
   setGrip(i) {
     this.grip = i;
+    this.picked = -1;
     this.mu = this.report.byLoad(i);
     this.worst = this.members.findIndex((list) => list.includes(this.report.column.load[i]));
     this.values = this.mu && this.members.map((list) => list.reduce((most, load) => (Number.isNaN(most) || Number.isNaN(this.mu[load]) ? NaN : Math.max(most, this.mu[load])), 0));
@@ -111,6 +127,12 @@ export class LoadBall {
     return this.range;
   }
 
+  /** Marks load `load` (-1: none). */
+  pick(load) {
+    this.picked = load;
+    this.draw();
+  }
+
   paint(mu) {
     if (!Number.isFinite(mu) || !this.range) return NO_LIMIT;
     const { low, high } = this.range;
@@ -119,7 +141,7 @@ export class LoadBall {
 
   geometry() {
     const size = this.canvas.clientWidth;
-    return { size, middle: size / 2, radius: size / 2 - 15 };
+    return { size, middle: size / 2, radius: size / 2 - 20 };
   }
 
   /** The load under the pointer. */
@@ -167,7 +189,7 @@ export class LoadBall {
       context.fill();
     }
     const project = (d) => [middle + dot(axes[0], d) * radius, middle - dot(axes[1], d) * radius, dot(axes[2], d)];
-    this.drawAxes(context, project, middle, radius, ink);
+    this.drawAxes(context, project, middle, radius, ink, style.getPropertyValue('--panel'));
     if (this.values && this.sparse) {
       const order = this.directions.map((d, i) => [i, ...project(d)]).sort((a, b) => a[3] - b[3]);
       for (const [i, x, y, z] of order) {
@@ -179,6 +201,8 @@ export class LoadBall {
       }
       context.globalAlpha = 1;
     }
+    const at = this.members.findIndex((list) => list.includes(this.picked));
+    if (at >= 0) this.drawPicked(context, ...project(this.directions[at]));
     if (this.worst >= 0) this.drawWorst(context, ...project(this.directions[this.worst]), middle, radius);
   }
 
@@ -207,7 +231,8 @@ export class LoadBall {
     context.putImageData(image, 0, 0);
   }
 
-  drawAxes(context, project, middle, radius, ink) {
+  drawAxes(context, project, middle, radius, ink, halo) {
+    this.labels = [];
     context.font = '600 11px system-ui, sans-serif';
     context.textAlign = 'center';
     context.textBaseline = 'middle';
@@ -222,10 +247,38 @@ export class LoadBall {
       context.lineTo(x + dx * 0.04, y + dy * 0.04);
       context.stroke();
       const length = Math.hypot(dx, dy);
-      if (length > 0.25 * radius) context.fillText(name, middle + (dx / length) * (length + 9), middle + (dy / length) * (length + 9));
-      else context.fillText(name, x + 8, y - 8);
+      // Beside the ball a letter is readable on every colour; one that points at the viewer gets a halo.
+      const out = Math.max(length * 1.04 + 9, z < 0 || length > 0.8 * radius ? radius + 10 : 0);
+      const place = length > 0.25 * radius ? [middle + (dx / length) * out, middle + (dy / length) * out] : [x + 9, y - 9];
+      this.labels.push(place);
+      context.globalAlpha = z < -0.2 ? 0.6 : 1;
+      context.lineWidth = 3;
+      context.strokeStyle = halo;
+      context.strokeText(name, ...place);
+      context.strokeStyle = ink;
+      context.fillText(name, ...place);
     }
     context.globalAlpha = 1;
+  }
+
+  /** A diamond on the chosen load, open where it lies behind the ball. */
+  drawPicked(context, x, y, z) {
+    const trace = (r) => {
+      context.beginPath();
+      [[0, -r], [r, 0], [0, r], [-r, 0]].forEach(([dx, dy], k) => context[k ? 'lineTo' : 'moveTo'](x + dx, y + dy));
+      context.closePath();
+    };
+    trace(8);
+    context.lineWidth = 4.5;
+    context.strokeStyle = '#fff';
+    context.stroke();
+    context.lineWidth = 2;
+    context.strokeStyle = '#111';
+    context.stroke();
+    if (z < 0) return;
+    trace(3.5);
+    context.fillStyle = '#111';
+    context.fill();
   }
 
   /** A ring round the worst load; behind the ball, an arrow at the rim on its side. */

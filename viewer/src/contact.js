@@ -63,7 +63,7 @@ function frame(pad, rings, slip) {
 }
 
 /** Fills the two figures in `root` for grip `i` of the report. */
-export function drawContact(root, report, i) {
+export function drawContact(root, report, i, prefix = '') {
   const pad = report.header.gripper?.pad;
   const rings = report.contact(i);
   const planes = report.pressure(i);
@@ -77,7 +77,7 @@ export function drawContact(root, report, i) {
     svg.replaceChildren();
     if (!view) return;
     const own = rings.filter((ring) => ring.face === face);
-    drawFace({ svg, face, own, pad, plane: planes?.[face], slip, view, largest });
+    drawFace({ svg, face, prefix, own, pad, plane: planes?.[face], slip, view, largest });
     const words = planes ? `pressure up to ${number(Math.max(0, ...own.flatMap((r) => r.points.map(([x, y]) => at(planes[face], x, y)))) / unit)} ${unitName}` : 'no pressure known';
     svg.setAttribute('aria-label', `Contact on face ${report.column[face ? 'face_ii' : 'face_i'][i]}: ${words}`);
     const output = figure.querySelector('.probe');
@@ -90,6 +90,7 @@ export function drawContact(root, report, i) {
     };
     svg.onpointerleave = () => (output.textContent = '');
   });
+  root.querySelectorAll('.pad-face').forEach((place, face) => (place.textContent = `on face ${report.column[face ? 'face_ii' : 'face_i'][i]}`));
   const legend = root.querySelector('.pressure-legend');
   legend.querySelector('.bar').style.background = gradient(scale);
   legend.querySelector('.max').textContent = planes ? `${number(largest / unit)}\u00a0${unitName}` : 'unknown';
@@ -103,12 +104,12 @@ function slipWords(slip) {
   return 'No slip limit was found for this load.';
 }
 
-function drawFace({ svg, face, own, pad, plane, slip, view, largest }) {
+function drawFace({ svg, face, prefix, own, pad, plane, slip, view, largest }) {
   const side = view.side * 1e3;
   const [left, top] = [view.x * 1e3 - side / 2, -view.y * 1e3 - side / 2];
   svg.setAttribute('viewBox', `${left} ${top} ${side} ${side}`);
   const pixel = side / 170;
-  const id = (name) => `${name}-${face}`;
+  const id = (name) => `${prefix}${name}-${face}`;
   const defs = element('defs');
   svg.append(defs);
   if (pad) svg.append(element('path', { d: path([{ points: pad }]), class: 'pad-outline' }));
@@ -195,7 +196,9 @@ function slipCentre({ svg, slip, left, top, side, pixel }) {
   // Far away: an arrow at the rim points there.
   const [mx, my] = [left + side / 2, top + side / 2];
   const [ux, uy] = [x - mx, y - my].map((v) => v / Math.hypot(x - mx, y - my));
-  const reach = (side / 2 - 4 * pixel) / Math.max(Math.abs(ux), Math.abs(uy));
+  // Below lie the scale and the axes.
+  const free = side / 2 - 4 * pixel;
+  const reach = Math.min(free / Math.abs(ux), (uy > 0 ? free - 18 * pixel : free) / Math.abs(uy));
   const [ex, ey] = [mx + ux * reach, my + uy * reach];
   const wing = (turn) => `${ex - 9 * pixel * ux + turn * 4.5 * pixel * uy},${ey - 9 * pixel * uy - turn * 4.5 * pixel * ux}`;
   svg.append(element('path', { d: `M${wing(1)}L${ex},${ey}L${wing(-1)}Z`, class: 'slip-far' }));

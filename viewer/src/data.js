@@ -41,10 +41,91 @@ export class Report {
     this.header = header;
     this.column = column;
     this.n = header.grips.shown;
-    /** Friction of the pads that the run reckoned with, where one is known. */
-    this.friction = header.asked.pad_friction ?? header.gripper?.pad_friction ?? null;
+    /** What the run reckoned with; a friction that nobody stated is null. */
+    this.planned = { friction: header.asked.pad_friction ?? header.gripper?.pad_friction ?? null, force: header.asked.force ?? null, safety: 1 };
+    /** What is shown: as planned, until somebody asks what if. */
+    this.now = { ...this.planned };
+    this.known = new Map();
     this.rowOf = new Map(Array.from(column.by_load_grip, (grip, row) => [grip, row]));
     this.indexOfId = new Map(Array.from(column.id, (id, i) => [id, i]));
+  }
+
+  /** Friction of the pads that is shown, or null. */
+  get friction() {
+    return this.now.friction;
+  }
+
+  /** Whether something else than the plan is shown. */
+  get changed() {
+    return Object.keys(this.now).some((name) => this.now[name] !== this.planned[name]);
+  }
+
+  /** Whether the friction needed is only an estimate: at another force, in proportion to load over force. */
+  get estimate() {
+    return this.now.force !== this.planned.force;
+  }
+
+  /** Friction needed by grip `i` (NaN: no limit state). */
+  mu(i) {
+    return this.scaled(this.column.mu[i]);
+  }
+
+  scaled(mu) {
+    return this.estimate ? (mu * this.planned.force) / this.now.force : mu;
+  }
+
+  /** Friction of the pads over the friction needed (NaN without either). */
+  safety(i) {
+    if (!this.changed && Number.isFinite(this.column.safety[i])) return this.column.safety[i];
+    return this.friction ? this.friction / this.mu(i) : NaN;
+  }
+
+  /** Whether the pads hold grip `i` with the safety asked for; null where no friction is known. */
+  holds(i) {
+    if (!this.friction) return null;
+    return this.column.mu[i] === 0 || this.safety(i) >= this.now.safety;
+  }
+
+  /** Whether `squeeze` is only an estimate: another friction or safety than planned. */
+  get squeezeEstimate() {
+    return this.friction !== this.planned.friction || this.now.safety !== 1;
+  }
+
+  /** Gripping force [N] that grip `i` needs under its worst load. */
+  squeeze(i) {
+    const planned = this.column.force_needed[i];
+    return this.squeezeEstimate ? (planned * this.planned.friction * this.now.safety) / this.friction : planned;
+  }
+
+  /** Score by which grips are ranked, at the force shown. */
+  score(i) {
+    const { k1, k2 } = this.header.asked;
+    return (k1 ?? 1) / this.mu(i) + (k2 ?? 1) * this.column.alpha[i];
+  }
+
+  /** Share of the pad that touches, on the face where it is less (NaN without a gripper). */
+  cover(i) {
+    const key = this.column.contact[i];
+    if (!this.known.has(key)) {
+      const area = (points) => points.reduce((sum, [x, y], k) => sum + (x * points[(k + 1) % points.length][1] - y * points[(k + 1) % points.length][0]) / 2, 0);
+      const pad = Math.abs(area(this.header.gripper?.pad ?? []));
+      const touching = [0, 0];
+      for (const ring of this.contact(i)) touching[ring.face] += (ring.hole ? -1 : 1) * Math.abs(area(ring.points));
+      this.known.set(key, pad > 0 ? Math.min(...touching) / pad : NaN);
+    }
+    return this.known.get(key);
+  }
+
+  /** Largest pressure under the worst load of grip `i` [Pa]. */
+  largestPressure(i) {
+    const planes = this.pressure(i);
+    if (!planes) return NaN;
+    let most = 0;
+    for (const { face, points } of this.contact(i)) {
+      const [a0, a1, a2] = planes[face];
+      for (const [x, y] of points) most = Math.max(most, a0 + a1 * x + a2 * y);
+    }
+    return most;
   }
 
   status(i) {
@@ -85,6 +166,15 @@ export class Report {
     if (kind === 1) return { type: 'rotation', c: [a, b], sense };
     if (kind === 2) return { type: 'translation', direction: [a, b] };
     return { type: kind === 3 ? 'none' : 'unknown' };
+  }
+
+  /** Loads of grip `i`, the one that needs most friction first; the worst one alone where no others are stored. */
+  hardestFirst(i) {
+    const values = this.byLoad(i);
+    const worst = this.column.load[i];
+    if (!values) return [worst];
+    const rank = (load) => (Number.isFinite(values[load]) ? values[load] : Infinity);
+    return [...values.keys()].sort((a, b) => (rank(b) === rank(a) ? (a === worst ? -1 : b === worst ? 1 : a - b) : rank(b) - rank(a)));
   }
 
   /** mu_s of every load for grip `i` (NaN: no limit state), or null where the table was not stored. */

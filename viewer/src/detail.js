@@ -21,9 +21,9 @@ export const statusOf = (name) => STATUS[name] ?? [words(name), 'fair', ''];
 export function verdict(report, i) {
   const known = statusOf(report.status(i));
   if (report.status(i) !== 'ok' || !report.friction) return known;
-  const [mu, safety] = [report.column.mu[i], report.column.safety[i]];
-  if (mu === 0 || safety >= 1) return ['Holds', 'good', ''];
-  return ['Slips', 'bad', 'The worst load needs more friction than the pads have at this gripping force.'];
+  const about = report.estimate ? '\u2248 ' : '';
+  if (report.holds(i)) return [`${about}Holds`, 'good', ''];
+  return [`${about}Slips`, 'bad', report.now.safety > 1 && report.safety(i) >= 1 ? 'It holds, but with less safety than is asked for.' : 'The worst load needs more friction than the pads have at this gripping force.'];
 }
 
 const LOADS_SHOWN = 6;
@@ -62,20 +62,21 @@ export class Detail {
     this.find('.swatch.none').style.background = css(NO_LIMIT);
     if (ball) {
       ball.hover = (hit) => {
-        this.find('.ball-probe').textContent = hit ? `${this.report.header.loads[hit.load].name}: ${Number.isFinite(hit.mu) ? number(hit.mu) : 'no slip limit'}` : '';
+        this.find('.ball-probe').textContent = hit ? `${this.report.header.loads[hit.load].name}: ${Number.isFinite(hit.mu) ? number(this.report.scaled(hit.mu)) : 'no slip limit'}` : '';
       };
+      ball.onPick = (load) => this.pick(load);
     }
   }
 
   show(i) {
     const { report } = this;
     const c = report.column;
+    this.grip = i;
     const [name, kind, meaning] = verdict(report, i);
     this.find('.grip-title').textContent = `Grip ${count(c.rank[i])}`;
     const pill = this.find('.pill');
     pill.className = `pill ${kind}`;
     pill.textContent = name;
-    this.root.querySelectorAll('.pad-face').forEach((place, face) => (place.textContent = `on face ${c[face ? 'face_ii' : 'face_i'][i]}`));
     this.find('.grip-sub').textContent = `${c.inside[i] ? 'From inside, faces' : 'Faces'} ${c.face_i[i]} and ${c.face_ii[i]}, id ${c.id[i]}${Number.isFinite(c.flip_of[i]) ? `, jaws exchanged of ${c.flip_of[i]}` : ''}`;
     this.find('.meaning').textContent = kind === 'good' ? '' : meaning;
     this.numbers(i);
@@ -91,14 +92,16 @@ export class Detail {
       place.querySelector('.value').textContent = value;
       place.querySelector('.note').textContent = note;
     };
-    tile('mu', number(c.mu[i]), 'at the worst load');
-    const safety = c.safety[i];
-    tile('safety', Number.isFinite(safety) ? `${number(safety)}\u00d7` : c.mu[i] === 0 ? '\u221e' : NONE, padFriction ? `pad friction ${chosen(padFriction)}` : 'pad friction not stated');
-    tile('squeeze', newtons(c.force_needed[i]), padFriction ? `for pad friction ${chosen(padFriction)}` : 'pad friction not stated');
+    const about = this.report.estimate ? '\u2248\u2009' : '';
+    tile('mu', `${about}${number(this.report.mu(i))}`, this.report.estimate ? `estimate at ${newtons(this.report.now.force)}` : 'at the worst load');
+    const safety = this.report.safety(i);
+    tile('safety', Number.isFinite(safety) ? `${about}${number(safety)}\u00d7` : c.mu[i] === 0 ? '\u221e' : NONE, padFriction ? `pad friction ${chosen(padFriction)}` : 'pad friction not stated');
+    tile('squeeze', `${this.report.squeezeEstimate && Number.isFinite(c.force_needed[i]) ? '\u2248\u2009' : ''}${newtons(this.report.squeeze(i))}`, padFriction ? `for pad friction ${chosen(padFriction)}` : 'pad friction not stated');
     tile('width', mm(c.width[i]), c.inside[i] ? 'from face to face, held from inside' : 'from face to face');
     this.find('.more').replaceChildren(
       facts([
         ['Contact left', percent(c.contact_share[i])],
+        ['Pad covered', percent(this.report.cover(i))],
         ['Twist-out margin', percent(c.twist_margin[i])],
         ['Self-aligning tilt \u03b1', degrees(c.alpha[i])],
         ['Spread to twist out \u0394d', mm(c.delta_d[i])],
@@ -111,12 +114,12 @@ export class Detail {
   loads(i) {
     const { header } = this.report;
     const range = this.ball?.setGrip(i);
-    const values = this.report.byLoad(i);
+    const values = this.report.byLoad(i)?.map((mu) => this.report.scaled(mu));
     const legend = this.find('.ball-legend');
     legend.style.visibility = range ? 'visible' : 'hidden';
     if (range) {
-      legend.querySelector('.min').textContent = number(range.low);
-      legend.querySelector('.max').textContent = number(range.high);
+      legend.querySelector('.min').textContent = number(this.report.scaled(range.low));
+      legend.querySelector('.max').textContent = number(this.report.scaled(range.high));
       this.find('.missing').textContent = range.missing ? `no slip limit: ${count(range.missing)}` : '';
       this.find('.swatch.none').hidden = !range.missing;
     } else {
@@ -127,11 +130,11 @@ export class Detail {
     this.find('.worst-load').textContent = header.loads[worst].name;
     const sorted = values ? [...values].map((mu) => (Number.isFinite(mu) ? mu : Infinity)).sort((a, b) => a - b) : [];
     const part = (share) => (sorted.length ? number(sorted[Math.round((sorted.length - 1) * share)]) : NONE);
-    const hardest = ['Hardest load', values ? part(1) : number(this.report.column.mu[i])];
+    const hardest = ['Hardest load', values ? part(1) : number(this.report.mu(i))];
     this.find('.spread').replaceChildren(facts(values ? [['Easiest load', part(0)], ['Median', part(0.5)], hardest] : [hardest]));
     const canvas = this.find('.ball');
     canvas.setAttribute('aria-label', range
-      ? `Friction needed over ${count(header.loads.length)} loads: ${number(range.low)} to ${number(range.high)}, worst under ${header.loads[worst].name}`
+      ? `Friction needed over ${count(header.loads.length)} loads: ${number(this.report.scaled(range.low))} to ${number(this.report.scaled(range.high))}, worst under ${header.loads[worst].name}`
       : `Worst load ${header.loads[worst].name}; the table of all loads was not stored`);
     const sizes = header.loads.map((load) => Math.hypot(...load.wrench.force)).filter((size) => size > 0);
     const [least, most] = [Math.min(...sizes), Math.max(...sizes)];
@@ -139,16 +142,39 @@ export class Detail {
     this.find('.ball-note').textContent = values ? `A point of the ball is the direction in which a load pushes the part; it turns with the view.${strength}` : 'Only the worst load of this grip was stored: a page has every load of the best 20 grips, with gripfast plan --polish all of every grip.';
     const body = this.find('.loads tbody');
     body.replaceChildren();
-    const order = values ? [...values.keys()].sort((a, b) => (Number.isFinite(values[b]) ? values[b] : Infinity) - (Number.isFinite(values[a]) ? values[a] : Infinity) || (a === worst ? -1 : b === worst ? 1 : a - b)) : [worst];
+    const order = this.report.hardestFirst(i);
     for (const load of order.slice(0, LOADS_SHOWN)) {
       const row = body.insertRow();
       if (load === worst) row.className = 'worst';
-      const name = row.insertCell();
+      row.dataset.load = load;
+      const name = document.createElement('button');
+      name.type = 'button';
+      name.className = 'link';
       name.textContent = this.shortName(load);
       name.title = header.loads[load].name;
-      row.insertCell().textContent = number(values ? values[load] : this.report.column.mu[i]);
+      name.addEventListener('click', () => this.pick(load));
+      row.insertCell().append(name);
+      row.insertCell().textContent = number(values ? values[load] : this.report.mu(i));
     }
+    this.pick(-1);
     this.find('.loads caption').textContent = order.length > LOADS_SHOWN ? `The ${LOADS_SHOWN} hardest of ${count(order.length)} loads` : 'Loads, hardest first';
+  }
+
+  /** Chooses a load of the grip shown (-1: the worst one): on the ball, in the table, in words, and in the view. */
+  pick(load) {
+    const { report } = this;
+    const worst = report.column.load[this.grip];
+    this.load = load >= 0 && load !== worst ? load : -1;
+    this.ball?.pick(this.load);
+    this.root.querySelectorAll('.loads tr').forEach((row) => row.toggleAttribute('data-picked', Number(row.dataset.load) === this.load));
+    this.find('.picked').hidden = this.find('#unpick').hidden = this.load < 0;
+    if (this.load >= 0) {
+      const mu = report.byLoad(this.grip)?.[this.load];
+      this.find('.picked-load').textContent = report.header.loads[this.load].name;
+      const safety = report.friction && mu > 0 ? `, safety ${number(report.friction / report.scaled(mu))}\u00d7` : '';
+      this.find('.picked-mu').textContent = Number.isFinite(mu) ? `friction needed ${number(report.scaled(mu))}${safety}` : 'no slip limit';
+    }
+    this.onLoad?.(this.load >= 0 ? this.load : worst);
   }
 
   /** A load's name without the words that all loads begin with. */

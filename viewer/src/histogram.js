@@ -53,6 +53,12 @@ export class Histogram {
     return [a <= 0 ? -Infinity : this.value(a), b >= 1 ? Infinity : this.value(b)];
   }
 
+  /** Whether to say that the bars stand for the planned force, while the list shows another. */
+  setPlanned(planned) {
+    this.planned = planned;
+    this.label();
+  }
+
   reset() {
     this.from.value = 0;
     this.to.value = 100;
@@ -84,7 +90,7 @@ export class Histogram {
   label() {
     const [low, high] = this.range();
     const words = low === -Infinity && high === Infinity ? 'all' : `${low === -Infinity ? number(this.low) : number(low)} to ${high === Infinity ? 'largest' : number(high)}`;
-    this.output.textContent = words;
+    this.output.textContent = this.planned ? `${words}, at the planned force` : words;
     this.from.setAttribute('aria-valuetext', number(this.value(this.from.value / 100)));
     this.to.setAttribute('aria-valuetext', high === Infinity ? 'no limit' : number(high));
     const [min, max] = this.root.querySelectorAll('.ends span');

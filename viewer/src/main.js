@@ -2,9 +2,10 @@
 
 import { LoadBall } from './ball.js';
 import { css, friction, frictionScale } from './colour.js';
+import { drawCompare } from './compare.js';
 import { load } from './data.js';
 import { Detail, statusOf, verdict } from './detail.js';
-import { EMPTY, pairName, pairs, select, sortKeys } from './filter.js';
+import { APPROACHES, EMPTY, pairName, pairs, select, sortKeys } from './filter.js';
 import { count, fixed, number } from './format.js';
 import { Histogram } from './histogram.js';
 import { VirtualList } from './list.js';
@@ -12,6 +13,7 @@ import { drawRun, limits } from './run.js';
 import { View } from './scene.js';
 import { theme } from './theme.js';
 import { triad } from './triad.js';
+import { whatIf } from './whatif.js';
 import { drawWhy } from './why.js';
 
 const $ = (selector) => document.querySelector(selector);
@@ -53,7 +55,7 @@ async function start() {
   });
 
   const asked = address(report);
-  const state = { filter: { ...EMPTY }, key: 'rank', direction: 1, order: [], chosen: -1 };
+  const state = { filter: { ...EMPTY }, key: 'rank', direction: 1, order: [], chosen: -1, pinned: -1 };
   const keys = sortKeys(report);
   const squeeze = report.column.force_needed.some(Number.isFinite);
   if (!squeeze) delete keys.squeeze;
@@ -68,7 +70,7 @@ async function start() {
     fill(row, position) {
       const i = state.order[position];
       const c = report.column;
-      const mu = c.mu[i];
+      const mu = report.mu(i);
       const [status, kind] = verdict(report, i);
       row.replaceChildren();
       const cell = (className, text) => {
@@ -81,7 +83,7 @@ async function start() {
       cell('rank', count(c.rank[i]));
       const needed = cell('mu', Number.isFinite(mu) ? fixed(mu, decimals) : '\u2013');
       needed.style.setProperty('--swatch', Number.isFinite(mu) ? css(friction(scale.at(mu))) : 'transparent');
-      const value = squeeze ? c.force_needed[i] : (c.alpha[i] * 180) / Math.PI;
+      const value = squeeze ? report.squeeze(i) : (c.alpha[i] * 180) / Math.PI;
       cell('number', fixed(value, value < 99.95 ? 1 : 0));
       cell('number', fixed(c.width[i] * 1e3, 1));
       cell('faces', pairName(report, i));
@@ -96,10 +98,23 @@ async function start() {
     list.mark(state.order.indexOf(i), scroll);
     view?.setGrip(i, glide);
     detail.show(i);
+    showPinned();
     const c = report.column;
-    $('#said').textContent = `Grip ${c.rank[i]}: friction needed ${number(c.mu[i])}, ${verdict(report, i)[0]}`;
+    $('#said').textContent = `Grip ${c.rank[i]}: friction needed ${number(report.mu(i))}, ${verdict(report, i)[0]}`;
     history.replaceState(null, '', `#grip=${c.id[i]}`);
   }
+
+  function showPinned() {
+    drawCompare($('#compare'), report, state.pinned, state.chosen);
+    view?.setPinned(state.pinned === state.chosen ? -1 : state.pinned);
+    $('#pin').setAttribute('aria-pressed', String(state.pinned >= 0));
+    $('#pin').textContent = state.pinned >= 0 ? `Let go of grip ${count(report.column.rank[state.pinned])}` : 'Pin to compare';
+  }
+  $('#pin').addEventListener('click', () => {
+    state.pinned = state.pinned >= 0 ? -1 : state.chosen;
+    showPinned();
+  });
+  detail.onLoad = (load) => view?.setLoad(load);
 
   const histogram = new Histogram($('#histogram'), report, scale, (low, high) => {
     Object.assign(state.filter, { low, high });
@@ -112,7 +127,9 @@ async function start() {
     $('#list').scrollTop = 0;
     list.draw();
     const all = state.order.length === report.n;
-    $('#count').textContent = all ? `${count(report.n)} grips` : `${count(state.order.length)} of ${count(report.n)} grips`;
+    const slips = report.friction ? state.order.reduce((sum, i) => sum + (verdict(report, i)[1] === 'bad' ? 1 : 0), 0) : 0;
+    const hold = report.changed && report.friction ? `, ${report.estimate ? '\u2248\u2009' : ''}${count(state.order.length - slips)} hold` : '';
+    $('#count').textContent = (all ? `${count(report.n)} grips` : `${count(state.order.length)} of ${count(report.n)} grips`) + hold;
     $('#empty').hidden = state.order.length > 0;
     $('#list').hidden = state.order.length === 0;
     const filtered = JSON.stringify(state.filter) !== JSON.stringify(EMPTY) || state.filter.low !== -Infinity || state.filter.high !== Infinity;
@@ -140,6 +157,8 @@ async function start() {
   $('#sort').append(...Object.entries(keys).map(([key, { name }]) => option(key, name)));
   $('#pair').append(option('', 'All face pairs'), ...pairs(report).map(([pair, n]) => option(pair, `${pair.replace('/', ' / ')}  (${count(n)})`)));
   $('#status').append(option('', 'Any status'), ...header.statuses.map((name) => option(name, statusOf(name)[0])));
+  if (report.friction) $('#status').append(option('kind:good', 'All but slipping'), option('kind:bad', 'Slipping'));
+  $('#approach').append(option('', 'Any approach'), ...APPROACHES.map(([value, name]) => option(value, name)));
   $('#columns').addEventListener('click', (event) => {
     const { key } = event.target.closest('button')?.dataset ?? {};
     if (key) sortBy(key);
@@ -149,7 +168,8 @@ async function start() {
     sortBy(event.target.value);
   });
   $('#direction').addEventListener('click', () => sortBy(state.key));
-  for (const id of ['pair', 'status', 'text']) {
+  const fields = Object.keys(EMPTY).filter((name) => name !== 'low' && name !== 'high');
+  for (const id of fields) {
     $(`#${id}`).addEventListener('input', (event) => {
       state.filter[id] = event.target.value;
       relist();
@@ -157,13 +177,25 @@ async function start() {
   }
   const clear = () => {
     state.filter = { ...EMPTY };
-    for (const id of ['pair', 'status', 'text']) $(`#${id}`).value = '';
+    for (const id of fields) $(`#${id}`).value = '';
     histogram.reset();
     relist();
   };
   $('#clear').addEventListener('click', clear);
   $('#empty button').addEventListener('click', clear);
 
+  whatIf($('#what-if'), report, () => {
+    const load = detail.load;
+    histogram.setPlanned(report.estimate);
+    relist();
+    view?.recolour();
+    if (state.chosen >= 0) {
+      detail.show(state.chosen);
+      detail.pick(load);
+      showPinned();
+    }
+    list.mark(state.order.indexOf(state.chosen));
+  });
   drawRun($('#run-content'), report);
   const why = drawWhy($('#panel-why'), report);
   $('#tab-why').hidden = !why;
@@ -188,8 +220,9 @@ async function start() {
         else view.show(toggle, on);
       }
     });
+    $('#unpick').addEventListener('click', () => detail.pick(-1));
     $('#turn').addEventListener('click', () => {
-      const force = report.load(state.chosen).wrench.force;
+      const force = header.loads[detail.load >= 0 ? detail.load : report.column.load[state.chosen]].wrench.force;
       if (Math.hypot(...force) > 0) view.faceDirection(force);
     });
   }
@@ -259,7 +292,7 @@ async function start() {
   document.documentElement.dataset.ready = String(Math.round(performance.now()));
   // For tests and for the curious: what is shown, as numbers.
   window.gripfast = {
-    report, state, view,
+    report, state, view, ball, detail,
     jaw: (side) => (view ? [...view.jaws.fingers[side].matrixWorld.elements] : null),
   };
 }

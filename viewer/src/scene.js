@@ -7,6 +7,7 @@ import {
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { friction } from './colour.js';
+import { verdict } from './detail.js';
 import { Jaws } from './jaws.js';
 
 const MM = 1000;
@@ -16,16 +17,30 @@ const [FILL, MARGIN] = [0.86, 52];
 const UP = new Vector3(0, 0, 1);
 
 const PALETTE = {
-  light: { part: '#b4bdc8', edge: '#4b5663', jaw: '#4a6785', jawEdge: '#2f4a66', pad: '#d9762b', load: '#a3158f', fixture: '#8a6d00', sky: '#ffffff', ground: '#9aa3ad' },
-  dark: { part: '#76828f', edge: '#11161b', jaw: '#9db4cc', jawEdge: '#c9d8e6', pad: '#f0964d', load: '#ef6bd8', fixture: '#d9b84a', sky: '#f2f6fa', ground: '#4a535d' },
+  light: { part: '#b4bdc8', edge: '#4b5663', jaw: '#4a6785', jawEdge: '#2f4a66', pad: '#d9762b', load: '#a3158f', fixture: '#8a6d00', ghost: '#0a7d6c', sky: '#ffffff', ground: '#9aa3ad' },
+  dark: { part: '#76828f', edge: '#11161b', jaw: '#9db4cc', jawEdge: '#c9d8e6', pad: '#f0964d', load: '#ef6bd8', fixture: '#d9b84a', ghost: '#4fd1bd', sky: '#f2f6fa', ground: '#4a535d' },
 };
 
 const vector = (list) => new Vector3(...list);
 
-function dotTexture() {
+function dotTexture(cross) {
   const canvas = document.createElement('canvas');
   canvas.width = canvas.height = 32;
   const context = canvas.getContext('2d');
+  if (cross) {
+    context.lineCap = 'round';
+    for (const [colour, width] of [['#555', 13], ['#fff', 7]]) {
+      context.strokeStyle = colour;
+      context.lineWidth = width;
+      context.beginPath();
+      for (const [from, to] of [[8, 24], [24, 8]]) {
+        context.moveTo(from, 8);
+        context.lineTo(to, 24);
+      }
+      context.stroke();
+    }
+    return new CanvasTexture(canvas);
+  }
   context.fillStyle = '#fff';
   context.beginPath();
   context.arc(16, 16, 14.5, 0, 2 * Math.PI);
@@ -106,6 +121,7 @@ export class View {
       contact: new MeshBasicMaterial({ transparent: true, opacity: 0.85, depthWrite: false, side: DoubleSide }),
       contactEdge: new LineBasicMaterial(),
       load: new MeshBasicMaterial({ depthTest: false, transparent: true }),
+      ghost: new LineBasicMaterial({ transparent: true, opacity: 0.9 }),
       fixture: new MeshBasicMaterial({ opacity: 0.14, ...glass }),
       fixtureEdge: new LineBasicMaterial({ transparent: true, opacity: 0.5 }),
     };
@@ -142,41 +158,57 @@ export class View {
     this.world.add(this.part);
   }
 
-  /** Both pad centres of every grip, coloured by mu_s. */
+  /** Both pad centres of every grip, coloured by the friction needed: a disc where it holds, a cross where it slips. */
   buildDots(scale) {
     const { n, column } = this.report;
+    this.scale = scale;
     const at = new Float32Array(6 * n);
-    const colour = new Uint8Array(6 * n);
     for (let i = 0; i < n; i++) {
-      const rgb = friction(scale.at(column.mu[i]));
       for (let side = 0; side < 2; side++) {
         const reach = (side ? -0.5 : 0.5) * column.width[i];
         for (let k = 0; k < 3; k++) {
           at[6 * i + 3 * side + k] = column.origin[3 * i + k] + reach * column.rotation[9 * i + 6 + k];
-          colour[6 * i + 3 * side + k] = rgb[k];
         }
       }
     }
     const geometry = new BufferGeometry();
     geometry.setAttribute('position', new BufferAttribute(at, 3));
-    geometry.setAttribute('color', new BufferAttribute(colour, 3, true));
-    // Vertex colours are taken as linear; the picture wants these very sRGB values.
-    const linear = new Color();
-    for (let k = 0; k < 2 * n; k++) {
-      linear.setRGB(colour[3 * k] / 255, colour[3 * k + 1] / 255, colour[3 * k + 2] / 255, 'srgb');
-      colour.set([linear.r * 255, linear.g * 255, linear.b * 255], 3 * k);
-    }
-    this.dotIndex = new Uint32Array(2 * n);
-    geometry.setIndex(new BufferAttribute(this.dotIndex, 1));
-    const material = new PointsMaterial({ size: n < 400 ? 7 : n < 3000 ? 6 : 4.5, sizeAttenuation: false, vertexColors: true, map: dotTexture(), alphaTest: 0.35, transparent: true });
+    geometry.setAttribute('color', new BufferAttribute(new Uint8Array(6 * n), 3, true));
+    const size = n < 400 ? 7 : n < 3000 ? 6 : 4.5;
     // Dots lie in the part's faces: a little towards the viewer, the faces no longer cut them.
     const lift = (0.025 * this.radius).toExponential(6);
-    material.onBeforeCompile = (shader) => {
+    const raise = (shader) => {
       shader.vertexShader = shader.vertexShader.replace('#include <project_vertex>', `#include <project_vertex>\nmvPosition.xyz *= 1.0 - ${lift} / max(-mvPosition.z, ${lift});\ngl_Position = projectionMatrix * mvPosition;`);
     };
-    this.dots = new Points(geometry, material);
-    this.dots.frustumCulled = false;
+    this.dots = new Group();
+    [this.holding, this.slipping] = [false, true].map((cross) => {
+      const own = new BufferGeometry();
+      own.setAttribute('position', geometry.attributes.position);
+      own.setAttribute('color', geometry.attributes.color);
+      own.setIndex(new BufferAttribute(new Uint32Array(2 * n), 1));
+      const material = new PointsMaterial({ size: cross ? size + 2 : size, sizeAttenuation: false, vertexColors: true, map: dotTexture(cross), alphaTest: 0.35, transparent: true });
+      material.onBeforeCompile = raise;
+      const points = new Points(own, material);
+      points.frustumCulled = false;
+      this.dots.add(points);
+      return points;
+    });
+    this.places = geometry.attributes.position;
     this.world.add(this.dots);
+    this.recolour();
+  }
+
+  /** Colours the dots by the friction that is shown now. */
+  recolour() {
+    const colours = this.holding.geometry.attributes.color;
+    // Vertex colours are taken as linear; the picture wants these very sRGB values.
+    const linear = new Color();
+    for (let i = 0; i < this.report.n; i++) {
+      const [r, g, b] = friction(this.scale.at(this.report.mu(i)));
+      linear.setRGB(r / 255, g / 255, b / 255, 'srgb');
+      for (let side = 0; side < 2; side++) colours.array.set([linear.r * 255, linear.g * 255, linear.b * 255], 6 * i + 3 * side);
+    }
+    colours.needsUpdate = true;
   }
 
   buildLoad() {
@@ -192,7 +224,7 @@ export class View {
 
   setTheme(dark) {
     const colours = PALETTE[dark ? 'dark' : 'light'];
-    for (const name of ['part', 'edge', 'jaw', 'jawEdge', 'pad', 'load', 'fixture']) this.materials[name].color.set(colours[name]);
+    for (const name of ['part', 'edge', 'jaw', 'jawEdge', 'pad', 'load', 'fixture', 'ghost']) this.materials[name].color.set(colours[name]);
     this.materials.palm.color.set(colours.jaw);
     this.materials.fixtureEdge.color.set(colours.fixture);
     for (const name of ['padEdge', 'contact', 'contactEdge']) this.materials[name].color.set(colours.pad);
@@ -204,9 +236,18 @@ export class View {
   /** Shows these grips' dots, the best drawn last so that it stays on top. */
   setListed(indices) {
     const worstFirst = Uint32Array.from(indices).sort((a, b) => b - a);
-    worstFirst.forEach((i, k) => this.dotIndex.set([2 * i, 2 * i + 1], 2 * k));
-    this.dots.geometry.index.needsUpdate = true;
-    this.dots.geometry.setDrawRange(0, 2 * worstFirst.length);
+    const slips = (i) => verdict(this.report, i)[1] === 'bad';
+    for (const [points, cross] of [[this.holding, false], [this.slipping, true]]) {
+      const { index } = points.geometry;
+      let k = 0;
+      for (const i of worstFirst) {
+        if (slips(i) !== cross) continue;
+        index.array[k++] = 2 * i;
+        index.array[k++] = 2 * i + 1;
+      }
+      index.needsUpdate = true;
+      points.geometry.setDrawRange(0, k);
+    }
     this.listed = worstFirst;
     this.render();
   }
@@ -222,13 +263,45 @@ export class View {
     this.jaws.setContact(this.report.contact(i));
     this.width = this.report.column.width[i];
     this.inside = this.report.column.inside[i] === 1;
-    const force = vector(this.report.load(i).wrench.force);
-    if (force.length() > 0) {
-      this.load.visible = true;
+    this.glide(to, known && glide);
+  }
+
+  /** Draws the force of load `load` at the centre of mass. */
+  setLoad(load) {
+    const force = vector(this.report.header.loads[load].wrench.force);
+    this.load.visible = force.length() > 0;
+    if (this.load.visible) {
       this.load.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), force.normalize());
       this.load.scale.setScalar((0.62 * this.radius) / MM);
     }
-    this.glide(to, known && glide);
+    this.render();
+  }
+
+  /** Shows the outline of grip `i`'s gripper besides the chosen one (-1: none). */
+  setPinned(i) {
+    const { gripper } = this.report.header;
+    if (i >= 0 && gripper && !this.ghost) {
+      this.ghost = new Jaws(gripper, this.ghostMaterials());
+      this.world.add(this.ghost.root);
+    }
+    if (this.ghost) {
+      this.ghost.root.visible = i >= 0;
+      if (i >= 0) {
+        const { x1, x2, x3, origin } = this.report.pose(i);
+        const width = this.report.column.width[i];
+        const inside = this.report.column.inside[i] === 1;
+        this.ghost.root.quaternion.setFromRotationMatrix(new Matrix4().makeBasis(vector(x1), vector(x2), vector(x3)));
+        this.ghost.root.position.set(...origin);
+        this.ghost.place(inside ? width - 2 * (gripper.outer_pad ?? 0) : width, inside ? -width : width);
+      }
+    }
+    this.render();
+  }
+
+  ghostMaterials() {
+    const unseen = new MeshBasicMaterial({ visible: false });
+    const { ghost } = this.materials;
+    return { jaw: unseen, palm: unseen, pad: unseen, contact: unseen, jawEdge: ghost, padEdge: ghost, contactEdge: ghost };
   }
 
   setOpen(open) {
@@ -440,7 +513,7 @@ export class View {
     if (!this.dots.visible || !this.listed) return;
     const rect = this.canvas.getBoundingClientRect();
     const at = [event.clientX - rect.left, event.clientY - rect.top];
-    const place = this.dots.geometry.attributes.position;
+    const place = this.places;
     const point = new Vector3();
     const hits = [];
     for (const i of this.listed) {
