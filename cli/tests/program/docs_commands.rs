@@ -12,8 +12,13 @@ use std::fs::File;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-const PAGES: [&str; 5] =
-    ["README.md", "docs/tutorial.md", "docs/gripper-file.md", "docs/mechanics.md", "docs/sizing.md"];
+const PAGES: [&str; 5] = [
+    "README.md",
+    "docs/tutorial.md",
+    "docs/gripper-file.md",
+    "docs/mechanics.md",
+    "docs/sizing.md",
+];
 
 /// A command of a page and the output shown under it.
 struct Step {
