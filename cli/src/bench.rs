@@ -1,29 +1,37 @@
-//! `gripfast bench`: how fast this machine scores, and whether its backends agree.
+//! `gripfast bench`: how fast this machine scores, and whether its backends agree. Its subcommands
+//! are the parts of `benches/device.sh`.
+
+mod check;
+mod commands;
+mod entry;
+mod known;
+mod sweep;
+mod workloads;
 
 use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use clap::Args as ClapArgs;
-use glam::{DVec2, DVec3};
-use gripfast::backend::{
-    Backend, Batch, Choice, Polish, Problem, ScoreOptions, Scored, Seed, SeedSet, SeedStatus,
-};
-use gripfast::load::sphere;
-use gripfast::model::{Contact, Polygon, Wrench};
+use clap::{Args as ClapArgs, Subcommand};
+use gripfast::backend::{Backend, Choice, Polish, ScoreOptions, Scored, Seed, SeedSet};
 use serde_json::json;
 
 use super::backend::{self, BackendArgs};
+use workloads::{Contacts, Workload, same_answers, same_seeds};
 
 /// Measures seed evaluations, exact solves and scored grips per second, and checks the GPU against
 /// the processor.
 #[derive(Debug, ClapArgs)]
 #[command(
+    args_conflicts_with_subcommands = true,
     after_help = "EXAMPLES:\n  gripfast bench\n  gripfast bench --backend gpu --json\n  gripfast bench --backend cpu --seconds 3 --seeds 321\n\n\
+The subcommands measure an adapter thoroughly; `bash benches/device.sh` runs them all and writes what they find.\n\n\
 Times include upload and readback. Each workload runs once to warm up, then until the time is over. A software adapter is checked, its times mean nothing."
 )]
 pub(crate) struct Args {
+    #[command(subcommand)]
+    part: Option<Part>,
     #[command(flatten)]
     backend: BackendArgs,
     /// Loads on each grip: unit forces spread over the sphere.
@@ -43,20 +51,64 @@ pub(crate) struct Args {
     json: bool,
 }
 
-/// Largest relative difference between bounds of two backends: each is widened by half of it.
-const BOUND_TOLERANCE: f64 = 2.0 * gripfast::backend::F32_TOLERANCE;
+/// A part of `benches/device.sh`.
+#[derive(Debug, Subcommand)]
+enum Part {
+    Check(check::Args),
+    Sweep(sweep::Args),
+    Commands(commands::Args),
+    Entry(entry::Args),
+}
 
-/// Largest relative difference between final answers of two backends.
-const ANSWER_TOLERANCE: f64 = 1e-9;
+/// Where a part of `benches/device.sh` puts what it finds.
+#[derive(Debug, ClapArgs)]
+struct Output {
+    /// Folder for the part's Markdown and JSON; without it the Markdown goes to standard output.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+}
 
-/// Grips that are scored, and what is done with them.
-struct Workload {
+impl Output {
+    /// Writes both files whole, or the Markdown to standard output at the `end`.
+    fn write(
+        &self,
+        name: &str,
+        markdown: &str,
+        data: &impl serde::Serialize,
+        end: bool,
+    ) -> anyhow::Result<()> {
+        let Some(folder) = &self.out else {
+            if end {
+                write!(std::io::stdout().lock(), "{markdown}")?;
+            }
+            return Ok(());
+        };
+        write_both(folder, name, markdown, data)
+    }
+}
+
+/// `NAME.json` and `NAME.md` in a folder.
+fn write_both(
+    folder: &Path,
+    name: &str,
+    markdown: &str,
+    data: &impl serde::Serialize,
+) -> anyhow::Result<()> {
+    gripfast::file::write(&folder.join(format!("{name}.json")), |writer| {
+        serde_json::to_writer_pretty(&mut *writer, data)?;
+        writeln!(writer)
+    })?;
+    gripfast::file::write(&folder.join(format!("{name}.md")), |writer| {
+        writer.write_all(markdown.as_bytes())
+    })?;
+    Ok(())
+}
+
+/// A workload of the quick bench.
+struct Row {
     name: &'static str,
     what: &'static str,
-    contacts: Vec<Arc<Contact>>,
-    wrenches: Vec<Vec<Wrench>>,
-    distance: f64,
-    force: f64,
+    workload: Workload,
     task: Task,
 }
 
@@ -64,26 +116,6 @@ struct Workload {
 enum Task {
     Seed,
     Score(Polish),
-}
-
-impl Workload {
-    fn batch(&self) -> Batch<'_> {
-        let pairs = self.contacts.iter().zip(&self.wrenches);
-        Batch {
-            problems: pairs
-                .map(|(contact, wrenches)| Problem {
-                    contact,
-                    distance: self.distance,
-                    force: self.force,
-                    wrenches,
-                })
-                .collect(),
-        }
-    }
-
-    fn loads(&self) -> usize {
-        self.wrenches.iter().map(Vec::len).sum()
-    }
 }
 
 /// What one workload came to on one backend.
@@ -95,6 +127,13 @@ struct Measured {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    match args.part {
+        Some(Part::Check(args)) => return check::run(args),
+        Some(Part::Sweep(args)) => return sweep::run(args),
+        Some(Part::Commands(args)) => return commands::run(args),
+        Some(Part::Entry(args)) => return entry::run(args),
+        None => {}
+    }
     anyhow::ensure!(
         args.seconds.is_finite() && args.seconds > 0.0,
         "--seconds {}: give a positive number",
@@ -118,29 +157,29 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let mut rows = Vec::new();
     let mut agreed = true;
-    for workload in workloads(args.grips as usize, args.loads as usize) {
+    for row in workloads(args.grips as usize, args.loads as usize) {
         let mut first: Option<Measured> = None;
         for backend in &backends {
             let measured =
-                measure(backend, &workload, &set, Duration::from_secs_f64(args.seconds))?;
+                measure(backend, &row, &set, Duration::from_secs_f64(args.seconds))?;
             let check = first.as_ref().map(|first| compare(first, &measured));
             agreed &= check.as_ref().is_none_or(|check| check.is_ok());
             let solved: usize = measured.scored.iter().map(|scored| scored.solved).sum();
             let per_second =
                 |count: usize| count as f64 * f64::from(measured.runs) / measured.seconds;
             rows.push(json!({
-                "workload": workload.name,
-                "what": workload.what,
+                "workload": row.name,
+                "what": row.what,
                 "backend": backend.name(),
-                "grips": workload.contacts.len(),
-                "loads": workload.loads(),
+                "grips": row.workload.contacts.len(),
+                "loads": row.workload.loads(),
                 "seeds": set.len(),
                 "runs": measured.runs,
                 "seconds": measured.seconds,
-                "grips_per_second": per_second(workload.contacts.len()),
-                "loads_per_second": per_second(workload.loads()),
-                "seed_evaluations_per_second": if matches!(workload.task, Task::Score(Polish::All)) { None } else { Some(per_second(workload.loads() * set.len())) },
-                "exact_solves_per_second": if workload.task == Task::Seed { None } else { Some(per_second(solved)) },
+                "grips_per_second": per_second(row.workload.contacts.len()),
+                "loads_per_second": per_second(row.workload.loads()),
+                "seed_evaluations_per_second": if matches!(row.task, Task::Score(Polish::All)) { None } else { Some(per_second(row.workload.loads() * set.len())) },
+                "exact_solves_per_second": if row.task == Task::Seed { None } else { Some(per_second(solved)) },
                 "agrees_with_cpu": check.as_ref().map(|check| check.is_ok()),
                 "difference": check.as_ref().map(|check| match check { Ok(most) => json!(most), Err(why) => json!(why) }),
             }));
@@ -215,13 +254,13 @@ fn is_software(_: &[Backend]) -> bool {
 /// in memory.
 fn measure(
     backend: &Backend,
-    workload: &Workload,
+    row: &Row,
     set: &SeedSet,
     least: Duration,
 ) -> anyhow::Result<Measured> {
-    let batch = workload.batch();
+    let batch = row.workload.batch();
     let once = || -> anyhow::Result<(Vec<Seed>, Vec<Scored>)> {
-        Ok(match workload.task {
+        Ok(match row.task {
             Task::Seed => (backend.seed(&batch, set)?, Vec::new()),
             Task::Score(polish) => (
                 Vec::new(),
@@ -240,117 +279,31 @@ fn measure(
 
 /// Largest relative difference, or what differs beyond the tolerance.
 fn compare(a: &Measured, b: &Measured) -> Result<f64, String> {
-    if a.seeds.len() != b.seeds.len() || a.scored.len() != b.scored.len() {
-        return Err("different numbers of answers".to_owned());
-    }
-    let relative = |x: f64, y: f64| if x == y { 0.0 } else { (x - y).abs() / x.abs().max(y.abs()) };
-    let mut most: f64 = 0.0;
-    for (i, (x, y)) in a.seeds.iter().zip(&b.seeds).enumerate() {
-        if x.status == SeedStatus::Bounded && y.status == SeedStatus::Bounded {
-            most = most.max(relative(x.lower, y.lower));
-        }
-        if most.is_nan() || most > BOUND_TOLERANCE {
-            return Err(format!("load {i}: {x:?} and {y:?}"));
-        }
-    }
-    for (i, (x, y)) in a.scored.iter().zip(&b.scored).enumerate() {
-        let (Some((load_x, x)), Some((load_y, y))) = (x.worst, y.worst) else { continue };
-        let difference = x.mu_s.zip(y.mu_s).map_or(0.0, |(x, y)| relative(x, y));
-        if load_x != load_y
-            || x.status != y.status
-            || difference.is_nan()
-            || difference > ANSWER_TOLERANCE
-        {
-            return Err(format!(
-                "grip {i}: load {load_x} {:?} and load {load_y} {:?}",
-                x.mu_s, y.mu_s
-            ));
-        }
-        most = most.max(difference);
-    }
-    Ok(most)
+    Ok(same_seeds(&a.seeds, &b.seeds)?.max(same_answers(&a.scored, &b.scored)?))
 }
 
-/// A rectangle's corners; `cut` takes one corner off, as the edge of a face does.
-fn pad(centre: DVec2, cut: f64) -> Polygon {
-    let (a, b) = (0.011, 0.01);
-    let mut outer = vec![
-        DVec2::new(-a, -b),
-        DVec2::new(a, -b),
-        DVec2::new(a, b - cut),
-        DVec2::new(a - cut, b),
-        DVec2::new(-a, b),
-    ];
-    if cut == 0.0 {
-        outer.remove(3);
-    }
-    Polygon { outer: outer.into_iter().map(|point| centre + point).collect(), holes: Vec::new() }
-}
-
-fn workloads(grips: usize, loads: usize) -> Vec<Workload> {
-    let directions = sphere::directions(loads);
-    let ball = |point: DVec3| -> Vec<Wrench> {
-        directions.iter().map(|&force| Wrench { force, moment: point.cross(force) }).collect()
+fn workloads(grips: usize, loads: usize) -> Vec<Row> {
+    let few = (grips / 20).max(1);
+    let row = |name, what, kind, grips, task| Row {
+        name,
+        what,
+        workload: Workload::new(kind, grips, loads),
+        task,
     };
-    // Grips spread over a part: the centre of mass lies elsewhere in each.
-    let point = |i: usize| {
-        DVec3::new(
-            0.02 * (i as f64 * 0.618).fract(),
-            0.02 * (i as f64 * 0.755).fract(),
-            0.004 * (i as f64 * 0.57).fract(),
-        )
-    };
-    let shared = |count: usize| {
-        let face = vec![pad(DVec2::ZERO, 0.0)];
-        let contact = Arc::new(Contact { face_i: face.clone(), face_ii: face });
-        vec![contact; count]
-    };
-    let own = |count: usize, same: bool| -> Vec<Arc<Contact>> {
-        let cut = |i: usize| 0.001 + 0.006 * (i as f64 * 0.618).fract();
-        (0..count)
-            .map(|i| {
-                Arc::new(Contact {
-                    face_i: vec![pad(DVec2::ZERO, cut(i))],
-                    face_ii: vec![pad(DVec2::ZERO, cut(if same { i } else { i + 1 }))],
-                })
-            })
-            .collect()
-    };
-    let workload = |name, what, contacts: Vec<Arc<Contact>>, task| {
-        let wrenches = (0..contacts.len()).map(|i| ball(point(i))).collect();
-        Workload { name, what, contacts, wrenches, distance: 0.03, force: 40.0, task }
-    };
+    use Contacts::{Different, Own, Shared};
+    let worst = Task::Score(Polish::Worst);
     vec![
-        workload("seed_shared", "seeds, pads wholly on the faces", shared(grips), Task::Seed),
-        workload("seed_own", "seeds, a contact for each grip", own(grips, true), Task::Seed),
-        workload(
-            "seed_different",
-            "seeds, different areas on the faces",
-            own(grips, false),
-            Task::Seed,
-        ),
-        workload(
-            "score_shared",
-            "worst load, pads wholly on the faces",
-            shared(grips),
-            Task::Score(Polish::Worst),
-        ),
-        workload(
-            "score_own",
-            "worst load, a contact for each grip",
-            own(grips, true),
-            Task::Score(Polish::Worst),
-        ),
-        workload(
-            "score_different",
-            "worst load, different areas",
-            own((grips / 20).max(1), false),
-            Task::Score(Polish::Worst),
-        ),
-        workload(
+        row("seed_shared", "seeds, pads wholly on the faces", Shared, grips, Task::Seed),
+        row("seed_own", "seeds, a contact for each grip", Own, grips, Task::Seed),
+        row("seed_different", "seeds, different areas on the faces", Different, grips, Task::Seed),
+        row("score_shared", "worst load, pads wholly on the faces", Shared, grips, worst),
+        row("score_own", "worst load, a contact for each grip", Own, grips, worst),
+        row("score_different", "worst load, different areas", Different, few, worst),
+        row(
             "solve_all",
             "every load exactly, pads wholly on the faces",
-            shared((grips / 20).max(1)),
+            Shared,
+            few,
             Task::Score(Polish::All),
         ),
     ]

@@ -31,7 +31,10 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 #[cfg(feature = "gpu")]
-pub use gpu::{ADAPTER_VARIABLE, AdapterSummary, Gpu, list as list_adapters};
+pub use gpu::{
+    ADAPTER_VARIABLE, AdapterSummary, ChunkSpans, Deviation, DeviceSpans, Gpu, KernelCheck, Span,
+    Timeline, list as list_adapters,
+};
 
 pub use choice::{Choice, Selection, select};
 pub use score::{Polish, ScoreOptions, Scored};
@@ -149,6 +152,15 @@ impl Backend {
             Self::Cpu => "cpu".to_owned(),
             #[cfg(feature = "gpu")]
             Self::Gpu(gpu) => gpu.name(),
+        }
+    }
+
+    /// Notes on a running clock ([`Gpu::start_clock`]) how long exact answers took.
+    fn solved_since(&self, start: std::time::Instant) {
+        match self {
+            Self::Cpu => {}
+            #[cfg(feature = "gpu")]
+            Self::Gpu(gpu) => gpu.polished_since(start),
         }
     }
 

@@ -94,6 +94,12 @@ impl Backend {
         seeds: &SeedSet,
         mut solve: impl FnMut(Range<usize>, Vec<Seed>) -> Vec<Scored> + Send,
     ) -> Result<Vec<Scored>> {
+        let mut solve = |block: Range<usize>, seeds: Vec<Seed>| {
+            let start = std::time::Instant::now();
+            let scored = solve(block, seeds);
+            self.solved_since(start);
+            scored
+        };
         let mut scored = Vec::with_capacity(batch.problems.len());
         let mut waiting: Option<(Range<usize>, Vec<Seed>)> = None;
         for block in blocks(&batch.problems) {

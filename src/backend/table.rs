@@ -106,7 +106,11 @@ impl Table {
 /// The gradient basis of one contact at every twist, as the GPU's kernel writes it:
 /// `[face][twist][weight]`, and in each the components `g1, g2, torque` and their product with the
 /// twist.
-fn contact_basis(header: &ContactHeader, edges: [&[EdgeRecord]; 2], seeds: &SeedSet) -> Vec<f32> {
+pub(crate) fn contact_basis(
+    header: &ContactHeader,
+    edges: [&[EdgeRecord]; 2],
+    seeds: &SeedSet,
+) -> Vec<f32> {
     let mut out = Vec::with_capacity(header.faces as usize * seeds.len() * BASIS * 4);
     let mut push = |v: &[f32; 4], g: [f32; 9]| {
         for g in g.as_chunks::<3>().0 {

@@ -6,6 +6,10 @@ use crate::error::{Error, Result};
 /// Environment variable that names the adapter when the flag `--adapter` does not.
 pub const ADAPTER_VARIABLE: &str = "GRIPFAST_ADAPTER";
 
+/// What the clock needs: timestamps of kernels, and of copies where there are those too.
+pub(super) const TIMESTAMPS: wgpu::Features =
+    wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
+
 /// An adapter as `gripfast devices` lists it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct AdapterSummary {
@@ -31,11 +35,24 @@ pub struct AdapterSummary {
     pub max_invocations: u32,
     /// Memory of a workgroup [bytes].
     pub workgroup_memory: u32,
+    /// Storage buffers that a kernel can bind.
+    pub max_storage_buffers: u32,
+    /// Smallest and largest number of lanes that run in step.
+    pub subgroup: [u32; 2],
+    /// Whether kernels can exchange numbers within a subgroup.
+    pub subgroup_operations: bool,
+    /// Whether the adapter tells the time of kernels.
+    pub timestamps: bool,
+    /// Whether it tells the time of copies too.
+    pub timestamps_of_copies: bool,
+    /// Length of a timestamp's tick [ns]; `None` without timestamps, or where the device did not
+    /// open.
+    pub timestamp_period: Option<f32>,
 }
 
 impl AdapterSummary {
     fn new(index: usize, adapter: &wgpu::Adapter) -> Self {
-        let (info, limits) = (adapter.get_info(), adapter.limits());
+        let (info, limits, features) = (adapter.get_info(), adapter.limits(), adapter.features());
         let kind = match info.device_type {
             wgpu::DeviceType::DiscreteGpu => "discrete GPU",
             wgpu::DeviceType::IntegratedGpu => "integrated GPU",
@@ -55,6 +72,12 @@ impl AdapterSummary {
             max_workgroups: limits.max_compute_workgroups_per_dimension,
             max_invocations: limits.max_compute_invocations_per_workgroup,
             workgroup_memory: limits.max_compute_workgroup_storage_size,
+            max_storage_buffers: limits.max_storage_buffers_per_shader_stage,
+            subgroup: [info.subgroup_min_size, info.subgroup_max_size],
+            subgroup_operations: features.contains(wgpu::Features::SUBGROUP),
+            timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
+            timestamps_of_copies: features.contains(TIMESTAMPS),
+            timestamp_period: None,
         }
     }
 }
@@ -78,13 +101,22 @@ pub(crate) fn adapters() -> Vec<wgpu::Adapter> {
     pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends))
 }
 
-/// All adapters, in the order of their indices.
+/// All adapters, in the order of their indices. Those that have timestamps are opened for a moment,
+/// for only an open device tells their period.
 pub fn list() -> Vec<AdapterSummary> {
-    adapters()
-        .iter()
-        .enumerate()
-        .map(|(index, adapter)| AdapterSummary::new(index, adapter))
-        .collect()
+    let summary = |(index, adapter): (usize, &wgpu::Adapter)| {
+        let mut summary = AdapterSummary::new(index, adapter);
+        if summary.timestamps {
+            let descriptor = wgpu::DeviceDescriptor {
+                required_features: wgpu::Features::TIMESTAMP_QUERY,
+                ..Default::default()
+            };
+            let opened = pollster::block_on(adapter.request_device(&descriptor)).ok();
+            summary.timestamp_period = opened.map(|(_, queue)| queue.get_timestamp_period());
+        }
+        summary
+    };
+    adapters().iter().enumerate().map(summary).collect()
 }
 
 /// The adapter asked for by index or part of its name (`--adapter`, else the environment variables

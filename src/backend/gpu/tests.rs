@@ -194,8 +194,7 @@ fn the_comparer_sees_one_wrong_number() {
 
 /// A device that is destroyed before its third chunk of 100 loads, and a batch of 350.
 fn with_doomed_device<R>(mut gpu: Gpu, then: impl FnOnce(&Backend, &Batch<'_>) -> R) -> R {
-    gpu.limits.loads = 100;
-    gpu.destroy_before = AtomicU64::new(3);
+    gpu.lose_before(3, 100);
     let mut random = Random(11);
     let contact = random.contact();
     let wrenches: Vec<Wrench> = (0..350)
@@ -302,6 +301,71 @@ fn a_record_that_was_not_written_is_an_error() {
         match run(forget) {
             Ok(()) => assert!(!forget),
             Err(error) => assert!(forget && error.to_string().contains("did not write"), "{error}"),
+        }
+    }
+}
+
+/// The tolerance that widens every bound covers what single precision does on this adapter, and the
+/// basis is as good as the processor's.
+#[test]
+fn the_tolerance_of_the_bounds_holds_on_this_adapter() {
+    let Some(gpu) = gpu(true) else { return };
+    for frequency in [4, 8] {
+        let seeds = SeedSet::new(frequency).unwrap();
+        let check = gpu.check_kernels(&seeds, 40).unwrap();
+        for deviation in &check.deviations {
+            println!("{deviation:?}");
+            assert!(deviation.count > 0 && deviation.from_twin < 2e-5, "{deviation:?}");
+        }
+        println!("{} twists: {:.1e} of {:.1e}", seeds.len(), check.largest, check.tolerance);
+        assert!(check.tolerance_holds() && check.largest > 0.0, "{check:?}");
+        assert!(check.bounded > check.loads / 3, "{check:?}");
+        assert!(check.other_status + check.other_twist <= check.loads / 200, "{check:?}");
+    }
+}
+
+/// The clock changes no answer; its steps follow one another, and the device works on a chunk while
+/// the processor makes the next.
+#[test]
+fn the_clock_shows_every_chunk_and_changes_nothing() {
+    let Some(mut gpu) = gpu(true) else { return };
+    gpu.limits.loads = 2000;
+    let backend = Backend::Gpu(Box::new(gpu));
+    let Backend::Gpu(gpu) = &backend else { panic!("the backend changed") };
+    let set = SeedSet::new(8).unwrap();
+    let mut random = Random(37);
+    let contact = random.contact();
+    let wrenches: Vec<Wrench> = (0..9000)
+        .map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 })
+        .collect();
+    let problem = Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches };
+    let batch = Batch { problems: vec![problem] };
+    let without = backend.seed(&batch, &set).unwrap();
+    assert_eq!(gpu.stop_clock(), None);
+    gpu.start_clock().unwrap();
+    let with = backend.seed(&batch, &set).unwrap();
+    let timeline = gpu.stop_clock().unwrap();
+    assert_eq!(with, without);
+    assert_eq!(timeline.chunks.iter().map(|chunk| chunk.loads).sum::<usize>(), wrenches.len());
+    assert_eq!(timeline.chunks.len(), 5);
+    let forward = |span: Span| span.from <= span.to;
+    for chunk in &timeline.chunks {
+        assert!(chunk.bytes_up > 0 && chunk.bytes_down == (chunk.loads * 32) as u64);
+        assert!(chunk.make.to <= chunk.send.from && chunk.send.to <= chunk.wait.from);
+        assert!(chunk.wait.to <= chunk.fetch.from && chunk.fetch.to <= chunk.spread.from);
+        assert_eq!(chunk.device.is_some(), gpu.has_timestamps());
+        let Some(device) = chunk.device else { continue };
+        assert!(forward(device.basis) && forward(device.search), "{device:?}");
+        assert!(device.basis.to <= device.search.from, "{device:?}");
+        for copy in [device.upload, device.readback].into_iter().flatten() {
+            assert!(forward(copy), "{device:?}");
+        }
+    }
+    // Two chunks are under way at a time: the next is sent before the one before is waited for.
+    for pair in timeline.chunks.windows(2) {
+        assert!(pair[1].send.to <= pair[0].wait.from, "{pair:?}");
+        if let (Some(before), Some(after)) = (pair[0].device, pair[1].device) {
+            assert!(before.search.from <= after.search.from, "{pair:?}");
         }
     }
 }

@@ -1,0 +1,369 @@
+//! How far the kernels' single precision is from the processor's twin of them and from double
+//! precision, on whatever adapter is open.
+
+use std::sync::Arc;
+
+use glam::{DMat2, DVec2, DVec3};
+
+use super::super::layout::{BOUNDED, COUPLED, LEAST_DISSIPATION};
+use super::super::prepare::Prepared;
+use super::super::seeds::{NEGATED, RING};
+use super::super::table::contact_basis;
+use super::super::{Batch, Job, Problem, SeedStatus, cpu, not_searched};
+use super::{Chunk, ChunkSpans, Failure, Gpu, State, map};
+use crate::backend::{F32_TOLERANCE, SeedSet};
+use crate::contact::{Loops, friction};
+use crate::error::{Error, Result};
+use crate::geometry::polygon::rings_moments;
+use crate::model::{Contact, Patch, Polygon, Wrench};
+
+/// Largest differences of one number of a kernel.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Deviation {
+    /// `fill_basis` or `search`.
+    pub kernel: &'static str,
+    /// Which number, and relative to what.
+    pub number: &'static str,
+    /// How many were compared.
+    pub count: usize,
+    /// Largest difference from the processor's kernel in single precision.
+    pub from_twin: f64,
+    /// Largest difference from the closed forms in double precision; `None` where there are none.
+    pub from_exact: Option<f64>,
+    /// The same of the processor's kernel.
+    pub twin_from_exact: Option<f64>,
+}
+
+/// What [`Gpu::check_kernels`] found.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct KernelCheck {
+    /// Number by number.
+    pub deviations: Vec<Deviation>,
+    /// Loads on which adapter and processor took different twists of equal value.
+    pub other_twist: usize,
+    /// Loads that got bounds on one of them only: a hair inside or outside full contact.
+    pub other_status: usize,
+    /// Loads searched.
+    pub loads: usize,
+    /// Loads with bounds.
+    pub bounded: usize,
+    /// The tolerance that widens every bound.
+    pub tolerance: f64,
+    /// Largest difference of a bound from double precision, on adapter or processor.
+    pub largest: f64,
+}
+
+impl KernelCheck {
+    /// Whether the tolerance covers every difference of a bound that was seen.
+    pub fn tolerance_holds(&self) -> bool {
+        self.largest <= self.tolerance
+    }
+}
+
+/// The largest of some differences; one that is not a number counts as infinite.
+#[derive(Debug, Clone, Copy, Default)]
+struct Most {
+    count: usize,
+    from_twin: f64,
+    from_exact: f64,
+    twin_from_exact: f64,
+}
+
+impl Most {
+    fn add(&mut self, found: f32, twin: f32, exact: f64, scale: f64) {
+        let apart = |a: f64, b: f64| {
+            let apart = (a - b).abs() / scale;
+            if apart.is_nan() { f64::INFINITY } else { apart }
+        };
+        let (found, twin) = (f64::from(found), f64::from(twin));
+        self.count += 1;
+        self.from_twin = self.from_twin.max(apart(found, twin));
+        self.from_exact = self.from_exact.max(apart(found, exact));
+        self.twin_from_exact = self.twin_from_exact.max(apart(twin, exact));
+    }
+
+    fn of(self, kernel: &'static str, number: &'static str, exact: bool) -> Deviation {
+        Deviation {
+            kernel,
+            number,
+            count: self.count,
+            from_twin: self.from_twin,
+            from_exact: exact.then_some(self.from_exact),
+            twin_from_exact: exact.then_some(self.twin_from_exact),
+        }
+    }
+}
+
+/// A contact in double precision in the kernels' scaled frame.
+struct Exact {
+    faces: usize,
+    area: [f64; 2],
+    centroid: [DVec2; 2],
+    compliance: DMat2,
+    /// `[face][twist]`: rows of the weights `1, x1, x2`.
+    basis: [Vec<[[f64; 3]; 3]>; 2],
+}
+
+impl Exact {
+    fn new(contact: &Contact, prepared: &Prepared, seeds: &SeedSet) -> Self {
+        let loops = [&contact.face_i, &contact.face_ii]
+            .map(|patch| Loops::mapped(patch, |point| (point - prepared.origin) / prepared.unit));
+        let moments = [0, 1].map(|k: usize| rings_moments(&loops[k].rings().collect::<Vec<_>>()));
+        let basis = [0, 1].map(|k: usize| {
+            let one = |v: &[f32; 4]| {
+                friction(&loops[k], [v[0], v[1], v[2]].map(f64::from), [1.0, 0.0, 0.0]).g
+            };
+            seeds.twists().iter().map(one).collect()
+        });
+        Self {
+            faces: prepared.header.faces as usize,
+            area: [moments[0].area, moments[1].area],
+            centroid: [moments[0].centroid, moments[1].centroid],
+            compliance: (moments[0].second + moments[1].second).inverse(),
+            basis,
+        }
+    }
+
+    /// Gradients of the dissipation at every twist, for the pressure in full contact.
+    fn gradients(&self, f3: f64, m1: f64, m2: f64) -> Vec<DVec3> {
+        let normal = [1.0 + 0.5 * f3, 1.0 - 0.5 * f3];
+        let mean = [normal[0] / self.area[0], normal[1] / self.area[1]];
+        let row = |face: usize, k: usize, weight: usize| DVec3::from(self.basis[face][k][weight]);
+        let twists = 0..self.basis[0].len();
+        if self.faces == 1 {
+            return twists.map(|k| (mean[0] + mean[1]) * row(0, k, 0)).collect();
+        }
+        let [ci, cii] = self.centroid;
+        let slope = self.compliance * (DVec2::new(-m2, m1) - normal[0] * ci + normal[1] * cii);
+        let (at_i, at_ii) = (mean[0] - slope.dot(ci), mean[1] + slope.dot(cii));
+        let less = |k: usize, weight: usize| row(0, k, weight) - row(1, k, weight);
+        twists
+            .map(|k| {
+                at_i * row(0, k, 0)
+                    + at_ii * row(1, k, 0)
+                    + slope.x * less(k, 1)
+                    + slope.y * less(k, 2)
+            })
+            .collect()
+    }
+}
+
+/// The largest value of a unit wrench over the twists.
+fn lower(w: DVec3, gradients: &[DVec3], seeds: &SeedSet) -> f64 {
+    let value = |(v, g): (&[f32; 4], &DVec3)| {
+        let v = DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]));
+        w.dot(v).abs() / v.dot(*g).max(f64::from(LEAST_DISSIPATION))
+    };
+    seeds.twists().iter().zip(gradients).map(value).fold(0.0, f64::max)
+}
+
+/// The bound from the triangles round the twist `best`.
+fn upper(w: DVec3, gradients: &[DVec3], seeds: &SeedSet, best: usize) -> f64 {
+    let support = |entry: u32| {
+        let sign = if entry & NEGATED != 0 { -1.0 } else { 1.0 };
+        sign * gradients[(entry & !NEGATED) as usize]
+    };
+    let (ga, ring) = (gradients[best], seeds.rings()[best]);
+    let total = |i: usize| {
+        let (gb, gc) = (support(ring[i]), support(ring[(i + 1) % RING]));
+        let det = ga.dot(gb.cross(gc));
+        let parts = [w.dot(gb.cross(gc)), ga.cross(w).dot(gc), ga.cross(w).dot(gb)];
+        let sum: f64 = parts.iter().map(|x| x.abs()).sum();
+        if det.abs() > 1e-12 { sum / det.abs() } else { f64::INFINITY }
+    };
+    (0..RING).map(total).fold(f64::INFINITY, f64::min)
+}
+
+/// A small generator, so that the contacts are the same everywhere.
+struct Random(u64);
+
+impl Random {
+    fn within(&mut self, low: f64, high: f64) -> f64 {
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.within(-1.0, 1.0), self.within(-1.0, 1.0), self.within(-1.0, 1.0))
+    }
+
+    /// A star-shaped polygon.
+    fn patch(&mut self) -> Patch {
+        let corners = 3 + self.within(0.0, 8.0) as usize;
+        let (centre, turn, flat) = (
+            DVec2::new(self.within(-0.02, 0.02), self.within(-0.02, 0.02)),
+            self.within(0.0, 1.0),
+            self.within(0.3, 1.0),
+        );
+        let ring = (0..corners).map(|i| {
+            let angle =
+                (i as f64 + turn + self.within(-0.2, 0.2)) / corners as f64 * std::f64::consts::TAU;
+            let size = 0.02 * self.within(0.5, 1.0);
+            centre + DVec2::from_angle(angle) * size * DVec2::new(1.0, flat)
+        });
+        vec![Polygon { outer: ring.collect(), holes: Vec::new() }]
+    }
+
+    /// Congruent faces, or those of a pad that hangs over an edge.
+    fn contact(&mut self, same: bool) -> Contact {
+        let face_i = self.patch();
+        let cut = self.within(0.6, 1.0);
+        let face_ii = if same {
+            face_i.clone()
+        } else {
+            let shrunk = |p: &DVec2| *p * DVec2::new(cut, 1.0);
+            let outer = face_i[0].outer.iter().map(shrunk).collect();
+            vec![Polygon { outer, holes: Vec::new() }]
+        };
+        Contact { face_i, face_ii }
+    }
+}
+
+impl Gpu {
+    /// Runs both kernels on random contacts (half of them with different faces, at no distance so
+    /// that friction does not couple, for double precision has no twin of that) and compares every
+    /// number with the processor's kernels and with the closed forms in double precision.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] when the device fails or leaves a record unwritten.
+    pub fn check_kernels(&self, seeds: &SeedSet, contacts: usize) -> Result<KernelCheck> {
+        let mut random = Random(31);
+        let grips: Vec<(Arc<Contact>, Vec<Wrench>)> = (0..contacts)
+            .map(|i| {
+                let wrench = |random: &mut Random| {
+                    let size = 40.0 * 10_f64.powf(random.within(-2.0, -0.3));
+                    Wrench { force: random.vector() * size, moment: random.vector() * size * 0.01 }
+                };
+                let contact = Arc::new(random.contact(i % 2 == 0));
+                (contact, (0..100).map(|_| wrench(&mut random)).collect())
+            })
+            .collect();
+        let problems: Vec<Problem<'_>> = grips
+            .iter()
+            .map(|(contact, wrenches)| Problem { contact, distance: 0.0, force: 40.0, wrenches })
+            .collect();
+        let batch = Batch { problems };
+        let job = Job::new(&batch, seeds)?;
+        let mut answers = vec![not_searched(SeedStatus::NoContact); job.loads];
+        let (mut basis, mut bounds) = ([Most::default(); 3], [Most::default(); 3]);
+        let (mut other_twist, mut other_status, mut loads, mut bounded) = (0, 0, 0, 0);
+        for mut plan in job.plans(self.limits(), &mut answers) {
+            let chunk = job.build(&mut plan);
+            let members: Vec<usize> = plan.iter().map(|(contact, _)| *contact).collect();
+            let (records, found) = self.records_and_basis(&chunk, seeds)?;
+            let twins = cpu::run(&chunk, seeds);
+            for (header, (&member, index)) in chunk.contacts.iter().zip(members.iter().zip(0..)) {
+                let Some(prepared) = &job.prepared[member] else { continue };
+                let exact = Exact::new(&grips[member].0, prepared, seeds);
+                let face = |a: u32, b: u32| &chunk.edges[a as usize..b as usize];
+                let edges = [
+                    face(header.edges_i, header.edges_ii),
+                    face(header.edges_ii, header.edges_end),
+                ];
+                let twin = contact_basis(header, edges, seeds);
+                let first = header.basis as usize * 4;
+                for (place, (&twin, &found)) in twin.iter().zip(&found[first..]).enumerate() {
+                    let (k, weight, part) = (place / 12 % seeds.len(), place / 4 % 3, place % 4);
+                    let on = place / 12 / seeds.len();
+                    let g = exact.basis[on][k];
+                    let v = &seeds.twists()[k];
+                    let (value, scale) = if part < 3 {
+                        (g[weight][part], exact.area[on])
+                    } else {
+                        ((0..3).map(|m| f64::from(v[m]) * g[weight][m]).sum(), exact.area[on])
+                    };
+                    let most = match (weight, part) {
+                        (0, 3) => &mut basis[0],
+                        (0, _) => &mut basis[1],
+                        _ => &mut basis[2],
+                    };
+                    let scale = if (weight, part) == (0, 3) { value } else { scale };
+                    most.add(found, twin, value, scale);
+                }
+                let groups = chunk.groups.iter().filter(|group| group.contact == index);
+                for load in groups.flat_map(|group| group.first..group.first + group.count) {
+                    let (found, twin) = (&records[load as usize], &twins[load as usize]);
+                    let load = &chunk.loads[load as usize];
+                    loads += 1;
+                    other_status += usize::from(found.status != twin.status);
+                    let same = found.best == twin.best;
+                    other_twist += usize::from(!same);
+                    let has_bounds = |status: u32| matches!(status, BOUNDED | COUPLED);
+                    if !(has_bounds(found.status) && has_bounds(twin.status)) {
+                        continue;
+                    }
+                    bounded += 1;
+                    let [f3, m1, m2] = [load.f3, load.m1, load.m2].map(f64::from);
+                    let gradients = exact.gradients(f3, m1, m2);
+                    let w = DVec3::from(load.wrench.map(f64::from));
+                    let value = lower(w, &gradients, seeds);
+                    bounds[0].add(found.lower, twin.lower, value, value);
+                    let value = upper(w, &gradients, seeds, found.best as usize);
+                    if same {
+                        bounds[1].add(found.upper, twin.upper, value, value);
+                        for m in 0..3 {
+                            bounds[2].add(found.twist[m], twin.twist[m], 0.0, 1.0);
+                        }
+                    } else {
+                        bounds[1].add(found.upper, found.upper, value, value);
+                    }
+                }
+            }
+        }
+        let largest = bounds[..2]
+            .iter()
+            .map(|most| most.from_exact.max(most.twin_from_exact))
+            .fold(0.0, f64::max);
+        let deviations = vec![
+            basis[0].of("fill_basis", "dissipation, relative", true),
+            basis[1].of("fill_basis", "weight 1, of the area", true),
+            basis[2].of("fill_basis", "weights x1 and x2, of the area", true),
+            bounds[0].of("search", "lower bound, relative", true),
+            bounds[1].of("search", "upper bound, relative", true),
+            bounds[2].of("search", "interpolated twist, absolute", false),
+        ];
+        Ok(KernelCheck {
+            deviations,
+            other_twist,
+            other_status,
+            loads,
+            bounded,
+            tolerance: F32_TOLERANCE,
+            largest,
+        })
+    }
+
+    /// The records of a chunk, and the basis that the first kernel left.
+    fn records_and_basis(
+        &self,
+        chunk: &Chunk,
+        seeds: &SeedSet,
+    ) -> Result<(Vec<super::SeedRecord>, Vec<f32>)> {
+        let mut state = State::default();
+        let ticket = self.submit(&mut state, 0, chunk, seeds, std::time::Instant::now())?;
+        let records = self.collect(&ticket, &mut ChunkSpans::default())?;
+        let fault = |why: String| Error::from(Failure::Fault(why));
+        let Some(basis) = &state.slots[0].basis else {
+            return Err(fault("the basis was not kept".to_owned()));
+        };
+        let bytes = (chunk.basis * size_of::<[f32; 4]>()) as u64;
+        let readback = self.buffer(
+            "basis readback",
+            bytes,
+            wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        );
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(basis, 0, &readback, 0, bytes);
+        let submission = self.queue.submit([encoder.finish()]);
+        let mapped = map(&readback, wgpu::MapMode::Read);
+        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
+        self.device.poll(wait).map_err(|error| fault(error.to_string()))?;
+        self.check_lost()?;
+        if !matches!(mapped.try_recv(), Ok(Ok(()))) {
+            return Err(fault("the basis was not ready after the wait".to_owned()));
+        }
+        let view = readback.get_mapped_range(..).map_err(|error| fault(error.to_string()))?;
+        Ok((records, bytemuck::pod_collect_to_vec(&view)))
+    }
+}
