@@ -160,8 +160,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     for row in workloads(args.grips as usize, args.loads as usize) {
         let mut first: Option<Measured> = None;
         for backend in &backends {
-            let measured =
-                measure(backend, &row, &set, Duration::from_secs_f64(args.seconds))?;
+            let measured = measure(backend, &row, &set, Duration::from_secs_f64(args.seconds))?;
             let check = first.as_ref().map(|first| compare(first, &measured));
             agreed &= check.as_ref().is_none_or(|check| check.is_ok());
             let solved: usize = measured.scored.iter().map(|scored| scored.solved).sum();

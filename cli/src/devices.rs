@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args as ClapArgs;
 
-/// Lists the graphics adapters: number, name, driver, type, limits.
+/// Lists the graphics adapters: number, name, driver, type, limits, timestamps.
 #[derive(Debug, ClapArgs)]
 #[command(
     after_help = "EXAMPLES:\n  gripfast devices\n  gripfast devices --json\n  WGPU_BACKEND=vulkan gripfast devices\n\n\
@@ -37,6 +37,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             "driver",
             "largest binding",
             "workgroup",
+            "subgroup",
+            "timestamps",
             "taken by auto",
         ]);
         for adapter in &adapters {
@@ -52,6 +54,17 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
                     adapter.max_invocations,
                     adapter.workgroup_memory >> 10
                 ),
+                format!(
+                    "{} to {}{}",
+                    adapter.subgroup[0],
+                    adapter.subgroup[1],
+                    if adapter.subgroup_operations { "" } else { ", no exchange" }
+                ),
+                match (adapter.timestamp_period, adapter.timestamps_of_copies) {
+                    (Some(period), true) => format!("{period} ns"),
+                    (Some(period), false) => format!("{period} ns, kernels only"),
+                    (None, _) => "none".to_owned(),
+                },
                 if adapter.counts_as_gpu { "yes" } else { "no: software" }.to_owned(),
             ]);
         }

@@ -710,6 +710,39 @@ fn reference_cases(backend: &Backend) {
     assert!(bounded > 10);
 }
 
+/// A device that goes before its third chunk of 500 loads: under `auto` the processor computes what
+/// is missing, under `gpu` it is an error that says so.
+#[cfg(feature = "gpu")]
+#[test]
+fn gpu_that_is_lost_in_mid_batch() {
+    use gripfast::backend::{ADAPTER_VARIABLE, Gpu};
+    if gpu().is_none() {
+        return;
+    }
+    let named = std::env::var(ADAPTER_VARIABLE).unwrap_or_else(|_| "0".to_owned());
+    let mut random = Random(47);
+    let contact = random.congruent(0.02);
+    let wrenches: Vec<Wrench> = (0..2300).map(|_| random.wrench(20.0, 0.02)).collect();
+    let problem = Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches };
+    let batch = Batch { problems: vec![problem] };
+    let set = SeedSet::default();
+    let expected = Backend::Cpu.seed(&batch, &set).unwrap();
+    for strict in [false, true] {
+        let mut gpu = Gpu::open(Some(&named), strict).unwrap();
+        gpu.lose_before(3, 500);
+        let backend = Backend::Gpu(Box::new(gpu));
+        match backend.seed(&batch, &set) {
+            Ok(found) => {
+                assert!(!strict);
+                assert_agrees(&found, &expected);
+                let Backend::Gpu(gpu) = &backend else { panic!("the backend changed") };
+                assert!(gpu.chunks_redone() >= 2, "{} redone", gpu.chunks_redone());
+            }
+            Err(error) => assert!(strict && error.to_string().contains("lost"), "{error}"),
+        }
+    }
+}
+
 macro_rules! suite {
     ($($name:ident),+ $(,)?) => {
         mod cpu {

@@ -14,9 +14,11 @@ pub(crate) fn root() -> PathBuf {
     if here.join("data").is_dir() { here.into() } else { above.into() }
 }
 
-/// A file of the reference data beside the checkout; `None`, said aloud, when it is not there.
+/// A file of the reference data, beside the checkout or in the folder that GRIPFAST_REFERENCE names;
+/// `None`, said aloud, when it is not there.
 pub(crate) fn reference(path: &str) -> Option<PathBuf> {
-    let file = root().join("../shared").join(path);
+    let named = std::env::var_os("GRIPFAST_REFERENCE").map(PathBuf::from);
+    let file = named.unwrap_or_else(|| root().join("../shared")).join(path);
     if file.exists() {
         return Some(file);
     }

@@ -82,7 +82,10 @@ F32_TOLERANCE is too small for this adapter",
         report.kernels.push((set.len(), check));
         args.output.write("check", &report.markdown(), &report, false)?;
     }
-    report.item("batches of 0 to 100,000 loads, twice, permuted".to_owned(), batches(gpu, &start, args.seconds));
+    report.item(
+        "batches of 0 to 100,000 loads, twice, permuted".to_owned(),
+        batches(gpu, &start, args.seconds),
+    );
     args.output.write("check", &report.markdown(), &report, false)?;
     for strict in [false, true] {
         let name = if strict { "loss of the device, gpu" } else { "loss of the device, auto" };
@@ -177,7 +180,8 @@ fn batches(gpu: gripfast::backend::Gpu, start: &Instant, seconds: f64) -> Result
                 left_out += 1;
                 continue;
             }
-            let what = |why: String| format!("{grips} grips of {loads} loads, {}: {why}", kind.name());
+            let what =
+                |why: String| format!("{grips} grips of {loads} loads, {}: {why}", kind.name());
             let workload = Workload::new(kind, grips, loads);
             let batch = workload.batch();
             let found = run(&backend, &batch)?;
@@ -185,8 +189,7 @@ fn batches(gpu: gripfast::backend::Gpu, start: &Instant, seconds: f64) -> Result
             if bits(&found) != bits(&run(&backend, &batch)?) {
                 return Err(what("other bytes the second time".to_owned()));
             }
-            let backward =
-                Batch { problems: batch.problems.iter().rev().copied().collect() };
+            let backward = Batch { problems: batch.problems.iter().rev().copied().collect() };
             let permuted = run(&backend, &backward)?;
             let expected: Vec<Seed> =
                 found.chunks(loads).rev().flat_map(<[Seed]>::to_vec).collect();

@@ -222,7 +222,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     report.complete = true;
     args.output.write("sweep", &report.markdown(), &report, true)?;
-    let apart = report.rows.iter().find(|row| row.left_out.as_ref().is_some_and(|why| why.starts_with("DIFFERS")));
+    let apart = report
+        .rows
+        .iter()
+        .find(|row| row.left_out.as_ref().is_some_and(|why| why.starts_with("DIFFERS")));
     if let Some(row) = apart {
         anyhow::bail!(
             "the backends disagree at {} twists, {} loads, {} contacts: {}",
@@ -336,7 +339,8 @@ impl Cell<'_> {
     #[cfg(not(feature = "gpu"))]
     fn steps(&self, _: &mut Row, _: &Workload) -> anyhow::Result<()> {
         let _ = (self.limits, known::EVALUATION, known::RING, known::BASIS_EDGE);
-        let _ = (known::BASIS_BYTES, known::LOAD_BYTES, self.contacts.edges(), self.contacts.faces());
+        let _ =
+            (known::BASIS_BYTES, known::LOAD_BYTES, self.contacts.edges(), self.contacts.faces());
         Ok(())
     }
 
@@ -349,12 +353,16 @@ impl Cell<'_> {
         self.place.seed(&workload.batch(), self.set)?;
         let whole = begin.elapsed().as_secs_f64();
         let chunks = gpu.stop_clock().unwrap_or_default().chunks;
-        let device = |span: &dyn Fn(gripfast::backend::DeviceSpans) -> Option<gripfast::backend::Span>| -> Option<f64> {
+        let device = |span: &dyn Fn(
+            gripfast::backend::DeviceSpans,
+        ) -> Option<gripfast::backend::Span>|
+         -> Option<f64> {
             chunks.iter().map(|chunk| Some(span(chunk.device?)?.seconds())).sum()
         };
-        let sum = |span: &dyn Fn(&gripfast::backend::ChunkSpans) -> gripfast::backend::Span| -> f64 {
-            chunks.iter().map(|chunk| span(chunk).seconds()).sum()
-        };
+        let sum =
+            |span: &dyn Fn(&gripfast::backend::ChunkSpans) -> gripfast::backend::Span| -> f64 {
+                chunks.iter().map(|chunk| span(chunk).seconds()).sum()
+            };
         let steps = Steps {
             whole,
             chunks: chunks.len(),
@@ -373,8 +381,8 @@ impl Cell<'_> {
             let (loads, twists) = (workload.loads() as f64, self.set.len() as f64);
             let distinct = if self.contacts == Contacts::Shared { 1 } else { row.grips };
             let evaluation = known::EVALUATION[faces - 1] * twists + known::RING[faces - 1];
-            let bytes = known::LOAD_BYTES * loads
-                + known::BASIS_BYTES * twists * (distinct * faces) as f64;
+            let bytes =
+                known::LOAD_BYTES * loads + known::BASIS_BYTES * twists * (distinct * faces) as f64;
             let edges = (distinct * faces * self.contacts.edges()) as f64;
             let work = evaluation * loads + known::BASIS_EDGE * edges * twists;
             row.share = Some(Share {

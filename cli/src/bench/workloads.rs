@@ -136,7 +136,8 @@ pub(crate) fn same_seeds(a: &[Seed], b: &[Seed]) -> Result<f64, String> {
     }
     let mut most: f64 = 0.0;
     for (i, (x, y)) in a.iter().zip(b).enumerate() {
-        let bounded = |seed: &Seed| matches!(seed.status, SeedStatus::Bounded | SeedStatus::Coupled);
+        let bounded =
+            |seed: &Seed| matches!(seed.status, SeedStatus::Bounded | SeedStatus::Coupled);
         if bounded(x) && bounded(y) {
             most = most.max(relative(x.lower, y.lower));
         }

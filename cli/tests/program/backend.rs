@@ -200,6 +200,93 @@ fn devices_and_bench_write_json() {
     assert!(results.iter().all(|row| row["loads_per_second"].as_f64().unwrap() > 0.0), "{report}");
 }
 
+/// `benches/device.sh` in seconds, with this build's program and without the test binary.
+#[cfg(target_os = "linux")]
+fn device_script(out: &std::path::Path, seconds: &str, adapter: &str, lose: &str) -> (i32, String) {
+    let script = crate::support::root().join("benches/device.sh");
+    let output = std::process::Command::new("bash")
+        .arg(script)
+        .args(["--seconds", seconds, adapter])
+        .env("OUT", out)
+        .env("GRIPFAST", assert_cmd::cargo::cargo_bin("gripfast"))
+        .env("SUITE", "")
+        .env("LOSE", lose)
+        .env_remove("GRIPFAST_ADAPTER")
+        .env_remove("WGPU_ADAPTER_NAME")
+        .output()
+        .unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    (output.status.code().unwrap(), String::from_utf8_lossy(&said).into_owned())
+}
+
+#[cfg(target_os = "linux")]
+fn entry(out: &std::path::Path) -> (Value, String) {
+    let file = std::fs::File::open(out.join("entry.json")).unwrap();
+    (serde_json::from_reader(file).unwrap(), std::fs::read_to_string(out.join("entry.md")).unwrap())
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_device_script_measures_an_adapter_and_says_what_it_had_no_time_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = gripfast(&["devices", "--json"]).assert().get_output().clone();
+    let devices: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
+    let Some(device) = devices.first() else {
+        crate::support::say("SKIPPED: no graphics adapter for the device script");
+        return;
+    };
+    let name = device["name"].as_str().unwrap();
+    let (code, said) = device_script(folder.path(), "25", name, "");
+    // Cut off or whole, by how busy the machine is; never for another reason.
+    assert!(code == 0 || code == 1 && !said.contains("FAILED"), "{code}: {said}");
+    let (entry, text) = entry(folder.path());
+    let adapter = entry["adapter"].as_str().unwrap();
+    assert!(adapter.starts_with(name), "{adapter}");
+    assert_eq!(entry["software_adapter"], device["kind"] == "software");
+    assert!(text.starts_with("## ") && text.contains(adapter), "{text}");
+    let check = &entry["parts"]["check"];
+    assert!(check["passed"] == true && check["kernels"][0][1]["largest"].as_f64().unwrap() > 0.0);
+    let rows = entry["parts"]["sweep"]["rows"].as_array().unwrap();
+    assert!(rows.len() >= 3 && rows.iter().any(|row| row["on"] == "adapter"), "{rows:?}");
+    for row in rows {
+        let measured = row["loads_per_second"].as_f64().unwrap() > 0.0;
+        assert!(measured || row["left_out"].is_string(), "{row}");
+        assert!(!row["left_out"].as_str().unwrap_or_default().starts_with("DIFFERS"), "{row}");
+    }
+    let names: Vec<String> = std::fs::read_dir(folder.path())
+        .unwrap()
+        .map(|file| file.unwrap().file_name().into_string().unwrap())
+        .collect();
+    assert!(names.iter().all(|name| !name.starts_with('.')), "{names:?}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_device_script_says_what_is_wrong_and_runs_what_it_can() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, said) = device_script(folder.path(), "8", "no such adapter", "");
+    assert_eq!(code, 2, "{said}");
+    assert!(said.contains("no adapter is called `no such adapter`"), "{said}");
+    let (found, text) = entry(folder.path());
+    assert!(text.contains("no adapter is called"), "{text}");
+    assert!(found["parts"]["sweep"]["rows"].as_array().is_some_and(|rows| !rows.is_empty()));
+    let output = gripfast(&["devices", "--json"]).assert().get_output().clone();
+    let devices: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
+    let Some(device) = devices.first() else { return };
+    // A device that goes in the sweep: the part says so, the others run.
+    let (code, said) = device_script(folder.path(), "12", device["name"].as_str().unwrap(), "2");
+    assert_eq!(code, 1, "{said}");
+    assert!(said.contains("the graphics processor was lost"), "{said}");
+    let (found, _) = entry(folder.path());
+    assert!(found["parts"]["sweep"]["failure"].as_str().unwrap().contains("lost"), "{found}");
+    assert_eq!(found["parts"]["check"]["passed"], true);
+    // No folder to write to.
+    let file = folder.path().join("file");
+    std::fs::write(&file, "").unwrap();
+    let (code, said) = device_script(&file, "5", "0", "");
+    assert!(code == 2 && said.contains("output folder"), "{said}");
+}
+
 /// `--polish top` prints the table of `--polish worst` and says how many grips it left out.
 #[test]
 fn polish_top_gives_the_same_best_grips() {
