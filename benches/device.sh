@@ -71,7 +71,7 @@ newest_suite() {
 
 build() {
     command -v cargo >/dev/null || stop "there is neither a built program nor cargo to build one"
-    (cd "$root" && cargo build --release --features full) || stop "the program does not build"
+    (cd "$root" && cargo build --release) || stop "the program does not build"
     (cd "$root" && cargo test --workspace --features full --test backend --no-run) ||
         stop "the test suite does not build"
 }
@@ -205,7 +205,7 @@ part() {
     case $status in
         0) words="whole, $((SECONDS - before)) s" ;;
         124 | 137) words="cut off after $limit s" ;;
-        *) words="FAILED with exit code $status: $(tail -n 1 "$work/$name.stderr")" ;;
+        *) words="FAILED with exit code $status: $(grep -m 1 '^error:' "$work/$name.stderr")" ;;
     esac
     [ $status -eq 0 ] || code=1
     return $status

@@ -192,7 +192,7 @@ impl Runner<'_> {
         let outcome = self.both(&mut row, part, flags);
         if let Err(error) = outcome {
             row.failed = !error.to_string().starts_with(NO_TIME);
-            row.problem = Some(error.to_string());
+            row.problem = Some(error.to_string().replace('\n', " "));
         }
         row
     }

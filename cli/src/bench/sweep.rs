@@ -194,9 +194,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     for (twists, loads, contacts) in cells {
         let set = SeedSet::with_at_least(twists)?;
         let first = report.rows.len();
+        // A cell has a rate on every place or on none.
+        if start.elapsed().as_secs_f64() >= args.seconds {
+            break;
+        }
         for place in &places {
             let rest = args.seconds - start.elapsed().as_secs_f64();
-            let mut cell = Cell { set: &set, loads, contacts, place, limits: report.limits };
+            let cell = Cell { set: &set, loads, contacts, place, limits: report.limits };
             let outcome = cell.measure((rest / left as f64).max(0.0), &mut history);
             left -= 1;
             match outcome {
@@ -215,12 +219,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         let mut rates = report.rows[first..].iter().map(|row| row.loads_per_second);
         let (one, all) = (rates.next(), rates.next());
         for row in &mut report.rows[first..] {
-            row.over_one_core = one.map(|one| row.loads_per_second / one);
-            row.over_all_cores = all.map(|all| row.loads_per_second / all);
+            let over = |rate: Option<f64>| {
+                rate.filter(|&rate| rate > 0.0 && row.runs > 0)
+                    .map(|rate| row.loads_per_second / rate)
+            };
+            (row.over_one_core, row.over_all_cores) = (over(one), over(all));
         }
         args.output.write("sweep", &report.markdown(), &report, false)?;
     }
-    report.complete = true;
+    report.complete = left == 0;
     args.output.write("sweep", &report.markdown(), &report, true)?;
     let apart = report
         .rows
@@ -238,9 +245,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Seconds that one grip took before, by place, twists and contacts: loads, seeds, scoring.
+/// Loads and seconds of one grip that was measured before on the same place, with the same twists
+/// and kind of contact: its seeds, and its scoring.
 #[derive(Default)]
-struct History(HashMap<(&'static str, usize, &'static str), (usize, f64, f64)>);
+struct History(HashMap<(&'static str, usize, &'static str), [Option<(usize, f64)>; 2]>);
 
 struct Cell<'a> {
     set: &'a SeedSet,
@@ -256,7 +264,7 @@ impl Cell<'_> {
     }
 
     /// Measures within about `seconds`; what would take far longer is left out.
-    fn measure(&mut self, seconds: f64, history: &mut History) -> anyhow::Result<Row> {
+    fn measure(&self, seconds: f64, history: &mut History) -> anyhow::Result<Row> {
         let mut row = Row {
             twists: self.set.len(),
             loads: self.loads,
@@ -276,23 +284,25 @@ impl Cell<'_> {
             left_out: None,
         };
         let key = (self.place.name, self.set.len(), self.contacts.name());
-        let before = history.0.get(&key).copied();
-        let factor = |(loads, ..): (usize, f64, f64)| self.loads as f64 / loads as f64;
-        let expected = before.map_or(0.0, |known| known.1 * factor(known));
-        if expected > 3.0 * seconds + 0.5 {
-            row.left_out = Some(format!("seeds of one grip would take {expected:.1} s"));
+        let known = history.0.entry(key).or_default();
+        // The dearest contacts cost with the square of the number of loads.
+        let expected = |known: Option<(usize, f64)>, power: i32| {
+            known.map_or(0.0, |(loads, time)| time * (self.loads as f64 / loads as f64).powi(power))
+        };
+        let most = 3.0 * seconds + 0.5;
+        let time = expected(known[0], 1);
+        if time > most {
+            row.left_out = Some(format!("seeds of one grip would take {time:.1} s"));
             return Ok(row);
         }
-        let (one_grip, seeds_time) = self.seeds(&mut row, 0.5 * seconds)?;
-        // The dearest contacts cost with the square of the number of loads.
-        let expected = before.map_or(0.0, |known| known.2 * factor(known).powi(2));
-        let mut score_time = expected;
-        if expected > 3.0 * seconds + 0.5 {
-            row.left_out = Some(format!("scoring one grip could take {expected:.1} s"));
+        let (one_grip, time) = self.seeds(&mut row, 0.5 * seconds)?;
+        known[0] = Some((self.loads, time));
+        let time = expected(known[1], 2);
+        if time > most {
+            row.left_out = Some(format!("scoring one grip could take {time:.1} s"));
         } else {
-            score_time = self.scoring(&mut row, &one_grip, 0.3 * seconds)?;
+            known[1] = Some((self.loads, self.scoring(&mut row, &one_grip, 0.3 * seconds)?));
         }
-        history.0.insert(key, (self.loads, seeds_time, score_time));
         Ok(row)
     }
 
@@ -495,15 +505,11 @@ over all cores | bounds, answers apart |\n|---|---|---|---|---|---|---|---|---|-
         let places = if self.adapter.is_some() { 3 } else { 2 };
         for cell in self.rows.chunks(places) {
             let rate = |row: Option<&Row>| {
-                let Some(row) = row else { return String::new() };
-                let Some(scoring) = &row.scoring else {
-                    return if row.runs == 0 {
-                        String::new()
-                    } else {
-                        format!("{:.3}", row.loads_per_second * 1e-6)
-                    };
-                };
-                format!("{:.3} ({:.0})", row.loads_per_second * 1e-6, scoring.grips_per_second)
+                let Some(row) = row.filter(|row| row.runs > 0) else { return String::new() };
+                let grips = row.scoring.as_ref().map_or_else(String::new, |scoring| {
+                    format!(" ({:.0})", scoring.grips_per_second)
+                });
+                format!("{:.3}{grips}", row.loads_per_second * 1e-6)
             };
             let ratio = |ratio: Option<f64>| ratio.map_or_else(String::new, |x| format!("{x:.2}"));
             let Some(last) = cell.last() else { continue };
@@ -514,14 +520,18 @@ over all cores | bounds, answers apart |\n|---|---|---|---|---|---|---|---|---|-
             );
             let _ = writeln!(
                 text,
-                "| {} | {} | {} | {} | {} | {} | {:.1} | {} | {} | {apart} |",
+                "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {apart} |",
                 last.twists,
                 last.loads,
                 last.contacts,
                 rate(cell.first()),
                 rate(cell.get(1)),
                 rate(adapter),
-                last.evaluations_per_second * 1e-6,
+                if last.runs > 0 {
+                    format!("{:.1}", last.evaluations_per_second * 1e-6)
+                } else {
+                    String::new()
+                },
                 ratio(adapter.and_then(|row| row.over_one_core)),
                 ratio(adapter.and_then(|row| row.over_all_cores)),
             );
@@ -532,7 +542,7 @@ over all cores | bounds, answers apart |\n|---|---|---|---|---|---|---|---|---|-
         if let Some(why) = &self.failure {
             let _ = writeln!(text, "\n**FAILED**: {why}");
         } else if !self.complete {
-            text += "\nCut off: there is more to measure.\n";
+            text += "\nThe time was over before the last rows.\n";
         }
         text
     }

@@ -226,7 +226,7 @@ impl Gpu {
     /// number with the processor's kernels and with the closed forms in double precision.
     ///
     /// # Errors
-    /// [`Error::Backend`] when the device fails or leaves a record unwritten.
+    /// [`crate::error::ErrorKind::Device`] when the device fails or leaves a record unwritten.
     pub fn check_kernels(&self, seeds: &SeedSet, contacts: usize) -> Result<KernelCheck> {
         let mut random = Random(31);
         let grips: Vec<(Arc<Contact>, Vec<Wrench>)> = (0..contacts)

@@ -124,7 +124,7 @@ impl Gpu {
     /// From now on the steps of each chunk are timed.
     ///
     /// # Errors
-    /// [`Error::Backend`] when the device does not answer.
+    /// [`crate::error::ErrorKind::Device`] when the device does not answer.
     pub fn start_clock(&self) -> Result<()> {
         let start = Instant::now();
         let mut clock = Clock { start, tick: None, zero: (0, 0.0), timeline: Timeline::default() };
@@ -149,7 +149,7 @@ impl Gpu {
             let submission = self.queue.submit([encoder.finish()]);
             readback.map_async(wgpu::MapMode::Read, 0..16, |_| {});
             let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
-            let failed = |why: String| Error::Backend(format!("starting the clock: {why}"));
+            let failed = |why: String| Error::device(format!("starting the clock: {why}"));
             self.device.poll(wait).map_err(|error| failed(error.to_string()))?;
             let view =
                 readback.get_mapped_range(0..16).map_err(|error| failed(error.to_string()))?;
