@@ -23,7 +23,7 @@ use crate::model::{Contact, Score, Status};
 pub(crate) const TIE: f64 = 1e-9;
 
 /// Loads seeded at a time, which bounds the memory whatever the size of the batch.
-const BLOCK: usize = 1 << 19;
+pub(super) const BLOCK: usize = 1 << 19;
 
 /// Which loads are solved exactly.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -76,7 +76,7 @@ impl Backend {
         seeds: &SeedSet,
         options: &ScoreOptions,
     ) -> Result<Vec<Scored>> {
-        self.by_blocks(batch, seeds, |block, found| {
+        self.by_blocks(BLOCK, batch, seeds, |block, found| {
             let problems = &batch.problems[block];
             let pads = DistinctPads::new(problems);
             pads.cases(problems, &found, options)
@@ -86,10 +86,11 @@ impl Backend {
         })
     }
 
-    /// Seeds one block of the batch after another. While a block is seeded, the one before is
-    /// solved.
+    /// Seeds one block of the batch, of `most` loads or one problem, after another. While a block is
+    /// seeded, the one before is solved.
     pub(super) fn by_blocks(
         &self,
+        most: usize,
         batch: &Batch<'_>,
         seeds: &SeedSet,
         mut solve: impl FnMut(Range<usize>, Vec<Seed>) -> Vec<Scored> + Send,
@@ -102,7 +103,7 @@ impl Backend {
         };
         let mut scored = Vec::with_capacity(batch.problems.len());
         let mut waiting: Option<(Range<usize>, Vec<Seed>)> = None;
-        for block in blocks(&batch.problems) {
+        for block in blocks(&batch.problems, most) {
             let part = Batch { problems: batch.problems[block.clone()].to_vec() };
             let (found, before) = rayon::join(
                 || self.seed(&part, seeds),
@@ -118,11 +119,11 @@ impl Backend {
     }
 }
 
-/// Cuts the problems so that each block has at most [`BLOCK`] loads (or one problem).
-fn blocks(problems: &[Problem<'_>]) -> Vec<Range<usize>> {
+/// Cuts the problems so that each block has at most `most` loads (or one problem).
+fn blocks(problems: &[Problem<'_>], most: usize) -> Vec<Range<usize>> {
     let (mut blocks, mut start, mut loads) = (Vec::new(), 0, 0);
     for (index, problem) in problems.iter().enumerate() {
-        if index > start && loads + problem.wrenches.len() > BLOCK {
+        if index > start && loads + problem.wrenches.len() > most {
             blocks.push(start..index);
             (start, loads) = (index, 0);
         }

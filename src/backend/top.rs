@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::score::{Case, DistinctPads, usable};
+use super::score::{BLOCK, Case, DistinctPads, usable};
 use super::{Backend, Batch, ScoreOptions, Scored, SeedSet};
 use crate::error::Result;
 
@@ -62,7 +62,7 @@ impl Backend {
         best: &mut Best,
         merit: &(dyn Fn(usize, f64) -> f64 + Sync),
     ) -> Result<Vec<Scored>> {
-        self.by_blocks(batch, seeds, |block, found| {
+        self.by_blocks(BLOCK, batch, seeds, |block, found| {
             let problems = &batch.problems[block.clone()];
             let pads = DistinctPads::new(problems);
             let cases = pads.cases(problems, &found, options);

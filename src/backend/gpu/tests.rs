@@ -369,3 +369,51 @@ fn the_clock_shows_every_chunk_and_changes_nothing() {
         }
     }
 }
+
+/// While the processor solves a block exactly, the device works on the chunks of the next, and the
+/// answers come in the order of the blocks.
+#[test]
+fn exact_answers_overlap_the_kernels_of_the_next_block() {
+    let Some(mut gpu) = gpu(true) else { return };
+    if !gpu.has_timestamps() {
+        eprintln!("SKIPPED: the adapter has no timestamps");
+        return;
+    }
+    gpu.limits.loads = 1500;
+    let backend = Backend::Gpu(Box::new(gpu));
+    let Backend::Gpu(gpu) = &backend else { panic!("the backend changed") };
+    let set = SeedSet::new(8).unwrap();
+    let mut random = Random(41);
+    let contact = random.contact();
+    let wrenches: Vec<Wrench> = (0..3000)
+        .map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 })
+        .collect();
+    let problem = Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches };
+    let batch = Batch { problems: vec![problem; 4] };
+    let expected = backend.seed(&Batch { problems: vec![problem] }, &set).unwrap();
+    let mut order = Vec::new();
+    // Threads of its own, so that other tests do not hold them up.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+    gpu.start_clock().unwrap();
+    pool.install(|| {
+        backend.by_blocks(3000, &batch, &set, |block, seeds| {
+            order.push(block);
+            assert_eq!(seeds, expected);
+            std::thread::sleep(std::time::Duration::from_millis(200));
+            Vec::new()
+        })
+    })
+    .unwrap();
+    let timeline = gpu.stop_clock().unwrap();
+    assert_eq!(order, [0..1, 1..2, 2..3, 3..4]);
+    assert_eq!((timeline.chunks.len(), timeline.polish.len()), (8, 4));
+    // Chunks 2k and 2k + 1 are block k's.
+    for (block, polish) in timeline.polish.iter().enumerate().take(3) {
+        let next = &timeline.chunks[2 * block + 2..2 * block + 4];
+        let common: f64 =
+            next.iter().map(|chunk| chunk.device.unwrap().search.common(*polish)).sum();
+        let whole: f64 = next.iter().map(|chunk| chunk.device.unwrap().search.seconds()).sum();
+        println!("block {block}: {common:.4} s of {whole:.4} s of the next one's search hidden");
+        assert!(common > 0.0, "{timeline:?}");
+    }
+}
