@@ -16,7 +16,7 @@ use glam::{DVec2, DVec3};
 use gripfast::backend::{
     Backend, Batch, Choice, Problem, ScoreOptions, SeedSet, Selection, select,
 };
-use gripfast::load::sphere;
+use gripfast::geometry::sphere;
 use gripfast::model::{Contact, Polygon, Wrench};
 
 /// A rectangular pad with one corner cut off by `cut`.

@@ -146,14 +146,81 @@ impl Body {
     }
 }
 
-impl Gripper {
-    /// The bodies of the finger under pad I (`jaw_i`) or II, with the pads `width` apart.
-    pub fn finger(&self, jaw_i: bool, width: f64) -> Vec<Body> {
-        let map = if jaw_i {
-            Frame { rotation: DMat3::IDENTITY, origin: DVec3::new(0.0, 0.0, width / 2.0) }
-        } else {
-            Frame { rotation: half_turn(), origin: DVec3::new(0.0, 0.0, -width / 2.0) }
+/// One of the two jaws of a gripper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Jaw {
+    /// The one at `x3 > 0`.
+    I,
+    /// The one at `x3 < 0`.
+    II,
+}
+
+impl Jaw {
+    /// Both, I first.
+    pub const BOTH: [Self; 2] = [Self::I, Self::II];
+
+    /// `1` for the jaw at `x3 > 0`, `-1` for the other.
+    pub fn side(self) -> f64 {
+        match self {
+            Self::I => 1.0,
+            Self::II => -1.0,
+        }
+    }
+
+    /// The other one.
+    #[must_use]
+    pub fn other(self) -> Self {
+        match self {
+            Self::I => Self::II,
+            Self::II => Self::I,
+        }
+    }
+
+    /// `I` or `II`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::I => "I",
+            Self::II => "II",
+        }
+    }
+
+    /// The jaw's frame in the grip frame with its pad face `offset` [m] from the middle plane.
+    pub fn at(self, offset: f64) -> Frame {
+        let rotation = match self {
+            Self::I => DMat3::IDENTITY,
+            Self::II => half_turn(),
         };
+        Frame { rotation, origin: DVec3::Z * self.side() * offset }
+    }
+}
+
+/// Which way round a gripper is put at a pose whose closing axis leaves both open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Jaws {
+    /// Jaw I on the positive side of the closing axis.
+    #[default]
+    Straight,
+    /// Jaws exchanged: half a turn about the approach axis.
+    Exchanged,
+}
+
+impl Jaws {
+    /// Both ways.
+    pub const BOTH: [Self; 2] = [Self::Straight, Self::Exchanged];
+
+    /// The turn of the gripper within the pose.
+    pub fn turn(self) -> DMat3 {
+        match self {
+            Self::Straight => DMat3::IDENTITY,
+            Self::Exchanged => half_turn(),
+        }
+    }
+}
+
+impl Gripper {
+    /// The bodies of a finger, with the pads `width` apart [m].
+    pub fn finger(&self, jaw: Jaw, width: f64) -> Vec<Body> {
+        let map = jaw.at(width / 2.0);
         self.fingers.iter().map(|body| body.moved(&map)).collect()
     }
 

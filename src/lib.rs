@@ -24,4 +24,5 @@ pub mod propose;
 pub mod rank;
 pub mod report;
 pub mod results;
+pub(crate) mod svg;
 pub mod units;

@@ -11,14 +11,13 @@ use std::collections::HashMap;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::clash::nearby::Nearby;
-use crate::clash::obstacle::{Course, MeshObstacle, Room, Volumes};
+use crate::clash::{Course, MeshObstacle, Nearby, Room, Volumes};
 use crate::error::{Error, Result};
 use crate::gripper::Gripper;
 use crate::model::{Frame, Grip};
 use crate::results::GripSet;
 
-pub use crate::clash::obstacle::Phase;
+pub use crate::clash::Phase;
 pub use scene::{Obstacle, Opening, Reach, Retreat, Scene, Solid};
 
 /// Grips that one thread tests after each other. What a piece remembers of the last collision stays

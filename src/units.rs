@@ -1,6 +1,8 @@
 //! Values with units at the edge of the program: `80N`, `350g`, `2mm`, `15deg`. Inside everything
 //! is SI.
 
+use glam::DVec3;
+
 use crate::error::{Error, Result};
 
 /// A kind of quantity with the units accepted for it.
@@ -132,6 +134,37 @@ impl Quantity {
     }
 }
 
+/// A direction: `+x`, `x`, `-z`, ... or three numbers joined by slashes, e.g. `0/0.5/-1`; its
+/// length is as given. `place` is the flag or field for the message.
+///
+/// # Errors
+/// When the text is none of these, or the numbers are not finite or all zero.
+pub fn direction(place: &str, text: &str) -> Result<DVec3> {
+    let text = text.trim();
+    let axes = [("x", DVec3::X), ("y", DVec3::Y), ("z", DVec3::Z)];
+    for (letter, axis) in axes {
+        if text == letter || text.strip_prefix('+') == Some(letter) {
+            return Ok(axis);
+        }
+        if text.strip_prefix('-') == Some(letter) {
+            return Ok(-axis);
+        }
+    }
+    let numbers: Option<Vec<f64>> =
+        text.split('/').map(|number| number.trim().parse().ok()).collect();
+    numbers
+        .and_then(|numbers| <[f64; 3]>::try_from(numbers).ok())
+        .map(DVec3::from_array)
+        .filter(|direction| direction.is_finite() && *direction != DVec3::ZERO)
+        .ok_or_else(|| {
+            Error::input(
+                place,
+                format!("'{text}' is not a direction"),
+                "give +x, -x, +y, -y, +z, -z or three numbers joined by slashes, e.g. 0/0.5/-1",
+            )
+        })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -153,5 +186,22 @@ mod tests {
         }
         let message = Quantity::Force.parse("--force", "80").unwrap_err().to_string();
         assert!(message.contains("--force") && message.contains("kN"), "{message}");
+    }
+
+    #[test]
+    fn directions_are_axes_or_three_numbers() {
+        for (text, expected) in [
+            ("x", DVec3::X),
+            ("+y", DVec3::Y),
+            (" -z ", -DVec3::Z),
+            ("0/0.5/-1", DVec3::new(0.0, 0.5, -1.0)),
+            ("1e-200/0/0", DVec3::X * 1e-200),
+        ] {
+            assert_eq!(direction("--ground", text).unwrap(), expected, "{text}");
+        }
+        for bad in ["", "+", "w", "xx", "+-x", "1/2", "1/2/3/4", "0/0/0", "1/nan/0", "1/2/inf"] {
+            let message = direction("--ground", bad).unwrap_err().to_string();
+            assert!(message.contains("--ground") && message.contains("0/0.5/-1"), "{message}");
+        }
     }
 }

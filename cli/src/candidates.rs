@@ -7,7 +7,7 @@ use glam::DVec3;
 use gripfast::error::{Error, Result};
 use gripfast::gripper::Gripper;
 use gripfast::propose::{Cone, Ground, ProposeOptions};
-use gripfast::units::Quantity;
+use gripfast::units::{Quantity, direction};
 use serde_json::{Value, json};
 
 #[derive(Debug, Args)]
@@ -168,32 +168,6 @@ impl CandidateArgs {
             ..defaults
         }
     }
-}
-
-/// `+x`, `-z`, ... or three numbers joined by slashes.
-pub(crate) fn direction(flag: &str, text: &str) -> Result<DVec3> {
-    let axis = |text: &str| match text {
-        "x" | "+x" => Some(DVec3::X),
-        "-x" => Some(-DVec3::X),
-        "y" | "+y" => Some(DVec3::Y),
-        "-y" => Some(-DVec3::Y),
-        "z" | "+z" => Some(DVec3::Z),
-        "-z" => Some(-DVec3::Z),
-        _ => None,
-    };
-    let numbers = || {
-        let numbers: Vec<f64> =
-            text.split('/').map(str::parse).collect::<std::result::Result<_, _>>().ok()?;
-        let vector = DVec3::from_array(numbers.try_into().ok()?);
-        (vector.is_finite() && vector.length() > 0.0).then_some(vector)
-    };
-    axis(text).or_else(numbers).ok_or_else(|| {
-        Error::input(
-            flag,
-            format!("'{text}' is no direction"),
-            "give +x, -z, ... or three numbers such as 0/0.5/-1",
-        )
-    })
 }
 
 fn two<'a>(flag: &str, text: &'a str, shape: &str) -> Result<(&'a str, &'a str)> {

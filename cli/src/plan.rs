@@ -13,7 +13,7 @@ use clap::{Args as ClapArgs, ValueEnum};
 use gripfast::backend::{Polish, ScoreOptions};
 use gripfast::error::Error;
 use gripfast::export::{self, Format};
-use gripfast::gripper;
+use gripfast::gripper::{self, Jaws};
 use gripfast::lab::compare;
 use gripfast::load::LoadSet;
 use gripfast::part::{Part, ReadOptions, Unit};
@@ -262,7 +262,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut proposer = Proposer::new(&part, &gripper, &propose)?;
     if let Some(text) = &args.why {
         let (position, angle, site) = why::pose(text)?;
-        let explanation = proposer.explain(site, position, angle, false)?;
+        let explanation = proposer.explain(site, position, angle, Jaws::Straight)?;
         why::print(&mut std::io::stdout().lock(), &explanation)?;
         return Ok(if explanation.rejection.is_none() {
             ExitCode::SUCCESS

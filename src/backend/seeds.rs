@@ -9,6 +9,7 @@
 use std::collections::HashMap;
 
 use crate::error::{Error, Result};
+use crate::geometry::sphere;
 
 /// Set in a [`SeedSet`] ring entry when the neighbour is the negative of the stored twist.
 pub const NEGATED: u32 = 1 << 31;
@@ -155,68 +156,12 @@ fn key(p: [f64; 3]) -> [i64; 3] {
     p.map(|x| (x * 1e6).round() as i64)
 }
 
-/// Vertices and outward triangles of the icosahedron with each face divided into `frequency^2`
-/// triangles (class I).
+/// Vertices and outward triangles of the geodesic sphere. A coordinate that is zero but for rounding
+/// becomes zero: translations shall be exactly that.
 fn geodesic_sphere(frequency: u32) -> (Vec<[f64; 3]>, Vec<[usize; 3]>) {
-    let phi = (1.0 + 5.0_f64.sqrt()) / 2.0;
-    let mut corners: Vec<[f64; 3]> = Vec::with_capacity(12);
-    for a in [-1.0, 1.0] {
-        for b in [-phi, phi] {
-            corners.extend([[0.0, a, b], [a, b, 0.0], [b, 0.0, a]]);
-        }
-    }
-    let n = frequency as usize;
-    let mut points: Vec<[f64; 3]> = Vec::with_capacity(10 * n * n + 2);
-    let mut triangles = Vec::with_capacity(20 * n * n);
-    let mut index_of: HashMap<[i64; 3], usize> = HashMap::new();
-    let mut vertex = |p: [f64; 3]| {
-        let length = dot(p, p).sqrt();
-        // A coordinate that is zero but for rounding becomes zero: translations shall be exactly
-        // that.
-        let p = p.map(|x| if (x / length).abs() < 1e-12 { 0.0 } else { x / length });
-        *index_of.entry(key(p)).or_insert_with(|| {
-            points.push(p);
-            points.len() - 1
-        })
-    };
-    let adjacent = |a: [f64; 3], b: [f64; 3]| (dot(a, b) - phi).abs() < 1e-9;
-    for i in 0..12 {
-        for j in 0..12 {
-            for k in 0..12 {
-                let (a, b, c) = (corners[i], corners[j], corners[k]);
-                let first_of_cycle = i < j && i < k;
-                if !(first_of_cycle
-                    && adjacent(a, b)
-                    && adjacent(b, c)
-                    && adjacent(c, a)
-                    && dot(cross(a, b), c) > 0.0)
-                {
-                    continue;
-                }
-                let mut at = |s: usize, t: usize| {
-                    let (wa, wb, wc) = ((n - s - t) as f64, s as f64, t as f64);
-                    vertex([0, 1, 2].map(|m| wa * a[m] + wb * b[m] + wc * c[m]))
-                };
-                for s in 0..n {
-                    for t in 0..n - s {
-                        triangles.push([at(s, t), at(s + 1, t), at(s, t + 1)]);
-                        if s + t + 1 < n {
-                            triangles.push([at(s + 1, t), at(s + 1, t + 1), at(s, t + 1)]);
-                        }
-                    }
-                }
-            }
-        }
-    }
-    (points, triangles)
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    let (points, triangles) = sphere::geodesic(frequency as usize);
+    let clean = |x: f64| if x.abs() < 1e-12 { 0.0 } else { x };
+    (points.iter().map(|point| point.to_array().map(clean)).collect(), triangles)
 }
 
 #[cfg(test)]

@@ -11,9 +11,9 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 
 use super::nearby::Nearby;
-use super::sweep::{Stage, Sweep};
+use super::sweep::{Phase, Sweep};
 use super::tree::{Topology, Tree};
-use crate::gripper::{Body, Gripper, half_turn};
+use crate::gripper::{Body, Gripper, Jaw};
 use crate::model::Frame;
 use crate::part::Mesh;
 
@@ -42,21 +42,10 @@ pub(crate) struct Course {
     pub(crate) clearance: f64,
 }
 
-/// When a body meets an obstacle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Phase {
-    /// In the grip, or while the jaws close.
-    Grip,
-    /// On the straight way to the grip with opened jaws.
-    Approach,
-    /// On the way back with closed jaws.
-    Retreat,
-}
-
 /// One swept body.
 #[derive(Debug, Clone)]
 struct Volume {
-    phase: Phase,
+    /// Its place among the fingers' or the palm's bodies.
     body: usize,
     sweep: Sweep,
     /// Smallest and largest coordinates, grip frame.
@@ -77,16 +66,15 @@ impl Volumes {
         let grown = DVec3::splat(course.clearance);
         let mut list = Vec::new();
         let mut add = |phase, body: usize, placed: Body, jaw, path| {
-            let sweep = Sweep::grown(placed, jaw, Stage::Grip, path, grown);
+            let sweep = Sweep::grown(placed, jaw, phase, path, grown);
             let bounds = [sweep.low.as_vec3a(), sweep.high.as_vec3a()];
-            list.push(Volume { phase, body, sweep, bounds });
+            list.push(Volume { body, sweep, bounds });
         };
         let mut fingers = |phase, offset: f64, path: &dyn Fn(DVec3) -> DVec3| {
-            for (side, jaw) in [(1.0, "I"), (-1.0, "II")] {
-                let rotation = if side > 0.0 { DMat3::IDENTITY } else { half_turn() };
-                let place = Frame { rotation, origin: DVec3::Z * side * offset };
+            for jaw in Jaw::BOTH {
+                let place = jaw.at(offset);
                 for (index, body) in gripper.fingers.iter().enumerate() {
-                    add(phase, index, body.moved(&place), jaw, path(DVec3::Z * side));
+                    add(phase, index, body.moved(&place), jaw.name(), path(DVec3::Z * jaw.side()));
                 }
             }
         };
@@ -112,7 +100,7 @@ impl Volumes {
         for (index, body) in gripper.palm.iter().enumerate() {
             add(Phase::Grip, index, body.clone(), "", DVec3::ZERO);
         }
-        list.sort_by_key(|volume| (volume.phase, volume.sweep.jaw.is_empty()));
+        list.sort_by_key(|volume| (volume.sweep.phase, volume.sweep.jaw.is_empty()));
         let bounds = list
             .iter()
             .fold([Vec3A::INFINITY, Vec3A::NEG_INFINITY], |[low, high], Volume { bounds, .. }| {
@@ -125,7 +113,7 @@ impl Volumes {
     /// fingers or palm bodies.
     pub(crate) fn name(&self, volume: usize) -> (Phase, &'static str, usize) {
         let volume = &self.list[volume];
-        (volume.phase, volume.sweep.jaw, volume.body)
+        (volume.sweep.phase, volume.sweep.jaw, volume.body)
     }
 
     /// The first volume that reaches below the plane `normal . x = offset` (world).
@@ -393,8 +381,8 @@ impl MeshObstacle {
     /// The first volume of the grip itself whose middle lies inside the closed surface: a body that
     /// meets no triangle is either wholly outside or wholly inside.
     pub(crate) fn contains(&self, volumes: &Volumes, world_from_grip: &Frame) -> Option<usize> {
-        volumes.list.iter().position(|Volume { phase, sweep, .. }| {
-            *phase == Phase::Grip
+        volumes.list.iter().position(|Volume { sweep, .. }| {
+            sweep.phase == Phase::Grip
                 && self.crossings(world_from_grip.point((sweep.low + sweep.high) / 2.0)) % 2 == 1
         })
     }

@@ -5,17 +5,19 @@ use glam::{DMat3, DVec3};
 use parry3d_f64::query::details::intersection_test_support_map_support_map;
 use parry3d_f64::shape::{SupportMap, Triangle};
 
-use crate::gripper::{Body, Gripper, Shape, half_turn};
+use crate::gripper::{Body, Gripper, Jaw, Jaws, Shape};
 use crate::model::Frame;
 use crate::part::PairKind;
 
 /// When a body meets an obstacle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Stage {
-    /// In the grip itself, or while the jaws close from the approach opening.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Phase {
+    /// In the grip, or while the jaws close.
     Grip,
-    /// On the straight way there with opened jaws.
+    /// On the straight way to the grip with opened jaws.
     Approach,
+    /// On the way back with closed jaws.
+    Retreat,
 }
 
 /// A convex body moved along a straight line: all its positions together, in the grip frame.
@@ -25,7 +27,7 @@ pub(crate) struct Sweep {
     pub(crate) body: String,
     /// `I`, `II` for a finger body, nothing for the palm.
     pub(crate) jaw: &'static str,
-    pub(crate) stage: Stage,
+    pub(crate) phase: Phase,
     /// Smallest and largest coordinates.
     pub(crate) low: DVec3,
     /// See `low`.
@@ -59,13 +61,12 @@ pub(crate) struct Motion {
     pub(crate) clearance: f64,
     /// Length of the approach [m].
     pub(crate) approach: f64,
-    /// Palm turned by half a turn (jaws exchanged).
-    pub(crate) flipped: bool,
+    /// Which way round the gripper is put.
+    pub(crate) jaws: Jaws,
 }
 
 /// All sweeps of a gripper, in the order in which they are tested.
 pub(crate) fn sweeps(gripper: &Gripper, motion: &Motion) -> Vec<Sweep> {
-    let turn = |turned: bool| if turned { half_turn() } else { DMat3::IDENTITY };
     // Outside grips: jaw I stands at +x3 and opens along +x3. Inside grips: its outer pad pushes
     // face I, which lies at -x3, so it is the jaw at -x3, and it draws in along +x3 for the
     // approach.
@@ -77,41 +78,38 @@ pub(crate) fn sweeps(gripper: &Gripper, motion: &Motion) -> Vec<Sweep> {
     };
     let back = motion.approach * DVec3::NEG_X;
     let (mut grip, mut approach) = (Vec::new(), Vec::new());
-    for side in [1.0, -1.0] {
-        let jaw = if (side > 0.0) == (motion.kind == PairKind::External) { "I" } else { "II" };
+    for jaw in Jaw::BOTH {
+        // Away from the gripped face by the tolerance, so that lying on it is no collision.
+        let closed = jaw.at(gap / 2.0 + motion.touch * way.signum());
+        let opened = jaw.at(gap / 2.0 + way.abs().max(motion.touch) * way.signum());
+        // Named after the face that it grips.
+        let jaw = match motion.kind {
+            PairKind::External => jaw.name(),
+            PairKind::Internal => jaw.other().name(),
+        };
         for body in &gripper.fingers {
-            // Away from the gripped face by the tolerance, so that lying on it is no collision.
-            let touching = motion.touch * way.signum();
-            let closed = Frame {
-                rotation: turn(side < 0.0),
-                origin: DVec3::Z * side * (gap / 2.0 + touching),
-            };
-            let opened = Frame {
-                origin: DVec3::Z * side * (gap / 2.0 + way.abs().max(motion.touch) * way.signum()),
-                ..closed
-            };
             let path = opened.origin - closed.origin;
-            grip.push(Sweep::new(body.moved(&closed), jaw, Stage::Grip, path, motion));
-            approach.push(Sweep::new(body.moved(&opened), jaw, Stage::Approach, back, motion));
+            grip.push(Sweep::new(body.moved(&closed), jaw, Phase::Grip, path, motion));
+            approach.push(Sweep::new(body.moved(&opened), jaw, Phase::Approach, back, motion));
         }
     }
-    let palm_at = Frame { rotation: turn(motion.flipped), origin: DVec3::ZERO };
+    let palm_at = Frame { rotation: motion.jaws.turn(), origin: DVec3::ZERO };
     for body in &gripper.palm {
         let body = body.moved(&palm_at);
-        grip.push(Sweep::new(body.clone(), "", Stage::Grip, DVec3::ZERO, motion));
-        approach.push(Sweep::new(body, "", Stage::Approach, back, motion));
+        grip.push(Sweep::new(body.clone(), "", Phase::Grip, DVec3::ZERO, motion));
+        approach.push(Sweep::new(body, "", Phase::Approach, back, motion));
     }
     grip.extend(approach);
     grip
 }
 
 impl Sweep {
-    fn new(body: Body, jaw: &'static str, stage: Stage, path: DVec3, motion: &Motion) -> Self {
+    fn new(body: Body, jaw: &'static str, phase: Phase, path: DVec3, motion: &Motion) -> Self {
         // Clearance on all sides but along x3, where a finger may lie on its face (the touch
         // tolerance keeps it off).
         let side = motion.clearance - motion.flush;
         let grown = DVec3::new(side, side, if jaw.is_empty() { side } else { 0.0 });
-        Self::grown(body, jaw, stage, path, grown)
+        Self::grown(body, jaw, phase, path, grown)
     }
 
     /// The sweep along `path` with `grown` added on all sides (less where negative, as far as it is
@@ -119,7 +117,7 @@ impl Sweep {
     pub(crate) fn grown(
         body: Body,
         jaw: &'static str,
-        stage: Stage,
+        phase: Phase,
         path: DVec3,
         grown: DVec3,
     ) -> Self {
@@ -132,7 +130,7 @@ impl Sweep {
             && is_axis_parallel(body.grip_from_body.rotation);
         let grown = if is_box { grown.max((low - high) * 0.499) } else { grown.max(DVec3::ZERO) };
         let exact = (!is_box).then(|| Convex { body: body.clone(), path, grown });
-        Self { body: body.name, jaw, stage, low: low - grown, high: high + grown, exact }
+        Self { body: body.name, jaw, phase, low: low - grown, high: high + grown, exact }
     }
 
     /// Whether the sweep is exactly its box.
@@ -282,7 +280,7 @@ mod tests {
             flush: 1e-6,
             clearance: 0.0,
             approach: 1.0,
-            flipped: false,
+            jaws: Jaws::Straight,
         }
     }
 
@@ -311,7 +309,7 @@ mod tests {
             for shape in [Shape::Box { half: DVec3::new(0.01, 0.005, 0.008) }, Shape::Cylinder { radius: 0.006, half_height: 0.01 }] {
                 let body = Body { name: "b".into(), shape: shape.clone(), grip_from_body: frame };
                 let path = DVec3::new(0.0, 0.0, 0.004);
-                let sweep = Sweep::new(body, "I", Stage::Grip, path, &Motion { touch: 0.0, flush: 0.0, ..motion() });
+                let sweep = Sweep::new(body, "I", Phase::Grip, path, &Motion { touch: 0.0, flush: 0.0, ..motion() });
                 prop_assert!(!sweep.is_box());
                 let triangle = [centre, centre + u, centre + v];
                 let inside = |point: DVec3, step: f64| {

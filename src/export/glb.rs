@@ -5,11 +5,11 @@
 
 use std::io::Write;
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use serde_json::{Value, json};
 
 use super::View;
-use crate::gripper::{Body, Shape};
+use crate::gripper::{Body, Jaw, Shape};
 use crate::model::{Frame, Ring};
 use crate::part::Mesh;
 
@@ -108,14 +108,14 @@ pub(super) fn write(
             bodies.iter().map(|body| scene.node(node(body))).collect()
         };
         let mut jaws = place(&mut scene, &palm, "");
-        for (name, side) in [("jaw_i", 1.0), ("jaw_ii", -1.0)] {
+        for (jaw, name) in Jaw::BOTH.into_iter().zip(["jaw_i", "jaw_ii"]) {
             let mut children = place(&mut scene, &fingers, &format!("{name}/"));
             children.extend(
                 pad.map(|pad| scene.node(json!({"name": format!("{id}/{name}/pad"), "mesh": pad}))),
             );
-            // Jaw II is jaw I turned by half a turn about the approach axis x1.
-            let rotation = if side > 0.0 { [0.0, 0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0, 0.0] };
-            let mut jaw = json!({"name": format!("{id}/{name}"), "translation": [0.0, 0.0, side * view.gap(grip) / 2.0], "rotation": rotation});
+            let place = jaw.at(view.gap(grip) / 2.0);
+            let rotation = DQuat::from_mat3(&place.rotation).to_array();
+            let mut jaw = json!({"name": format!("{id}/{name}"), "translation": place.origin, "rotation": rotation});
             if !children.is_empty() {
                 jaw["children"] = json!(children);
             }
@@ -166,33 +166,24 @@ pub(super) fn write(
     container(writer, &document, scene.bytes)
 }
 
-/// The file: a header of 12 bytes, the JSON chunk padded by spaces, the binary chunk padded by
-/// zeros (glTF 2.0, section 4.4).
-fn container(
-    writer: &mut impl Write,
-    document: &Value,
-    mut binary: Vec<u8>,
-) -> std::io::Result<()> {
-    let mut text = serde_json::to_vec(document)?;
-    text.resize(text.len().next_multiple_of(4), b' ');
-    binary.resize(binary.len().next_multiple_of(4), 0);
-    let chunk = if binary.is_empty() { 0 } else { 8 + binary.len() };
-    let word = |length: usize| {
-        u32::try_from(length).map(u32::to_le_bytes).map_err(|_| {
-            std::io::Error::other("the scene passes glTF's limit of 4 GiB; export fewer grips")
-        })
-    };
-    writer.write_all(b"glTF\x02\x00\x00\x00")?;
-    writer.write_all(&word(12 + 8 + text.len() + chunk)?)?;
-    writer.write_all(&word(text.len())?)?;
-    writer.write_all(b"JSON")?;
-    writer.write_all(&text)?;
-    if !binary.is_empty() {
-        writer.write_all(&word(binary.len())?)?;
-        writer.write_all(b"BIN\x00")?;
-        writer.write_all(&binary)?;
+/// The file. The document is JSON, not the types of `gltf::json`: these keep matrices in single
+/// precision, and a pose read from the file shall be that of the result file.
+fn container(writer: &mut impl Write, document: &Value, binary: Vec<u8>) -> std::io::Result<()> {
+    let text = serde_json::to_vec(document)?;
+    // Headers and padding (glTF 2.0, section 4.4) take 32 bytes at most; the library does not look
+    // for an overflow.
+    if u32::try_from(text.len() + binary.len() + 32).is_err() {
+        return Err(std::io::Error::other(
+            "the scene passes glTF's limit of 4 GiB; export fewer grips",
+        ));
     }
-    Ok(())
+    let file = gltf::Glb {
+        // Its length is counted while writing.
+        header: gltf::binary::Header { magic: *b"glTF", version: 2, length: 0 },
+        json: text.into(),
+        bin: (!binary.is_empty()).then(|| binary.into()),
+    };
+    file.to_writer(writer).map_err(std::io::Error::other)
 }
 
 /// A 4x4 matrix in glTF's order, column by column.

@@ -1,5 +1,5 @@
 //! Plane geometry: polygons with holes, their moments, clipping, convex hulls and support
-//! functions.
+//! functions; directions spread over the sphere; sets of things that belong together.
 //!
 //! Conventions: metres; outer rings counter-clockwise, holes clockwise once normalised; a ring's
 //! last point joins its first and is not repeated. A flat list of rings (outer and holes alike,
@@ -10,6 +10,8 @@ pub mod clip;
 pub mod hull;
 pub mod overlay;
 pub mod polygon;
+pub mod sphere;
+mod union_find;
 
 pub use clip::{
     HalfPlane, clip_ring_axis, clip_ring_convex, clip_ring_half_plane, clip_ring_half_plane_into,
@@ -21,3 +23,4 @@ pub use polygon::{
     Bounds2, Moments, area, bounds, contains, moments, normalise, patch_area, patch_moments,
     ring_area, transform,
 };
+pub use union_find::UnionFind;

@@ -6,9 +6,10 @@ use std::fmt::Write;
 use glam::{DVec2, DVec3};
 
 use super::check::outline;
-use super::{Body, Gripper};
+use super::{Body, Gripper, Jaw};
 use crate::geometry::Bounds2;
 use crate::model::Ring;
+use crate::svg::{escape, millimetres};
 
 /// Height of the drawn gripper and margins [px].
 const HEIGHT: f64 = 460.0;
@@ -18,8 +19,8 @@ const MARGIN: f64 = 90.0;
 pub fn svg(gripper: &Gripper) -> String {
     let open = gripper.stroke[1];
     let bodies: Vec<(&str, Body)> = (gripper.palm.iter().map(|body| ("palm", body.clone())))
-        .chain(gripper.finger(true, open).into_iter().map(|body| ("finger", body)))
-        .chain(gripper.finger(false, open).into_iter().map(|body| ("finger", body)))
+        .chain(gripper.finger(Jaw::I, open).into_iter().map(|body| ("finger", body)))
+        .chain(gripper.finger(Jaw::II, open).into_iter().map(|body| ("finger", body)))
         .collect();
     // Screen y runs down, and so does the approach axis: the screen shows (across, x1) as they are.
     let view = |across: DVec3| -> Vec<(&str, Ring)> {
@@ -54,7 +55,7 @@ pub fn svg(gripper: &Gripper) -> String {
          <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"16\" y=\"24\" font-size=\"16\">{}</text>\n\
          <text x=\"16\" y=\"42\">jaws open to {} mm; dimensions in mm; approach downwards</text>",
         escape(&gripper.name),
-        millimetres(open),
+        millimetres(open, 2),
     );
     for (rings, place) in [(&front, &front_place), (&side, &side_place)] {
         for (class, ring) in rings {
@@ -152,7 +153,7 @@ impl Drawing {
             line,
             (a.x + b.x) / 2.0,
             line - 3.0,
-            millimetres(x1 - x0)
+            millimetres(x1 - x0, 2)
         );
     }
 
@@ -176,16 +177,7 @@ impl Drawing {
             "<path class=\"dim\" d=\"M{from:.1} {0:.1}H{to:.1}M{from:.1} {1:.1}H{to:.1}M{line:.1} {0:.1}V{1:.1}\"/><text {place}>{label} {2}</text>",
             a.y,
             b.y,
-            millimetres(y1 - y0)
+            millimetres(y1 - y0, 2)
         );
     }
-}
-
-fn millimetres(value: f64) -> String {
-    let text = format!("{:.2}", value * 1e3);
-    text.trim_end_matches('0').trim_end_matches('.').to_string()
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

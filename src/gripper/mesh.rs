@@ -10,7 +10,7 @@ use glam::DVec3;
 use parry3d_f64::transformation::try_convex_hull;
 
 use crate::error::Result;
-use crate::geometry::clip_ring_axis;
+use crate::geometry::{UnionFind, clip_ring_axis};
 use crate::part::{Part, ReadOptions, Unit};
 
 /// Slices of a piece along its longest side, before those are joined whose common hull fills no
@@ -37,24 +37,15 @@ pub(super) fn hulls(path: &Path, unit: Option<Unit>) -> Result<Vec<Vec<DVec3>>> 
 
 /// Triangles of each connected piece, in the order of their first triangle.
 fn pieces(part: &Part) -> Vec<Vec<usize>> {
-    let mut parent: Vec<u32> = (0..part.mesh.vertices.len() as u32).collect();
-    fn root(parent: &mut [u32], mut index: u32) -> u32 {
-        while parent[index as usize] != index {
-            parent[index as usize] = parent[parent[index as usize] as usize];
-            index = parent[index as usize];
-        }
-        index
-    }
+    let mut sets = UnionFind::new(part.mesh.vertices.len());
     for &[a, b, c] in &part.mesh.triangles {
-        for other in [b, c] {
-            let (x, y) = (root(&mut parent, a), root(&mut parent, other));
-            parent[x.max(y) as usize] = x.min(y);
-        }
+        sets.join(a as usize, b as usize);
+        sets.join(a as usize, c as usize);
     }
     let mut pieces: Vec<Vec<usize>> = Vec::new();
     let mut piece_of = std::collections::HashMap::new();
     for (index, triangle) in part.mesh.triangles.iter().enumerate() {
-        let piece = *piece_of.entry(root(&mut parent, triangle[0])).or_insert_with(|| {
+        let piece = *piece_of.entry(sets.root(triangle[0] as usize)).or_insert_with(|| {
             pieces.push(Vec::new());
             pieces.len() - 1
         });

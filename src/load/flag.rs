@@ -2,11 +2,9 @@
 
 use std::path::PathBuf;
 
-use glam::DVec3;
-
 use super::{LoadSource, MAX_CASES};
 use crate::error::{Error, Result};
-use crate::units::Quantity;
+use crate::units::{Quantity, direction};
 
 /// Size of the ball's forces when none is stated [N].
 const UNIT_FORCE: f64 = 1.0;
@@ -100,38 +98,6 @@ fn count(place: &str, text: &str, number: &str) -> Result<usize> {
             place,
             format!("'{text}': '{number}' is not a number of directions"),
             format!("give 1 to {MAX_CASES}, e.g. ball:500"),
-        )),
-    }
-}
-
-/// `+x`, `x`, `-z`, or three numbers joined by slashes.
-fn direction(place: &str, text: &str) -> Result<DVec3> {
-    let axis = match text.trim_start_matches(['+', '-']) {
-        "x" => Some(DVec3::X),
-        "y" => Some(DVec3::Y),
-        "z" => Some(DVec3::Z),
-        _ => None,
-    };
-    if let Some(axis) = axis {
-        match text.len() {
-            1 => return Ok(axis),
-            2 => return Ok(if text.starts_with('-') { -axis } else { axis }),
-            _ => {}
-        }
-    }
-    let numbers: Vec<f64> = text
-        .split('/')
-        .map_while(|number| number.trim().parse().ok())
-        .filter(|number: &f64| number.is_finite())
-        .collect();
-    match numbers[..] {
-        [x, y, z] if text.split('/').count() == 3 && (x, y, z) != (0.0, 0.0, 0.0) => {
-            Ok(DVec3::new(x, y, z))
-        }
-        _ => Err(Error::input(
-            place,
-            format!("'{text}' is not a direction"),
-            "give +x, -x, +y, -y, +z, -z or three numbers joined by slashes, e.g. 0/0.5/-1",
         )),
     }
 }

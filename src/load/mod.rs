@@ -8,7 +8,6 @@
 
 mod flag;
 mod list;
-pub mod sphere;
 mod table;
 mod trajectory;
 
@@ -17,6 +16,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DVec3};
 
 use crate::error::{Error, Result};
+use crate::geometry::sphere;
 use crate::model::{Frame, Wrench};
 use crate::part::MassProperties;
 use crate::results::LoadCase;

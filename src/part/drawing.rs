@@ -9,6 +9,7 @@ use super::{Part, PlanarFace};
 use crate::geometry::Bounds2;
 use crate::geometry::polygon::{contains, rings};
 use crate::model::Polygon;
+use crate::svg;
 
 /// Longest extent of the part in a view, and margins [px].
 const SIZE: f64 = 380.0;
@@ -65,7 +66,7 @@ pub fn svg(part: &Part) -> String {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" width=\"{width:.0}\" height=\"{height:.0}\" font-family=\"sans-serif\" font-size=\"12\">\n\
          <style>path{{stroke:#333;stroke-width:.8;stroke-linejoin:round;fill-rule:evenodd}}.outside{{fill:#a9c7e8}}.inside{{fill:#f2c48d}}.both{{fill:#c9b6e4}}.none{{fill:#d9dde1}}.curved{{fill:#eceff1;stroke:#c5ccd2;stroke-width:.3}}.number{{text-anchor:middle;dominant-baseline:central;font-weight:600;fill:#013;stroke:#fff;stroke-width:3px;paint-order:stroke}}</style>\n\
          <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"{MARGIN:.0}\" y=\"22\" font-size=\"15\">{}: {:.1} x {:.1} x {:.1} mm, {} planar faces</text>",
-        escape(&part.name),
+        svg::escape(&part.name),
         size.x * 1e3,
         size.y * 1e3,
         size.z * 1e3,
@@ -94,17 +95,7 @@ pub fn svg(part: &Part) -> String {
         for shape in &shapes {
             let mut path = String::new();
             for ring in shape.polygons.iter().flat_map(rings) {
-                for (index, &point) in ring.iter().enumerate() {
-                    let point = place(point);
-                    let _ = write!(
-                        path,
-                        "{}{:.1} {:.1}",
-                        if index == 0 { "M" } else { "L" },
-                        point.x,
-                        point.y
-                    );
-                }
-                path.push('Z');
+                svg::ring(&mut path, ring, place);
             }
             let _ = writeln!(text, "<path class=\"{}\" d=\"{path}\"/>", shape.class);
         }
@@ -274,8 +265,4 @@ fn numbers(part: &Part, view: &View, shapes: &[Shape]) -> Vec<(u32, DVec2)> {
         }
     }
     found
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

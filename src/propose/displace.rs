@@ -4,8 +4,9 @@ use glam::{DMat3, DVec2};
 
 use super::patch::{Scratch, Touch, TurnedPad};
 use super::work::{self, Known};
-use super::{Proposer, site};
+use super::{proposer::Proposer, site};
 use crate::error::Result;
+use crate::gripper::Jaws;
 use crate::model::{Frame, Grip};
 
 /// By how much a grip stands off its pose.
@@ -39,25 +40,17 @@ impl Proposer<'_> {
             let local = site.part_from_site.inverse().compose(&part_from_grip);
             let (place, angle) =
                 (local.origin.truncate(), local.rotation.x_axis.truncate().to_angle());
-            let flipped = local.rotation.z_axis.z < 0.0;
-            let pad = TurnedPad::new(&work::oriented(&self.gripper.pad, flipped), angle);
+            let jaws = site::jaws(&local);
+            let pad = TurnedPad::new(&work::oriented(&self.gripper.pad, jaws), angle);
             let whole = [0, 1].map(|side: usize| {
                 patches.get(side).is_none_or(|patch| {
                     patch.touch(&pad, place, &mut scratch[side]) == Touch::Whole
                 })
             });
-            let contact = self.contact(
-                &patches,
-                &pad,
-                place,
-                angle,
-                flipped,
-                whole,
-                &mut scratch,
-                &mut known,
-            );
+            let contact =
+                self.contact(&patches, &pad, place, angle, jaws, whole, &mut scratch, &mut known);
             let mut faces = [0, 1].map(|side| site.face_at(side, self.part, place));
-            if flipped {
+            if jaws == Jaws::Exchanged {
                 faces.reverse();
             }
             Grip {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::options::{Cone, Ground, ProposeOptions};
-use crate::clash::sweep::Sweep;
+use crate::clash::Sweep;
 use crate::model::Frame;
 
 /// The surroundings, with unit vectors.

@@ -4,11 +4,13 @@ use glam::{DVec2, DVec3};
 
 use super::options::Rejection;
 use super::patch::{Scratch, Touch, TurnedPad};
+use super::proposer::{Prepared, Proposer};
 use super::site::Site;
-use super::{Prepared, Proposer, work};
-use crate::clash::sweep::{Stage, Sweep};
+use super::{site, work};
+use crate::clash::{Phase, Sweep};
 use crate::error::{Error, Result};
 use crate::geometry::clip_ring_axis;
+use crate::gripper::Jaws;
 use crate::model::{Contact, Frame, Patch, Polygon};
 use crate::part::PairKind;
 
@@ -99,7 +101,7 @@ impl Proposer<'_> {
             index,
             local.origin.truncate(),
             local.rotation.x_axis.truncate().to_angle(),
-            local.rotation.z_axis.z < 0.0,
+            site::jaws(&local),
         )
     }
 
@@ -143,8 +145,7 @@ impl Proposer<'_> {
         Ok((index, site_from_grip))
     }
 
-    /// Explains the pose at `position` [m] of a site's plane, approaching at `angle` [rad];
-    /// `flipped`: jaws exchanged.
+    /// Explains the pose at `position` [m] of a site's plane, approaching at `angle` [rad].
     ///
     /// # Errors
     /// When there is no such site or the numbers are not finite.
@@ -153,7 +154,7 @@ impl Proposer<'_> {
         site: usize,
         position: DVec2,
         angle: f64,
-        flipped: bool,
+        jaws: Jaws,
     ) -> Result<Explanation> {
         let Some(found) = self.sites.get(site) else {
             return Err(Error::input(
@@ -170,7 +171,7 @@ impl Proposer<'_> {
             ));
         }
         // A symmetric gripper looks the same with exchanged jaws.
-        let turned = flipped && !self.symmetric;
+        let turned = if self.symmetric { Jaws::Straight } else { jaws };
         let prepared = self.prepare(found);
         let mut verdict = Verdict { checks: Vec::new(), rejection: None, place: None };
         let mut frame = work::frame(found, position, angle);
@@ -178,9 +179,7 @@ impl Proposer<'_> {
         let contact = self.explain_contact(&prepared, position, angle, turned, &mut verdict);
         self.explain_environment(&prepared, &frame, turned, &mut verdict);
         self.explain_interference(&prepared, position, angle, turned, &frame, &mut verdict);
-        if flipped {
-            frame.rotation *= crate::gripper::half_turn();
-        }
+        frame.rotation *= jaws.turn();
         let Verdict { checks, rejection, place } = verdict;
         Ok(Explanation {
             site,
@@ -218,10 +217,10 @@ impl Proposer<'_> {
         prepared: &Prepared<'_>,
         position: DVec2,
         angle: f64,
-        turned: bool,
+        jaws: Jaws,
         verdict: &mut Verdict,
     ) -> Contact {
-        let outline_of_pad = work::oriented(&self.gripper.pad, turned);
+        let outline_of_pad = work::oriented(&self.gripper.pad, jaws);
         let pad = TurnedPad::new(&outline_of_pad, angle);
         let mut patches: [Patch; 2] = [Patch::new(), Patch::new()];
         for (side, name) in ["contact on face I", "contact on face II"].into_iter().enumerate() {
@@ -256,10 +255,10 @@ impl Proposer<'_> {
         &self,
         prepared: &Prepared<'_>,
         frame: &Frame,
-        turned: bool,
+        jaws: Jaws,
         verdict: &mut Verdict,
     ) {
-        let sweeps = &prepared.outer_sweeps[usize::from(turned)];
+        let sweeps = &prepared.outer_sweeps[jaws as usize];
         if self.options.ground.is_some() {
             let depths = self.environment.depths(sweeps, frame);
             let hit = self.environment.grounded(&depths, frame.origin);
@@ -286,7 +285,7 @@ impl Proposer<'_> {
         prepared: &Prepared<'_>,
         position: DVec2,
         angle: f64,
-        turned: bool,
+        jaws: Jaws,
         frame: &Frame,
         verdict: &mut Verdict,
     ) {
@@ -298,11 +297,11 @@ impl Proposer<'_> {
         );
         let view = self.view(site, &tree, angle);
         let place = self.place(site, &view, position);
-        for sweep in &prepared.sweeps[usize::from(turned)] {
-            let stage = match (sweep.stage, sweep.jaw.is_empty()) {
-                (Stage::Grip, false) => "in the grip and while closing",
-                (Stage::Grip, true) => "in the grip",
-                (Stage::Approach, _) => "on the approach",
+        for sweep in &prepared.sweeps[jaws as usize] {
+            let when = match (sweep.phase, sweep.jaw.is_empty()) {
+                (Phase::Grip, false) => "in the grip and while closing",
+                (Phase::Grip, true) => "in the grip",
+                (Phase::Approach | Phase::Retreat, _) => "on the approach",
             };
             let met = view.first_met(sweep, place);
             let at = met.map(|(_, corners)| frame.point(common_point(sweep, corners)));
@@ -317,7 +316,7 @@ impl Proposer<'_> {
                 _ => "free".to_string(),
             };
             verdict.place = verdict.place.or(at);
-            verdict.add(&format!("{} {stage}", title(sweep)), met.is_none(), detail, || {
+            verdict.add(&format!("{} {when}", title(sweep)), met.is_none(), detail, || {
                 work::reason(sweep)
             });
         }

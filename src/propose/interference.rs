@@ -10,8 +10,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::clash::sweep::Sweep;
-use crate::clash::tree::Tree;
+use crate::clash::{Sweep, Tree};
 
 /// The part as seen from the grip axes at one angle: tree axes turned by the angle about the
 /// closing axis.

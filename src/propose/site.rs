@@ -10,12 +10,12 @@ use glam::{DMat3, DVec2, DVec3};
 
 use places::{angles, main_direction, positions};
 
-use super::ProposeOptions;
+use super::options::ProposeOptions;
 use super::patch::PatchIndex;
 use crate::error::{Error, Result};
 use crate::geometry::polygon::{self, Bounds2, rings};
-use crate::geometry::{contains, overlay};
-use crate::gripper::Gripper;
+use crate::geometry::{UnionFind, contains, overlay};
+use crate::gripper::{Gripper, Jaws};
 use crate::model::{Frame, Patch, Polygon};
 use crate::part::{FacePair, PairKind, Part, PlanarFace};
 
@@ -265,6 +265,11 @@ impl Site {
     }
 }
 
+/// Which way round the gripper is put in a grip frame, given in the site frame.
+pub(super) fn jaws(site_from_grip: &Frame) -> Jaws {
+    if site_from_grip.rotation.z_axis.z < 0.0 { Jaws::Exchanged } else { Jaws::Straight }
+}
+
 /// Heights of the planes of side I and II above `point` of the axes' `(x, y)`.
 fn heights(
     face_i: &PlanarFace,
@@ -357,27 +362,19 @@ fn stretches(patch: Patch, gap: f64) -> Vec<Patch> {
         .map(|(index, polygon)| (Bounds2::of(&polygon.outer).grown(gap / 2.0), index))
         .collect();
     boxes.sort_by(|a, b| a.0.min.x.total_cmp(&b.0.min.x).then(a.1.cmp(&b.1)));
-    let mut parent: Vec<usize> = (0..patch.len()).collect();
-    fn root(parent: &mut [usize], mut index: usize) -> usize {
-        while parent[index] != index {
-            parent[index] = parent[parent[index]];
-            index = parent[index];
-        }
-        index
-    }
+    let mut sets = UnionFind::new(patch.len());
     for (position, (bounds, index)) in boxes.iter().enumerate() {
         for (other, other_index) in
             boxes[position + 1..].iter().take_while(|(other, _)| other.min.x <= bounds.max.x)
         {
             if bounds.meets(*other) {
-                let (a, b) = (root(&mut parent, *index), root(&mut parent, *other_index));
-                parent[a.max(b)] = a.min(b);
+                sets.join(*index, *other_index);
             }
         }
     }
     let mut stretches: Vec<(usize, Patch)> = Vec::new();
     for (index, polygon) in patch.into_iter().enumerate() {
-        let root = root(&mut parent, index);
+        let root = sets.root(index);
         match stretches.iter_mut().find(|(known, _)| *known == root) {
             Some((_, patch)) => patch.push(polygon),
             None => stretches.push((root, vec![polygon])),

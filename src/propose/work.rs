@@ -8,11 +8,11 @@ use rustc_hash::FxHashMap;
 use super::interference::View;
 use super::options::Rejection;
 use super::patch::{PatchIndex, Scratch, Touch, TurnedPad};
-use super::{Item, Prepared, Proposer};
-use crate::clash::sweep::{Stage, Sweep};
-use crate::clash::tree::Tree;
+use super::proposer::{Item, Prepared, Proposer};
+use super::site::Site;
+use crate::clash::{Phase, Sweep, Tree};
 use crate::geometry::polygon;
-use crate::gripper::half_turn;
+use crate::gripper::{Jaws, half_turn};
 use crate::model::{Contact, Frame, Grip, Patch, Polygon, Ring};
 use crate::part::PairKind;
 
@@ -45,27 +45,27 @@ const SHARED_CORNERS: usize = 40;
 const SAME_CONTACT: f64 = 1e-10;
 
 /// The grip frame at `place` of the site's plane, approaching at `angle`.
-pub(super) fn frame(site: &super::Site, place: DVec2, angle: f64) -> Frame {
+pub(super) fn frame(site: &Site, place: DVec2, angle: f64) -> Frame {
     let turn = Frame { rotation: glam::DMat3::from_rotation_z(angle), origin: place.extend(0.0) };
     site.part_from_site.compose(&turn)
 }
 
 /// The pad outline of an orientation in the grip frame before the half turn: with exchanged jaws it
 /// is mirrored.
-pub(super) fn oriented(pad: &[DVec2], flipped: bool) -> Ring {
-    if flipped {
-        pad.iter().rev().map(|point| DVec2::new(point.x, -point.y)).collect()
-    } else {
-        pad.to_vec()
+pub(super) fn oriented(pad: &[DVec2], jaws: Jaws) -> Ring {
+    match jaws {
+        Jaws::Straight => pad.to_vec(),
+        Jaws::Exchanged => pad.iter().rev().map(|point| DVec2::new(point.x, -point.y)).collect(),
     }
 }
 
 /// The reason for which a sweep that meets the part rejects a candidate.
 pub(super) fn reason(sweep: &Sweep) -> Rejection {
     let body = sweep.body.clone();
-    match sweep.stage {
-        Stage::Grip => Rejection::PartInterference { body },
-        Stage::Approach => Rejection::ApproachBlocked { body },
+    match sweep.phase {
+        Phase::Grip => Rejection::PartInterference { body },
+        // The part moves with the jaws on the retreat: proposals have none.
+        Phase::Approach | Phase::Retreat => Rejection::ApproachBlocked { body },
     }
 }
 
@@ -81,13 +81,12 @@ impl Proposer<'_> {
         let mut known = Known::default();
         // Numbers of the poses already taken, for the flips of an unsymmetric gripper.
         let mut taken: FxHashMap<u64, ()> = FxHashMap::default();
-        for orientation in 0..self.orientations() {
-            let flipped = orientation == 1;
+        for &jaws in self.orientations() {
             outcome.candidates += item.positions.len() as u64;
-            self.survivors(item, prepared, tree, flipped, buffers, &mut outcome);
+            self.survivors(item, prepared, tree, jaws, buffers, &mut outcome);
             let site = prepared.site;
             let angle = site.angles[item.angle];
-            let pad = TurnedPad::new(&oriented(&self.gripper.pad, flipped), angle);
+            let pad = TurnedPad::new(&oriented(&self.gripper.pad, jaws), angle);
             let alive = std::mem::take(&mut buffers.alive);
             for &index in &alive {
                 let place = site.positions[item.positions.start + index as usize];
@@ -96,7 +95,7 @@ impl Proposer<'_> {
                     &pad,
                     place,
                     angle,
-                    flipped,
+                    jaws,
                     buffers.whole[index as usize],
                     &mut buffers.scratch,
                     &mut known,
@@ -112,7 +111,7 @@ impl Proposer<'_> {
                     inside: site.kind == PairKind::Internal,
                     flip_of: None,
                 };
-                if flipped {
+                if jaws == Jaws::Exchanged {
                     turn(&mut grip);
                     grip.flip_of = taken.contains_key(&(grip.id)).then_some(grip.id);
                     grip.id += 1;
@@ -142,7 +141,7 @@ impl Proposer<'_> {
         item: &Item,
         prepared: &Prepared<'_>,
         tree: &Tree,
-        flipped: bool,
+        jaws: Jaws,
         buffers: &mut Buffers,
         outcome: &mut Outcome,
     ) {
@@ -176,7 +175,7 @@ impl Proposer<'_> {
             reject(Rejection::TooFarFromCentreOfMass, lost);
         }
 
-        let pad = TurnedPad::new(&oriented(&self.gripper.pad, flipped), angle);
+        let pad = TurnedPad::new(&oriented(&self.gripper.pad, jaws), angle);
         let floor = self.contact_floor(site, pad.area());
         buffers.whole.clear();
         buffers.whole.resize(positions.len(), [true; 2]);
@@ -196,7 +195,7 @@ impl Proposer<'_> {
         reject(Rejection::ContactTooSmall, lost);
 
         if !self.environment.is_empty() {
-            let sweeps = &prepared.outer_sweeps[usize::from(flipped)];
+            let sweeps = &prepared.outer_sweeps[jaws as usize];
             let depths = self.environment.depths(sweeps, &origin_frame);
             let mut lost: Vec<(Rejection, usize)> = Vec::new();
             let mut note =
@@ -224,7 +223,7 @@ impl Proposer<'_> {
         buffers.places.extend(positions.iter().map(|&position| self.place(site, &view, position)));
         buffers.blocked.clear();
         buffers.blocked.resize(positions.len(), false);
-        for sweep in &prepared.sweeps[usize::from(flipped)] {
+        for sweep in &prepared.sweeps[jaws as usize] {
             if buffers.alive.is_empty() {
                 return;
             }
@@ -237,18 +236,18 @@ impl Proposer<'_> {
     }
 
     /// Smallest contact area at a site [m^2]; reached up to rounding is enough.
-    pub(super) fn contact_floor(&self, site: &super::Site, pad: f64) -> f64 {
+    pub(super) fn contact_floor(&self, site: &Site, pad: f64) -> f64 {
         (self.options.min_contact * pad.min(site.overlap)).max(self.options.min_pad_share * pad)
             * (1.0 - 1e-9)
     }
 
     /// The part in the grip axes of a site at an angle.
-    pub(super) fn view<'t>(&self, site: &super::Site, tree: &'t Tree, angle: f64) -> View<'t> {
+    pub(super) fn view<'t>(&self, site: &Site, tree: &'t Tree, angle: f64) -> View<'t> {
         View::new(tree, DVec2::from_angle(site.turn + angle), site.origin.z)
     }
 
     /// A position of a site in the view's grip axes.
-    pub(super) fn place(&self, site: &super::Site, view: &View<'_>, position: DVec2) -> DVec2 {
+    pub(super) fn place(&self, site: &Site, view: &View<'_>, position: DVec2) -> DVec2 {
         view.turned(site.origin.truncate() + DVec2::from_angle(site.turn).rotate(position))
     }
 
@@ -259,7 +258,7 @@ impl Proposer<'_> {
         pad: &TurnedPad,
         place: DVec2,
         angle: f64,
-        flipped: bool,
+        jaws: Jaws,
         whole: [bool; 2],
         scratch: &mut [Scratch; 2],
         known: &mut Known,
@@ -271,7 +270,7 @@ impl Proposer<'_> {
             match patches[side].touch(pad, place, &mut scratch[side]) {
                 Touch::Empty => Patch::new(),
                 Touch::Whole => {
-                    vec![Polygon { outer: oriented(&self.gripper.pad, flipped), holes: Vec::new() }]
+                    vec![Polygon { outer: oriented(&self.gripper.pad, jaws), holes: Vec::new() }]
                 }
                 Touch::Part(_) => patches[side].outline(pad, place, &mut scratch[side], angle),
             }
@@ -279,7 +278,11 @@ impl Proposer<'_> {
         let face_i = patch(0);
         let face_ii = if patches.len() == 2 { patch(1) } else { face_i.clone() };
         let contact = Contact { face_i, face_ii };
-        self.shared(if flipped { mirror(&contact) } else { contact }, known)
+        let contact = match jaws {
+            Jaws::Straight => contact,
+            Jaws::Exchanged => mirror(&contact),
+        };
+        self.shared(contact, known)
     }
 
     /// The contact with exchanged jaws.

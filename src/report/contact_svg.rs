@@ -8,6 +8,7 @@ use glam::DVec2;
 use crate::contact::Loops;
 use crate::geometry::polygon::contains;
 use crate::model::{Contact, Patch, Pressure, Score, Slip};
+use crate::svg::{escape, millimetres};
 
 /// Panel size and margins [px].
 const PANEL: f64 = 360.0;
@@ -236,8 +237,7 @@ fn centre(svg: &mut String, view: &View, low: DVec2, high: DVec2, slip: Slip) {
 }
 
 fn axes(svg: &mut String, view: &View, size: DVec2) {
-    let mm =
-        |v: f64| format!("{:.4}", v * 1e3).trim_end_matches('0').trim_end_matches('.').to_string();
+    let mm = |value: f64| millimetres(value, 4);
     let (a, b) = (view.at(view.low), view.at(view.low + size));
     let _ = write!(
         svg,
@@ -255,10 +255,6 @@ fn axes(svg: &mut String, view: &View, size: DVec2) {
         b.y + 9.0,
         mm(view.low.y + size.y)
     );
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 #[cfg(test)]

@@ -113,7 +113,7 @@ fn congruent(patch: Patch) -> Arc<Contact> {
 
 /// Unit forces spread over the sphere, acting at `point`.
 fn ball(count: usize, point: DVec3) -> Vec<Wrench> {
-    gripfast::load::sphere::directions(count)
+    gripfast::geometry::sphere::directions(count)
         .into_iter()
         .map(|force| Wrench { force, moment: point.cross(force) })
         .collect()

@@ -3,7 +3,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 use gripfast::geometry::{Bounds2, intersect_convex, patch_area};
-use gripfast::gripper::{Body, Gripper, Shape, rectangle};
+use gripfast::gripper::{Body, Gripper, Jaw, Shape, rectangle};
 use gripfast::model::{Frame, Polygon};
 use gripfast::part::Part;
 use gripfast::propose::{ProposeOptions, Proposer, SiteInfo};
@@ -370,8 +370,8 @@ fn no_false_accept_with_round_bodies() {
                 let way = f64::from(step) / 4.0;
                 let (open, back) =
                     if way <= 1.0 { (opening * way, 0.0) } else { (opening, (way - 1.0) * 0.05) };
-                let mut bodies = gripper.finger(true, grip.width + 2.0 * open);
-                bodies.extend(gripper.finger(false, grip.width + 2.0 * open));
+                let mut bodies = gripper.finger(Jaw::I, grip.width + 2.0 * open);
+                bodies.extend(gripper.finger(Jaw::II, grip.width + 2.0 * open));
                 bodies.extend(gripper.palm.iter().cloned());
                 for body in bodies {
                     for point in &points {

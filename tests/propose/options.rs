@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 use gripfast::geometry::patch_area;
-use gripfast::gripper::{self, Gripper};
+use gripfast::gripper::{self, Gripper, Jaw, Jaws};
 use gripfast::model::Grip;
 use gripfast::part::Part;
 use gripfast::propose::{Cone, Ground, ProposeOptions, Proposer, Tally};
@@ -211,7 +211,7 @@ fn filters_reject_with_their_reason() {
     assert!(!grips.is_empty() && grips.len() < all.len());
     for grip in &grips {
         for body in
-            gripper.finger(true, grip.width).iter().chain(&gripper.finger(false, grip.width))
+            gripper.finger(Jaw::I, grip.width).iter().chain(&gripper.finger(Jaw::II, grip.width))
         {
             let down = grip.part_from_grip.rotation.transpose() * DVec3::NEG_Z;
             assert!(grip.part_from_grip.point(body.support_point(down)).z > -1e-5);
@@ -331,9 +331,9 @@ fn inside_grips_open_into_the_channel() {
         assert!((height(face_i) + 0.02).abs() < 1e-9 && (height(face_ii) - 0.02).abs() < 1e-9);
         // No corner of a fingertip is in a wall or in the floor.
         for body in gripper
-            .finger(true, 0.04 - 2.0 * outer)
+            .finger(Jaw::I, 0.04 - 2.0 * outer)
             .iter()
-            .chain(&gripper.finger(false, 0.04 - 2.0 * outer))
+            .chain(&gripper.finger(Jaw::II, 0.04 - 2.0 * outer))
         {
             for k in 0..8 {
                 let sign = |bit: i32| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
@@ -376,7 +376,8 @@ fn explanations_agree_with_the_run() {
     for site in proposer.sites() {
         for &angle in &site.angles {
             for &position in &site.positions {
-                let explanation = proposer.explain(site.site, position, angle, false).unwrap();
+                let explanation =
+                    proposer.explain(site.site, position, angle, Jaws::Straight).unwrap();
                 assert_eq!(
                     explanation.rejection.is_none(),
                     grips.contains_key(&id),
@@ -437,7 +438,7 @@ fn explanations_agree_with_the_run() {
                     .all(|x| x.abs() < 1e-12)
         );
     }
-    let beside = proposer.explain(0, DVec2::splat(1.0), 0.3, false).unwrap();
+    let beside = proposer.explain(0, DVec2::splat(1.0), 0.3, Jaws::Straight).unwrap();
     assert!(beside.rejection.is_some());
     assert!(
         !beside
@@ -446,7 +447,7 @@ fn explanations_agree_with_the_run() {
             .filter(|check| check.name.starts_with("contact"))
             .any(|check| check.passed)
     );
-    assert!(proposer.explain(99, DVec2::ZERO, 0.0, false).is_err());
-    assert!(proposer.explain(0, DVec2::NAN, 0.0, false).is_err());
+    assert!(proposer.explain(99, DVec2::ZERO, 0.0, Jaws::Straight).is_err());
+    assert!(proposer.explain(0, DVec2::NAN, 0.0, Jaws::Straight).is_err());
     assert!(proposer.explain_pose(0, 0, &gripfast::model::Frame::IDENTITY).is_err());
 }

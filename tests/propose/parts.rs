@@ -4,7 +4,7 @@
 use glam::{DVec2, DVec3};
 use gripfast::backend::{Backend, ScoreOptions, SeedSet};
 use gripfast::geometry::{Bounds2, contains, patch_area, ring_area};
-use gripfast::gripper::{self, Gripper, Shape};
+use gripfast::gripper::{self, Gripper, Jaw, Shape};
 use gripfast::load::LoadSet;
 use gripfast::model::Grip;
 use gripfast::part::{Part, ReadOptions};
@@ -108,8 +108,8 @@ fn assert_sound(part: &Part, gripper: &Gripper, grip: &Grip) {
             part.mesh.corners(index).map(|corner| grip.part_from_grip.point_inverse(corner))
         })
         .collect();
-    let mut bodies = gripper.finger(true, grip.width);
-    bodies.extend(gripper.finger(false, grip.width));
+    let mut bodies = gripper.finger(Jaw::I, grip.width);
+    bodies.extend(gripper.finger(Jaw::II, grip.width));
     bodies.extend(gripper.palm.iter().cloned());
     for body in bodies {
         assert!(matches!(body.shape, Shape::Box { .. }));

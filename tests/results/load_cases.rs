@@ -1,7 +1,8 @@
 //! Load cases from the flag: exact values, counts, invariance, refusals.
 
 use glam::{DMat3, DQuat, DVec3};
-use gripfast::load::{ACCELERATION_DIRECTIONS, LoadSet, inertial_wrench, sphere, wrench_in_grip};
+use gripfast::geometry::sphere;
+use gripfast::load::{ACCELERATION_DIRECTIONS, LoadSet, inertial_wrench, wrench_in_grip};
 use gripfast::model::{Frame, Wrench};
 use gripfast::part::MassProperties;
 use gripfast::results::LoadCase;

@@ -3,7 +3,7 @@
 
 use crate::support::grips;
 use glam::{DMat3, DQuat, DVec3};
-use gripfast::gripper::{Body, Gripper, Shape};
+use gripfast::gripper::{Body, Gripper, Jaw, Shape};
 use gripfast::model::Frame;
 use gripfast::part::Mesh;
 use gripfast::pick::{Obstacle, Phase, Picker, Reach, Reason, Retreat, Scene, Solid};
@@ -315,11 +315,11 @@ fn places(
             (Phase::Approach, opening, scene.approach * share),
             (Phase::Retreat, 0.0, scene.approach * share),
         ] {
-            for (jaw_i, jaw) in [(true, "I"), (false, "II")] {
-                for (index, body) in gripper.finger(jaw_i, width + 2.0 * extra).iter().enumerate() {
+            for jaw in Jaw::BOTH {
+                for (index, body) in gripper.finger(jaw, width + 2.0 * extra).iter().enumerate() {
                     found.push((
                         phase,
-                        jaw,
+                        jaw.name(),
                         index,
                         shifted(&body.grip_from_body, DVec3::NEG_X * way),
                         half(body),

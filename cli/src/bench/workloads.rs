@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 use gripfast::backend::{Batch, Problem, Scored, Seed, SeedStatus};
-use gripfast::load::sphere;
+use gripfast::geometry::sphere;
 use gripfast::model::{Contact, Polygon, Wrench};
 
 /// Largest relative difference between bounds of two backends: each is widened by half of it.

@@ -2,11 +2,11 @@
 
 use glam::DVec2;
 
-use super::PatchIndex;
+use super::super::options::ProposeOptions;
+use super::super::patch::PatchIndex;
 use crate::geometry::contains;
 use crate::geometry::polygon::{self, rings};
 use crate::model::Polygon;
-use crate::propose::ProposeOptions;
 
 /// Corners of the overlap that turn by less are points of a tessellated curve, not places of their
 /// own.

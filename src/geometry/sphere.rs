@@ -28,13 +28,15 @@ pub fn directions(count: usize) -> Vec<DVec3> {
         return axes().to_vec();
     }
     if let Some(f) = frequency(count, 20) {
-        return geodesic_facets(f)
-            .into_iter()
-            .map(|[a, b, c]| (b - a).cross(c - a).normalize())
-            .collect();
+        let (points, triangles) = geodesic(f);
+        let normal = |corners: [usize; 3]| {
+            let [a, b, c] = corners.map(|corner| points[corner]);
+            (b - a).cross(c - a).normalize()
+        };
+        return triangles.into_iter().map(normal).collect();
     }
     if let Some(f) = count.checked_sub(2).and_then(|count| frequency(count, 10)) {
-        return geodesic_vertices(f);
+        return geodesic(f).0;
     }
     fibonacci(count)
 }
@@ -119,53 +121,65 @@ fn icosahedron() -> ([DVec3; 12], [[usize; 3]; 20]) {
     (corners.map(|corner| DVec3::from_array(corner).normalize()), facets)
 }
 
-/// The point of facet `(a, b, c)` at integer barycentric coordinates `(f - i - j, i, j)`, on the
-/// sphere.
-fn on_sphere([a, b, c]: [DVec3; 3], f: usize, i: usize, j: usize) -> DVec3 {
-    (a * (f - i - j) as f64 + b * i as f64 + c * j as f64).normalize()
-}
-
-/// The 20 f^2 facets of the icosahedron divided f-fold, corners on the sphere.
-fn geodesic_facets(f: usize) -> Vec<[DVec3; 3]> {
+/// The icosahedron with each edge divided into `f` parts and blown up to the sphere (class I):
+/// `10 f^2 + 2` unit vectors (corners, then points inside edges, then inside facets) and `20 f^2`
+/// triangles of them, counter-clockwise from outside.
+pub fn geodesic(f: usize) -> (Vec<DVec3>, Vec<[usize; 3]>) {
     let (corners, facets) = icosahedron();
-    let mut found = Vec::with_capacity(20 * f * f);
-    for facet in facets {
-        let facet = facet.map(|corner| corners[corner]);
-        let at = |i, j| on_sphere(facet, f, i, j);
-        for i in 0..f {
-            for j in 0..f - i {
-                found.push([at(i, j), at(i + 1, j), at(i, j + 1)]);
-                if i + j + 1 < f {
-                    found.push([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
-                }
-            }
-        }
-    }
-    found
-}
-
-/// The 10 f^2 + 2 vertices of the icosahedron divided f-fold: corners, then points inside edges,
-/// then inside facets.
-fn geodesic_vertices(f: usize) -> Vec<DVec3> {
-    let (corners, facets) = icosahedron();
-    let mut found = corners.to_vec();
+    let mut points = corners.to_vec();
+    // First point inside each edge, from its lower to its higher corner.
+    let mut inside_edge = [[0; 12]; 12];
     for [a, b, c] in facets {
         for (from, to) in [(a, b), (b, c), (c, a)] {
             // Each edge belongs to two facets, which run along it in opposite senses.
             if from < to {
-                found.extend((1..f).map(|i| {
+                inside_edge[from][to] = points.len();
+                points.extend((1..f).map(|i| {
                     (corners[from] * (f - i) as f64 + corners[to] * i as f64).normalize()
                 }));
             }
         }
     }
+    let mut triangles = Vec::with_capacity(20 * f * f);
     for facet in facets {
-        let facet = facet.map(|corner| corners[corner]);
+        let [a, b, c] = facet.map(|corner| corners[corner]);
+        let first = points.len();
         for i in 1..f {
-            found.extend((1..f - i).map(|j| on_sphere(facet, f, i, j)));
+            points.extend(
+                (1..f - i)
+                    .map(|j| (a * (f - i - j) as f64 + b * i as f64 + c * j as f64).normalize()),
+            );
+        }
+        let along = |from: usize, to: usize, steps: usize| match steps {
+            0 => from,
+            _ if steps == f => to,
+            _ if from < to => inside_edge[from][to] + steps - 1,
+            _ => inside_edge[to][from] + (f - steps) - 1,
+        };
+        // The point at integer barycentric coordinates `(f - i - j, i, j)`.
+        let at = |i: usize, j: usize| {
+            let [a, b, c] = facet;
+            if j == 0 {
+                along(a, b, i)
+            } else if i == 0 {
+                along(a, c, j)
+            } else if i + j == f {
+                along(b, c, j)
+            } else {
+                // Rows before this one hold f - 2, f - 3, ... points.
+                first + (i - 1) * (f - 1) - i * (i - 1) / 2 + j - 1
+            }
+        };
+        for i in 0..f {
+            for j in 0..f - i {
+                triangles.push([at(i, j), at(i + 1, j), at(i, j + 1)]);
+                if i + j + 1 < f {
+                    triangles.push([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+                }
+            }
         }
     }
-    found
+    (points, triangles)
 }
 
 #[cfg(test)]
@@ -229,12 +243,23 @@ mod tests {
     }
 
     #[test]
-    fn facet_normals_point_outwards() {
-        assert!(
-            geodesic_facets(3)
-                .iter()
-                .all(|[a, b, c]| (*b - *a).cross(*c - *a).dot(*a + *b + *c) > 0.0)
-        );
+    fn geodesic_triangles_cover_the_sphere_once_and_face_outwards() {
+        for f in [1, 2, 3, 4, 7] {
+            let (points, triangles) = geodesic(f);
+            assert_eq!((points.len(), triangles.len()), (10 * f * f + 2, 20 * f * f), "{f}");
+            let mut edges = std::collections::HashSet::new();
+            for corners in &triangles {
+                let [a, b, c] = corners.map(|corner| points[corner]);
+                assert!((b - a).cross(c - a).dot(a + b + c) > 0.0, "{f}: {corners:?}");
+                // Neighbours on the sphere, so that an index out of place would be seen.
+                let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+                assert!(longest < 1.3 / f as f64, "{f}: {longest}");
+                for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+                    assert!(edges.insert((corners[from], corners[to])), "{f}: {corners:?}");
+                }
+            }
+            assert!(edges.iter().all(|&(from, to)| edges.contains(&(to, from))), "{f}");
+        }
     }
 
     #[test]

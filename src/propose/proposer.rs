@@ -1,0 +1,402 @@
+//! The stream of proposals: sites once, then chunk after chunk of work items.
+
+mod progress;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+pub use progress::Progress;
+
+use super::environment::Environment;
+use super::options::{ProposeOptions, Rejection};
+use super::patch::PatchIndex;
+use super::site::{self, Site};
+use super::work;
+use crate::clash::{Motion, Sweep, Topology, Tree, sweeps};
+use crate::error::{Error, Result};
+use crate::gripper::{Gripper, Jaws};
+use crate::model::{Contact, Grip, Polygon};
+use crate::part::{FacePair, PairKind, Part};
+
+/// Positions per work item: large enough to share what an angle determines, small enough to spread
+/// over the threads. Fixed, because contacts are shared within an item: results must not depend on
+/// the chunk size.
+const ITEM: usize = 2048;
+/// Corners of contact polygons that a chunk may hold, about (16 bytes each): where pads cover
+/// finely tessellated outlines, chunks have fewer candidates.
+const MOST_CORNERS: usize = 4_000_000;
+
+/// Counts of a run so far.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Tally {
+    /// Antiparallel face pairs within the stroke.
+    pub pairs: u64,
+    /// Candidates looked at.
+    pub candidates: u64,
+    /// Grips free of interference among them (flips not counted).
+    pub grips: u64,
+    /// Rejections by [`Rejection::name`].
+    pub rejections: BTreeMap<String, u64>,
+}
+
+/// Some candidates' outcome, in order.
+#[derive(Debug, Clone, Default)]
+pub struct Chunk {
+    /// Grips free of interference.
+    pub grips: Vec<Grip>,
+    /// Candidates looked at for them.
+    pub candidates: u64,
+}
+
+/// Proposes grips chunk by chunk: an iterator of [`Chunk`].
+pub struct Proposer<'a> {
+    pub(super) part: &'a Part,
+    pub(super) gripper: &'a Gripper,
+    pub(super) options: ProposeOptions,
+    pub(super) environment: Environment,
+    pub(super) sites: Vec<Site>,
+    pub(super) directions: Vec<DVec3>,
+    shape: Arc<Topology>,
+    /// Contact of a pad that lies wholly on both faces.
+    pub(super) whole: Arc<Contact>,
+    pub(super) symmetric: bool,
+    tally: Tally,
+    next: Cursor,
+    /// Corners per candidate in the last chunk.
+    corners: f64,
+    pub(super) tree: Option<(usize, Arc<Tree>)>,
+}
+
+/// Where the next chunk starts.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+struct Cursor {
+    site: usize,
+    angle: usize,
+    position: usize,
+    id: u64,
+}
+
+/// Positions `positions` of a site at one angle; the first has the number `id`.
+#[derive(Debug, Clone)]
+pub(super) struct Item {
+    pub(super) site: usize,
+    pub(super) angle: usize,
+    pub(super) positions: std::ops::Range<usize>,
+    pub(super) id: u64,
+}
+
+/// What the items of one site share.
+pub(super) struct Prepared<'a> {
+    pub(super) site: &'a Site,
+    /// Faces of side I and II; one entry where both are the same in the site's plane, as in every
+    /// prism.
+    pub(super) patches: Vec<PatchIndex>,
+    /// Against the part, for each of [`Proposer::orientations`].
+    pub(super) sweeps: Vec<Vec<Sweep>>,
+    /// Against ground and keep-out boxes.
+    pub(super) outer_sweeps: Vec<Vec<Sweep>>,
+}
+
+impl<'a> Proposer<'a> {
+    /// Finds the sites of `part` for `gripper`.
+    ///
+    /// # Errors
+    /// When an option is out of its range or names a face that is not there, the grid is too fine,
+    /// the gripper has no pad with area, or inside grips are asked of a gripper without outer pads.
+    pub fn new(part: &'a Part, gripper: &'a Gripper, options: &ProposeOptions) -> Result<Self> {
+        options.validate()?;
+        if !crate::geometry::is_convex(&gripper.pad) {
+            return Err(Error::input(
+                &gripper.name,
+                "the pad is not a convex counter-clockwise polygon",
+                "correct the gripper",
+            ));
+        }
+        let mut tally = Tally::default();
+        let mut pairs = Vec::new();
+        let chosen = chosen_faces(part, options)?;
+        if options.outside {
+            let reach = [gripper.stroke[0], gripper.stroke[1] - 2.0 * options.min_opening];
+            choose(
+                part.pairs(0.0, f64::INFINITY),
+                reach,
+                chosen.as_deref(),
+                &mut pairs,
+                &mut tally,
+            );
+        }
+        if options.inside {
+            let Some(outer) = gripper.outer_pad else {
+                let remedy = "state pad.outer_face in the gripper file: the distance from the pad face to the finger's outer gripping face";
+                return Err(Error::input(
+                    &gripper.name,
+                    "inside grips need outer pads, and this gripper states none",
+                    remedy,
+                ));
+            };
+            let reach = [
+                gripper.stroke[0] + 2.0 * (outer + options.min_opening),
+                gripper.stroke[1] + 2.0 * outer,
+            ];
+            choose(
+                part.internal_pairs(0.0, f64::INFINITY),
+                reach,
+                chosen.as_deref(),
+                &mut pairs,
+                &mut tally,
+            );
+        }
+        tally.pairs = pairs.len() as u64;
+        let (sites, directions) = site::sites(part, gripper, options, &pairs)?;
+        let pad = vec![Polygon { outer: gripper.pad.clone(), holes: Vec::new() }];
+        Ok(Self {
+            part,
+            gripper,
+            options: options.clone(),
+            environment: Environment::new(options),
+            sites,
+            directions,
+            shape: Arc::new(Topology::new(&part.mesh)),
+            whole: Arc::new(Contact { face_i: pad.clone(), face_ii: pad }),
+            symmetric: gripper.is_symmetric(),
+            tally,
+            next: Cursor::default(),
+            corners: 400.0,
+            tree: None,
+        })
+    }
+
+    /// Number of candidates in all.
+    pub fn candidates(&self) -> u64 {
+        self.sites
+            .iter()
+            .map(|site| {
+                (site.positions.len() * site.angles.len()) as u64 * self.orientations().len() as u64
+            })
+            .sum()
+    }
+
+    /// Counts so far.
+    pub fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// Ways to put the jaws at one pose that must be tested by themselves.
+    pub(super) fn orientations(&self) -> &'static [Jaws] {
+        if self.symmetric { &[Jaws::Straight] } else { &Jaws::BOTH }
+    }
+
+    /// Numbers used up per pose.
+    pub(super) fn stride(&self) -> u64 {
+        if self.options.flips || !self.symmetric { 2 } else { 1 }
+    }
+
+    fn motion(&self, site: &Site, approach: f64, jaws: Jaws) -> Motion {
+        let [least, most] = self.gripper.stroke;
+        let room = match site.kind {
+            PairKind::External => most - site.width,
+            PairKind::Internal => site.width - 2.0 * self.gripper.outer_pad.unwrap_or(0.0) - least,
+        };
+        Motion {
+            kind: site.kind,
+            width: site.width,
+            opening: self.options.opening.min(room / 2.0).max(0.0),
+            touch: site.rise,
+            flush: site.flush,
+            clearance: self.options.clearance,
+            approach,
+            jaws,
+        }
+    }
+
+    pub(super) fn prepare<'s>(&self, site: &'s Site) -> Prepared<'s> {
+        let axes = site::axes(self.directions[site.direction]);
+        let reach = self.gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
+        let (low, high) = self.part.mesh.bounding_box();
+        let bodies = self.gripper.fingers.iter().chain(&self.gripper.palm);
+        let extent = bodies
+            .flat_map(crate::gripper::Body::bounds)
+            .map(|corner| corner.length())
+            .fold(0.0, f64::max);
+        // Longer than the part and the gripper together: beyond it the gripper is clear of the
+        // part.
+        let clear = (high - low).length() + 2.0 * extent + self.gripper.stroke[1];
+        let each = |approach: f64| -> Vec<Vec<Sweep>> {
+            self.orientations()
+                .iter()
+                .map(|&jaws| sweeps(self.gripper, &self.motion(site, approach, jaws)))
+                .collect()
+        };
+        Prepared {
+            site,
+            patches: site.patches(self.part, &axes, reach),
+            sweeps: each(clear),
+            outer_sweeps: each(self.options.approach),
+        }
+    }
+
+    /// The tree in the axes of a direction; the last one is kept.
+    fn tree(&mut self, direction: usize) -> Arc<Tree> {
+        match &self.tree {
+            Some((known, tree)) if *known == direction => Arc::clone(tree),
+            _ => {
+                self.tree = None; // frees the old one first
+                let tree = Arc::new(self.new_tree(direction));
+                self.tree = Some((direction, Arc::clone(&tree)));
+                tree
+            }
+        }
+    }
+
+    pub(super) fn new_tree(&self, direction: usize) -> Tree {
+        let axes: DMat3 = site::axes(self.directions[direction]);
+        Tree::new(&self.shape, axes)
+    }
+
+    /// The next items: of one direction, and about a chunk of candidates; none when all are done.
+    fn take_items(&mut self) -> Vec<Item> {
+        let mut items: Vec<Item> = Vec::new();
+        let mut candidates = 0;
+        let most = ((MOST_CORNERS as f64 / self.corners) as usize).min(self.options.chunk).max(1);
+        while candidates < most {
+            let Some(site) = self.sites.get(self.next.site) else { break };
+            if self.next.angle == site.angles.len() || site.positions.is_empty() {
+                self.next = Cursor { site: self.next.site + 1, angle: 0, position: 0, ..self.next };
+                continue;
+            }
+            if items.first().is_some_and(|first| self.sites[first.site].direction != site.direction)
+            {
+                break;
+            }
+            let end = (self.next.position + ITEM).min(site.positions.len());
+            let positions = self.next.position..end;
+            candidates += positions.len();
+            let id = self.next.id;
+            self.next.id += positions.len() as u64 * self.stride();
+            items.push(Item { site: self.next.site, angle: self.next.angle, positions, id });
+            self.next.position = end;
+            if end == site.positions.len() {
+                (self.next.angle, self.next.position) = (self.next.angle + 1, 0);
+            }
+        }
+        items
+    }
+}
+
+impl Iterator for Proposer<'_> {
+    type Item = Chunk;
+
+    fn next(&mut self) -> Option<Chunk> {
+        let items = self.take_items();
+        let first = items.first()?;
+        let tree = self.tree(self.sites[first.site].direction);
+        let this = &*self;
+        let mut wanted: Vec<usize> = items.iter().map(|item| item.site).collect();
+        wanted.dedup();
+        let prepared: Vec<Prepared<'_>> =
+            wanted.par_iter().map(|&site| this.prepare(&this.sites[site])).collect();
+        let results: Vec<work::Outcome> = items
+            .par_iter()
+            .map_init(work::Buffers::default, |buffers, item| {
+                let prepared = &prepared[wanted.partition_point(|&site| site < item.site)];
+                this.evaluate(item, prepared, &tree, buffers)
+            })
+            .collect();
+        drop(prepared);
+        let mut chunk = Chunk::default();
+        for outcome in results {
+            chunk.candidates += outcome.candidates;
+            self.tally.grips +=
+                outcome.grips.iter().filter(|grip| grip.flip_of.is_none()).count() as u64;
+            chunk.grips.extend(outcome.grips);
+            for (reason, count) in outcome.rejections {
+                *self.tally.rejections.entry(reason.name()).or_default() += count;
+            }
+        }
+        self.tally.candidates += chunk.candidates;
+        let corners = |contact: &Contact| {
+            [&contact.face_i, &contact.face_ii]
+                .into_iter()
+                .flatten()
+                .flat_map(crate::geometry::polygon::rings)
+                .map(<[_]>::len)
+                .sum::<usize>()
+        };
+        let total: usize = chunk
+            .grips
+            .iter()
+            .filter(|grip| !Arc::ptr_eq(&grip.contact, &self.whole))
+            .map(|grip| corners(&grip.contact))
+            .sum();
+        self.corners = (total as f64 / chunk.candidates.max(1) as f64).max(1.0);
+        Some(chunk)
+    }
+}
+
+/// Whether each planar face may be touched; `None`: all may.
+fn chosen_faces(part: &Part, options: &ProposeOptions) -> Result<Option<Vec<bool>>> {
+    if options.faces.is_none() && options.faces_in.is_empty() {
+        return Ok(None);
+    }
+    let mut chosen = vec![false; part.faces.len()];
+    for &face in options.faces.iter().flatten() {
+        let Some(chosen) = chosen.get_mut(face as usize) else {
+            let remedy = format!("the part has {} of them, counted from 0", part.faces.len());
+            return Err(Error::input("faces", format!("there is no planar face {face}"), remedy));
+        };
+        *chosen = true;
+    }
+    for [low, high] in &options.faces_in {
+        // A face may touch the box from inside: coordinates come rounded to single precision.
+        let (low, high) = (*low - 1e-6, *high + 1e-6);
+        let within = |face: &crate::part::PlanarFace| {
+            let points = face.polygons.iter().flat_map(|polygon| &polygon.outer);
+            points
+                .map(|point| face.part_from_face.point(point.extend(0.0)))
+                .all(|point| point.cmpge(low).all() && point.cmple(high).all())
+        };
+        let mut any = false;
+        for face in part.faces.iter().filter(|face| within(face)) {
+            chosen[face.id as usize] = true;
+            any = true;
+        }
+        if !any {
+            let [a, b] = [low, high].map(|corner| (corner * 1e3).to_array());
+            let problem = format!(
+                "no planar face lies wholly between ({:.2}, {:.2}, {:.2}) and ({:.2}, {:.2}, {:.2}) mm",
+                a[0], a[1], a[2], b[0], b[1], b[2]
+            );
+            return Err(Error::input(
+                "box of faces",
+                problem,
+                "make it larger; the list of the part's faces says where they lie",
+            ));
+        }
+    }
+    Ok(Some(chosen))
+}
+
+fn choose(
+    all: Vec<FacePair>,
+    reach: [f64; 2],
+    chosen: Option<&[bool]>,
+    pairs: &mut Vec<FacePair>,
+    tally: &mut Tally,
+) {
+    for pair in all {
+        let chosen = |face: u32| chosen.is_none_or(|chosen| chosen[face as usize]);
+        let reason = if !(reach[0]..=reach[1]).contains(&pair.width) {
+            Rejection::Stroke
+        } else if !chosen(pair.face_i) || !chosen(pair.face_ii) {
+            Rejection::FaceNotChosen
+        } else {
+            pairs.push(pair);
+            continue;
+        };
+        *tally.rejections.entry(reason.name()).or_default() += 1;
+    }
+}
