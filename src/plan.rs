@@ -285,8 +285,8 @@ impl Collector {
         if self.kept.len() > keep.saturating_mul(2).max(self.full) {
             let value = |grip: &RankedGrip| grip.score.unwrap_or(f64::INFINITY);
             self.kept.sort_by(|a, b| value(b).total_cmp(&value(a)).then(a.grip.id.cmp(&b.grip.id)));
-            // Those that tie with the last one stay: the ranking orders ties by id, and all of them
-            // must be there.
+            // Those that tie with the last one stay: the ranking orders them by other things, and
+            // all of them must be there.
             let last = self.kept.get(keep.max(1) - 1).map_or(f64::NEG_INFINITY, value);
             let least = if last.is_finite() { last - CLOSE * last.abs() } else { last };
             self.kept.truncate(self.kept.partition_point(|grip| value(grip) >= least));

@@ -8,8 +8,9 @@ use glam::DVec3;
 use crate::model::{Patch, Status};
 use crate::results::RankedGrip;
 
-/// Scores that differ by less than this share count as equal and are ordered by id: final answers
-/// agree to this across backends and refiners, and the order shall not depend on which of them ran.
+/// Scores that differ by less than this share count as equal, and other things decide (see [`rank`]):
+/// final answers agree to this across backends and refiners, and the order shall not depend on which
+/// of them ran.
 pub const TIE: f64 = 1e-9;
 
 /// Two lengths [m] (or areas, by their square roots) count as equal for
@@ -77,8 +78,10 @@ pub struct Ranking {
 /// Scores and orders `grips`; their `rank` and `score` are set here. `centre_of_mass` and `size`
 /// (the diagonal of the bounding box) are the part's [m], in the part frame.
 ///
-/// The order is that of falling score; scores within [`TIE`] of each other follow the ids. It
-/// depends neither on the order in which the grips come nor on differences below [`TIE`].
+/// The order is that of falling score. Among scores within [`TIE`] of each other the grip nearest to
+/// the centre of mass comes first, then the one whose contacts are more symmetric about the plane in
+/// which the jaws close and more alike, then the lower id. The order depends neither on that in which
+/// the grips come nor on differences below [`TIE`].
 pub fn rank(
     grips: Vec<RankedGrip>,
     centre_of_mass: DVec3,
@@ -106,7 +109,7 @@ pub fn rank(
         grip.score = score.is_finite().then_some(score);
         kept.push((score, grip));
     }
-    order(&mut kept);
+    order(&mut kept, centre_of_mass);
     if options.merge_duplicates {
         let before = kept.len();
         kept = merge(kept, centre_of_mass);
@@ -149,15 +152,33 @@ pub(crate) fn ties(a: f64, b: f64) -> bool {
     a == b || ((a - b).is_finite() && (a - b).abs() <= TIE * a.abs().max(b.abs()))
 }
 
-/// Falling score, runs of scores that tie by id.
+/// Falling score, runs of scores that tie by [`preference`].
 ///
 /// A run ends at a gap between neighbours, not at a distance from its first member: two equal grips
 /// stay together whatever lies between them.
-fn order(grips: &mut [(f64, RankedGrip)]) {
+fn order(grips: &mut [(f64, RankedGrip)], centre_of_mass: DVec3) {
     grips.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.grip.id.cmp(&b.1.grip.id)));
     for run in grips.chunk_by_mut(|a, b| ties(a.0, b.0)) {
-        run.sort_by_key(|grip| grip.1.grip.id);
+        run.sort_by_cached_key(|grip| preference(&grip.1, centre_of_mass));
     }
+}
+
+/// What is preferred among equal scores, smallest first: distance of the grip from the centre of
+/// mass, asymmetry of its contacts (both in steps of [`SAME_LENGTH`]), id.
+fn preference(grip: &RankedGrip, centre_of_mass: DVec3) -> (u64, u64, u64) {
+    let steps = |length: f64| (length / SAME_LENGTH).round() as u64;
+    let contact = &grip.grip.contact;
+    let [one, two] =
+        [&contact.face_i, &contact.face_ii].map(|patch| crate::geometry::patch_moments(patch));
+    let aside = |moments: &crate::geometry::Moments| {
+        if moments.area > 0.0 { moments.centroid.y.abs() } else { 0.0 }
+    };
+    let unlike = (one.area.max(0.0).sqrt() - two.area.max(0.0).sqrt()).abs();
+    (
+        steps(grip.grip.part_from_grip.origin.distance(centre_of_mass)),
+        steps(aside(&one) + aside(&two) + unlike),
+        grip.grip.id,
+    )
 }
 
 /// What a symmetry of the part, or exchanging the jaws, leaves of a grip: width (negative from

@@ -1,10 +1,25 @@
 //! What surrounds the part: the ground it stands on and boxes to stay out of.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::options::{Cone, Ground, ProposeOptions};
+use super::site::Site;
+use super::work;
 use crate::clash::Sweep;
 use crate::model::Frame;
+
+/// A line in a site's plane: the gripper is clear of something for all grip origins with
+/// `normal . place >= offset`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Border {
+    /// Unit vector in the site's `(x, y)`.
+    pub(super) normal: DVec2,
+    /// [m].
+    pub(super) offset: f64,
+}
+
+/// Planes that lean less over a site's plane have no border in it (sine of the angle).
+const LEANING: f64 = 0.1;
 
 /// The surroundings, with unit vectors.
 #[derive(Debug, Clone)]
@@ -35,11 +50,50 @@ impl Environment {
         self.cone.is_none_or(|cone| cone.axis.angle_between(approach) <= cone.half_angle + 1e-9)
     }
 
+    /// Smallest angle between the cone's axis and the approaches of all sites [rad].
+    pub(super) fn nearest_approach(&self, sites: &[Site]) -> Option<f64> {
+        let cone = self.cone?;
+        let approaches = sites.iter().flat_map(|site| {
+            site.angles.iter().map(|&angle| work::approach(&work::frame(site, DVec2::ZERO, angle)))
+        });
+        approaches.map(|approach| cone.axis.angle_between(approach)).reduce(f64::min)
+    }
+
     /// Lowest height of each sweep over the ground, for a grip origin at height zero.
     pub(super) fn depths(&self, sweeps: &[Sweep], part_from_grip: &Frame) -> Vec<f64> {
         let Some(ground) = self.ground else { return Vec::new() };
         let down = part_from_grip.rotation.transpose() * -ground.normal;
         sweeps.iter().map(|sweep| -sweep.support_point(down).dot(down)).collect()
+    }
+
+    /// Where the sweeps of a gripper, given with its frames at the origin of a site, pass the ground
+    /// and the planes of the keep-out boxes' faces.
+    pub(super) fn borders(
+        &self,
+        sweeps: &[Sweep],
+        part_from_site: &Frame,
+        part_from_grip: &Frame,
+    ) -> Vec<Border> {
+        let ground = self.ground.map(|ground| (ground.normal, ground.offset));
+        let faces = self.keep_out.iter().flat_map(|[low, high]| {
+            (0..3).flat_map(move |axis| {
+                let normal = DVec3::AXES[axis];
+                [(normal, high[axis]), (-normal, -low[axis])]
+            })
+        });
+        let border = |(normal, offset): (DVec3, f64)| {
+            let down = part_from_grip.rotation.transpose() * -normal;
+            let lowest = sweeps
+                .iter()
+                .map(|sweep| -sweep.support_point(down).dot(down))
+                .fold(f64::INFINITY, f64::min);
+            let along = (part_from_site.rotation.transpose() * normal).truncate();
+            let length = along.length();
+            let offset = offset - normal.dot(part_from_site.origin) - lowest;
+            (length > LEANING && offset.is_finite())
+                .then(|| Border { normal: along / length, offset: offset / length })
+        };
+        ground.into_iter().chain(faces).filter_map(border).collect()
     }
 
     /// The first sweep below the ground, for a grip origin at `origin`.

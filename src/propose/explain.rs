@@ -33,10 +33,12 @@ pub struct SiteInfo {
     /// Site frame in the part frame: `z` is the closing axis, positions lie in `(x, y)`, angles
     /// count from `x`.
     pub part_from_site: Frame,
-    /// Grip origins in the site's `(x, y)` [m].
+    /// Grip origins tried at every angle, in the site's `(x, y)` [m].
     pub positions: Vec<DVec2>,
     /// Approach angles [rad].
     pub angles: Vec<f64>,
+    /// Grip origins tried at one angle only: pads flush with an edge, just clear of the ground, ...
+    pub special: Vec<Vec<DVec2>>,
 }
 
 /// One test of a pose.
@@ -82,6 +84,7 @@ impl Proposer<'_> {
             part_from_site: site.part_from_site,
             positions: site.positions.clone(),
             angles: site.angles.clone(),
+            special: site.special.clone(),
         };
         self.sites.iter().enumerate().map(info).collect()
     }
@@ -223,10 +226,10 @@ impl Proposer<'_> {
         let outline_of_pad = work::oriented(&self.gripper.pad, jaws);
         let pad = TurnedPad::new(&outline_of_pad, angle);
         let mut patches: [Patch; 2] = [Patch::new(), Patch::new()];
-        for (side, name) in ["contact on face I", "contact on face II"].into_iter().enumerate() {
+        let areas = [0, 1].map(|side: usize| {
             let mut scratch = Scratch::default();
             let patch = &prepared.patches[side.min(prepared.patches.len() - 1)];
-            let area = match patch.touch(&pad, position, &mut scratch) {
+            match patch.touch(&pad, position, &mut scratch) {
                 Touch::Empty => 0.0,
                 Touch::Whole => {
                     patches[side] =
@@ -237,15 +240,26 @@ impl Proposer<'_> {
                     patches[side] = patch.outline(&pad, position, &mut scratch, angle);
                     area
                 }
-            };
-            let floor = self.contact_floor(prepared.site, pad.area());
+            }
+        });
+        let [share, pad_share] = self.contact_floor(prepared.site, &pad);
+        let reason = || {
+            if areas.iter().all(|&area| area > 0.0 && area >= share) {
+                Rejection::PadShareTooSmall
+            } else {
+                Rejection::ContactTooSmall
+            }
+        };
+        for (name, area) in ["contact on face I", "contact on face II"].into_iter().zip(areas) {
             let detail = format!(
-                "{:.2} mm^2, {:.1} % of the pad; at least {:.2} mm^2",
+                "{:.2} mm^2, {:.1} % of the pad; at least {:.2} mm^2 by the share of the most that \
+                 can touch, {:.2} mm^2 by that of the pad",
                 area * 1e6,
                 area / pad.area() * 100.0,
-                floor * 1e6
+                share * 1e6,
+                pad_share * 1e6
             );
-            verdict.add(name, area > 0.0 && area >= floor, detail, || Rejection::ContactTooSmall);
+            verdict.add(name, area > 0.0 && area >= share.max(pad_share), detail, reason);
         }
         let [face_i, face_ii] = patches;
         Contact { face_i, face_ii }

@@ -16,8 +16,9 @@ pub struct ProposeOptions {
     pub angle_step: f64,
     /// Approach along and across the edges of the gripped faces as well.
     pub edge_angles: bool,
-    /// Smallest contact area on either face, as a share of the largest possible there: the pad's
-    /// area, or the area in which the two faces overlap, whichever is smaller.
+    /// Smallest contact area on either face, as a share of the most that a pad can touch there: the
+    /// area in which the two faces overlap, or that of a pad over the middle of its bounds, at the
+    /// grip's angle, whichever is smaller.
     pub min_contact: f64,
     /// Smallest contact area on either face, as a share of the pad's area.
     pub min_pad_share: f64,
@@ -44,7 +45,7 @@ pub struct ProposeOptions {
     /// Way by which each jaw is opened for the approach beyond contact [m]; less where the stroke
     /// ends.
     pub opening: f64,
-    /// Way by which each jaw must at least be openable [m]: else the pair is outside the stroke.
+    /// Way by which each jaw must at least be openable beyond contact [m].
     pub min_opening: f64,
     /// Distance kept between gripper and part, but for the pads [m].
     pub clearance: f64,
@@ -73,7 +74,7 @@ impl Default for ProposeOptions {
             inside: false,
             flips: false,
             opening: 5e-3,
-            min_opening: 0.25e-3,
+            min_opening: 0.05e-3,
             clearance: 0.0,
             approach: 0.1,
             chunk: 65_536,
@@ -189,8 +190,12 @@ pub enum Rejection {
     ApproachOutsideCone,
     /// The grip origin is too far from the centre of mass.
     TooFarFromCentreOfMass,
-    /// The contact area on a face is below the floor.
+    /// Counts face pairs, not candidates: the stroke does not leave the least opening for them.
+    OpeningTooSmall,
+    /// The contact area on a face is below [`ProposeOptions::min_contact`].
     ContactTooSmall,
+    /// The contact area on a face is below [`ProposeOptions::min_pad_share`].
+    PadShareTooSmall,
     /// A body would go below the ground.
     Ground {
         /// Its name.
@@ -223,7 +228,9 @@ impl Rejection {
             Self::FaceNotChosen => "face_pair_not_chosen".into(),
             Self::ApproachOutsideCone => "approach_outside_cone".into(),
             Self::TooFarFromCentreOfMass => "too_far_from_centre_of_mass".into(),
+            Self::OpeningTooSmall => "face_pair_opening_too_small".into(),
             Self::ContactTooSmall => "contact_too_small".into(),
+            Self::PadShareTooSmall => "pad_share_too_small".into(),
             Self::Ground { body } => with("ground", body),
             Self::KeepOut { body } => with("keep_out", body),
             Self::PartInterference { body } => with("part_interference", body),

@@ -14,13 +14,13 @@ pub use progress::Progress;
 use super::environment::Environment;
 use super::options::{ProposeOptions, Rejection};
 use super::patch::PatchIndex;
-use super::site::{self, Site};
+use super::site::{self, Places, Site};
 use super::work;
-use crate::clash::{Motion, Sweep, Topology, Tree, sweeps};
+use crate::clash::{Sweep, Topology, Tree, sweeps};
 use crate::error::{Error, Result};
 use crate::gripper::{Gripper, Jaws};
 use crate::model::{Contact, Grip, Polygon};
-use crate::part::{FacePair, PairKind, Part};
+use crate::part::{FacePair, Part};
 
 /// Positions per work item: large enough to share what an angle determines, small enough to spread
 /// over the threads. Fixed, because contacts are shared within an item: results must not depend on
@@ -29,6 +29,12 @@ const ITEM: usize = 2048;
 /// Corners of contact polygons that a chunk may hold, about (16 bytes each): where pads cover
 /// finely tessellated outlines, chunks have fewer candidates.
 const MOST_CORNERS: usize = 4_000_000;
+
+/// Rounding of a width against the stroke [m].
+const STROKE: f64 = 1e-9;
+/// Widths of face pairs outside the stroke that are told apart [m], and how many are kept.
+const SAME_WIDTH: f64 = 1e-5;
+const MOST_WIDTHS: usize = 5;
 
 /// Counts of a run so far.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -41,6 +47,68 @@ pub struct Tally {
     pub grips: u64,
     /// Rejections by [`Rejection::name`].
     pub rejections: BTreeMap<String, u64>,
+    /// Widths of the face pairs outside the stroke, the nearest to it first, at most five [m].
+    #[serde(default)]
+    pub widths_outside: Vec<f64>,
+    /// With an approach cone: smallest angle between its axis and an approach among all candidates
+    /// [rad].
+    #[serde(default)]
+    pub nearest_approach: Option<f64>,
+}
+
+impl Tally {
+    /// What the limits behind rejections were up against, one sentence each: widths outside the
+    /// stroke, the least opening and pad share, the nearest approach outside the cone.
+    pub fn remarks(&self, gripper: &Gripper, options: &ProposeOptions) -> Vec<String> {
+        let count = |reason: Rejection| self.rejections.get(&reason.name()).copied().unwrap_or(0);
+        let mut remarks = Vec::new();
+        if self.pairs == 0 && !self.widths_outside.is_empty() {
+            let widths: Vec<String> =
+                self.widths_outside.iter().map(|width| format!("{:.2}", width * 1e3)).collect();
+            remarks.push(format!(
+                "opposite faces are {} mm apart; the jaws of {} go from {:.2} to {:.2} mm",
+                widths.join(", "),
+                gripper.name,
+                gripper.stroke[0] * 1e3,
+                gripper.stroke[1] * 1e3
+            ));
+        }
+        if count(Rejection::OpeningTooSmall) > 0 {
+            remarks.push(format!(
+                "face pairs so near the end of the stroke that a jaw opens by less than the least \
+                 opening of {:.3} mm: {}",
+                options.min_opening * 1e3,
+                count(Rejection::OpeningTooSmall)
+            ));
+        }
+        if count(Rejection::PadShareTooSmall) > 0 {
+            remarks.push(format!(
+                "places at which less than the least share of the pad touches, {:.2} %: {}",
+                options.min_pad_share * 100.0,
+                count(Rejection::PadShareTooSmall)
+            ));
+        }
+        if let (Some(cone), Some(nearest)) = (options.approach_cone, self.nearest_approach)
+            && nearest > cone.half_angle
+        {
+            remarks.push(format!(
+                "no approach lies in the cone of {:.1} deg: the nearest is {:.2} deg from its axis",
+                cone.half_angle.to_degrees(),
+                nearest.to_degrees()
+            ));
+        }
+        remarks
+    }
+
+    fn note_width(&mut self, width: f64, [least, most]: [f64; 2]) {
+        if self.widths_outside.iter().any(|known| (known - width).abs() < SAME_WIDTH) {
+            return;
+        }
+        let beyond = |width: f64| (least - width).max(width - most);
+        let place = self.widths_outside.partition_point(|known| beyond(*known) <= beyond(width));
+        self.widths_outside.insert(place, width);
+        self.widths_outside.truncate(MOST_WIDTHS);
+    }
 }
 
 /// Some candidates' outcome, in order.
@@ -75,15 +143,20 @@ pub struct Proposer<'a> {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 struct Cursor {
     site: usize,
+    places: Places,
     angle: usize,
     position: usize,
+    /// Number of the next candidate of a grid: these are counted first, over all sites.
     id: u64,
+    /// Number of the next special candidate.
+    special_id: u64,
 }
 
 /// Positions `positions` of a site at one angle; the first has the number `id`.
 #[derive(Debug, Clone)]
 pub(super) struct Item {
     pub(super) site: usize,
+    pub(super) places: Places,
     pub(super) angle: usize,
     pub(super) positions: std::ops::Range<usize>,
     pub(super) id: u64,
@@ -119,15 +192,11 @@ impl<'a> Proposer<'a> {
         let mut tally = Tally::default();
         let mut pairs = Vec::new();
         let chosen = chosen_faces(part, options)?;
+        let mut choice = Choice { chosen: chosen.as_deref(), pairs: &mut pairs, tally: &mut tally };
+        let [least, most] = gripper.stroke;
         if options.outside {
-            let reach = [gripper.stroke[0], gripper.stroke[1] - 2.0 * options.min_opening];
-            choose(
-                part.pairs(0.0, f64::INFINITY),
-                reach,
-                chosen.as_deref(),
-                &mut pairs,
-                &mut tally,
-            );
+            let opened = [least, most - 2.0 * options.min_opening];
+            choice.take(part.pairs(0.0, f64::INFINITY), gripper.stroke, opened);
         }
         if options.inside {
             let Some(outer) = gripper.outer_pad else {
@@ -138,33 +207,30 @@ impl<'a> Proposer<'a> {
                     remedy,
                 ));
             };
-            let reach = [
-                gripper.stroke[0] + 2.0 * (outer + options.min_opening),
-                gripper.stroke[1] + 2.0 * outer,
-            ];
-            choose(
-                part.internal_pairs(0.0, f64::INFINITY),
-                reach,
-                chosen.as_deref(),
-                &mut pairs,
-                &mut tally,
-            );
+            let reach = gripper.stroke.map(|width| width + 2.0 * outer);
+            let opened = [reach[0] + 2.0 * options.min_opening, reach[1]];
+            choice.take(part.internal_pairs(0.0, f64::INFINITY), reach, opened);
         }
         tally.pairs = pairs.len() as u64;
-        let (sites, directions) = site::sites(part, gripper, options, &pairs)?;
+        let environment = Environment::new(options);
+        let (sites, directions) =
+            site::sites(part, gripper, options, &environment, &pairs, chosen.as_deref())?;
+        tally.nearest_approach = environment.nearest_approach(&sites);
+        let stride = if options.flips || !gripper.is_symmetric() { 2 } else { 1 };
+        let grid: usize = sites.iter().map(|site| site.positions.len() * site.angles.len()).sum();
         let pad = vec![Polygon { outer: gripper.pad.clone(), holes: Vec::new() }];
         Ok(Self {
             part,
             gripper,
             options: options.clone(),
-            environment: Environment::new(options),
+            environment,
             sites,
             directions,
             shape: Arc::new(Topology::new(&part.mesh)),
             whole: Arc::new(Contact { face_i: pad.clone(), face_ii: pad }),
             symmetric: gripper.is_symmetric(),
             tally,
-            next: Cursor::default(),
+            next: Cursor { special_id: grid as u64 * stride, ..Cursor::default() },
             corners: 400.0,
             tree: None,
         })
@@ -175,7 +241,9 @@ impl<'a> Proposer<'a> {
         self.sites
             .iter()
             .map(|site| {
-                (site.positions.len() * site.angles.len()) as u64 * self.orientations().len() as u64
+                let special: usize = site.special.iter().map(Vec::len).sum();
+                (site.positions.len() * site.angles.len() + special) as u64
+                    * self.orientations().len() as u64
             })
             .sum()
     }
@@ -195,24 +263,6 @@ impl<'a> Proposer<'a> {
         if self.options.flips || !self.symmetric { 2 } else { 1 }
     }
 
-    fn motion(&self, site: &Site, approach: f64, jaws: Jaws) -> Motion {
-        let [least, most] = self.gripper.stroke;
-        let room = match site.kind {
-            PairKind::External => most - site.width,
-            PairKind::Internal => site.width - 2.0 * self.gripper.outer_pad.unwrap_or(0.0) - least,
-        };
-        Motion {
-            kind: site.kind,
-            width: site.width,
-            opening: self.options.opening.min(room / 2.0).max(0.0),
-            touch: site.rise,
-            flush: site.flush,
-            clearance: self.options.clearance,
-            approach,
-            jaws,
-        }
-    }
-
     pub(super) fn prepare<'s>(&self, site: &'s Site) -> Prepared<'s> {
         let axes = site::axes(self.directions[site.direction]);
         let reach = self.gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
@@ -228,7 +278,9 @@ impl<'a> Proposer<'a> {
         let each = |approach: f64| -> Vec<Vec<Sweep>> {
             self.orientations()
                 .iter()
-                .map(|&jaws| sweeps(self.gripper, &self.motion(site, approach, jaws)))
+                .map(|&jaws| {
+                    sweeps(self.gripper, &site.motion(self.gripper, &self.options, approach, jaws))
+                })
                 .collect()
         };
         Prepared {
@@ -264,22 +316,40 @@ impl<'a> Proposer<'a> {
         let most = ((MOST_CORNERS as f64 / self.corners) as usize).min(self.options.chunk).max(1);
         while candidates < most {
             let Some(site) = self.sites.get(self.next.site) else { break };
-            if self.next.angle == site.angles.len() || site.positions.is_empty() {
-                self.next = Cursor { site: self.next.site + 1, angle: 0, position: 0, ..self.next };
+            if self.next.angle == site.angles.len() {
+                let (site, places) = match self.next.places {
+                    Places::Grid => (self.next.site, Places::Special),
+                    Places::Special => (self.next.site + 1, Places::Grid),
+                };
+                self.next = Cursor { site, places, angle: 0, position: 0, ..self.next };
                 continue;
             }
             if items.first().is_some_and(|first| self.sites[first.site].direction != site.direction)
             {
                 break;
             }
-            let end = (self.next.position + ITEM).min(site.positions.len());
+            let count = site.places(self.next.places, self.next.angle).len();
+            let end = (self.next.position + ITEM).min(count);
             let positions = self.next.position..end;
             candidates += positions.len();
-            let id = self.next.id;
-            self.next.id += positions.len() as u64 * self.stride();
-            items.push(Item { site: self.next.site, angle: self.next.angle, positions, id });
+            let stride = self.stride();
+            let next = match self.next.places {
+                Places::Grid => &mut self.next.id,
+                Places::Special => &mut self.next.special_id,
+            };
+            let id = *next;
+            *next += positions.len() as u64 * stride;
+            if !positions.is_empty() {
+                items.push(Item {
+                    site: self.next.site,
+                    places: self.next.places,
+                    angle: self.next.angle,
+                    positions,
+                    id,
+                });
+            }
             self.next.position = end;
-            if end == site.positions.len() {
+            if end == count {
                 (self.next.angle, self.next.position) = (self.next.angle + 1, 0);
             }
         }
@@ -380,23 +450,33 @@ fn chosen_faces(part: &Part, options: &ProposeOptions) -> Result<Option<Vec<bool
     Ok(Some(chosen))
 }
 
-fn choose(
-    all: Vec<FacePair>,
-    reach: [f64; 2],
-    chosen: Option<&[bool]>,
-    pairs: &mut Vec<FacePair>,
-    tally: &mut Tally,
-) {
-    for pair in all {
-        let chosen = |face: u32| chosen.is_none_or(|chosen| chosen[face as usize]);
-        let reason = if !(reach[0]..=reach[1]).contains(&pair.width) {
-            Rejection::Stroke
-        } else if !chosen(pair.face_i) || !chosen(pair.face_ii) {
-            Rejection::FaceNotChosen
-        } else {
-            pairs.push(pair);
-            continue;
-        };
-        *tally.rejections.entry(reason.name()).or_default() += 1;
+/// Sorts out the face pairs.
+struct Choice<'a> {
+    /// Faces that may be touched; `None`: all.
+    chosen: Option<&'a [bool]>,
+    pairs: &'a mut Vec<FacePair>,
+    tally: &'a mut Tally,
+}
+
+impl Choice<'_> {
+    /// Takes the pairs with a width in `opened`: `stroke` but for the least opening.
+    fn take(&mut self, all: Vec<FacePair>, stroke: [f64; 2], opened: [f64; 2]) {
+        let within =
+            |[least, most]: [f64; 2], width: f64| (least - STROKE..=most + STROKE).contains(&width);
+        for pair in all {
+            let chosen = |face: u32| self.chosen.is_none_or(|chosen| chosen[face as usize]);
+            let reason = if !within(stroke, pair.width) {
+                self.tally.note_width(pair.width, stroke);
+                Rejection::Stroke
+            } else if !within(opened, pair.width) {
+                Rejection::OpeningTooSmall
+            } else if !chosen(pair.face_i) || !chosen(pair.face_ii) {
+                Rejection::FaceNotChosen
+            } else {
+                self.pairs.push(pair);
+                continue;
+            };
+            *self.tally.rejections.entry(reason.name()).or_default() += 1;
+        }
     }
 }

@@ -5,13 +5,18 @@
 //! first, and split again into stretches too far apart for one pad.
 
 mod places;
+mod special;
 
 use glam::{DMat3, DVec2, DVec3};
+use serde::{Deserialize, Serialize};
 
-use places::{angles, main_direction, positions};
+use places::{angles, main_direction, positions, straight_edges};
+use special::{Landmarks, Posture};
 
+use super::environment::Environment;
 use super::options::ProposeOptions;
 use super::patch::PatchIndex;
+use crate::clash::{Motion, Sweep, sweeps};
 use crate::error::{Error, Result};
 use crate::geometry::polygon::{self, Bounds2, rings};
 use crate::geometry::{UnionFind, contains, overlay};
@@ -27,6 +32,16 @@ const SAME_DIRECTION: f64 = 1e-6;
 const SAME_PLANE: f64 = 2e-5;
 /// At most this many positions on one site; more is a slip of the unit.
 const MOST_POSITIONS: f64 = 2e7;
+
+/// Which places of a site.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub(super) enum Places {
+    /// Those tried at every angle.
+    #[default]
+    Grid,
+    /// Those of one angle.
+    Special,
+}
 
 /// A stretch of two facing planes.
 #[derive(Debug)]
@@ -51,11 +66,17 @@ pub(super) struct Site {
     pub(super) flush: f64,
     /// Area in which the two planes' faces overlap [m^2].
     pub(super) overlap: f64,
-    /// Grip origins, in the site's `(x, y)` [m].
+    /// Faces that pads may touch: the gripped ones and others in the same planes.
+    pub(super) touched: [Vec<u32>; 2],
+    /// Size of the overlap along the site's `x` and `y` [m].
+    pub(super) extent: DVec2,
+    /// Grip origins tried at every angle, in the site's `(x, y)` [m]: the grid and some points.
     pub(super) positions: Vec<DVec2>,
+    /// Grip origins tried at one angle besides: see [`special`].
+    pub(super) special: Vec<Vec<DVec2>>,
     /// Approach angles from the site's `x` [rad].
     pub(super) angles: Vec<f64>,
-    /// Bounds of the positions.
+    /// Bounds of all positions.
     pub(super) bounds: Bounds2,
 }
 
@@ -68,38 +89,53 @@ pub(super) fn axes(direction: DVec3) -> DMat3 {
 }
 
 /// Sites and their directions, in a stable order: by falling overlap of their largest pair.
+/// `chosen`: the faces that may be touched; `None`: all.
 pub(super) fn sites(
     part: &Part,
     gripper: &Gripper,
     options: &ProposeOptions,
+    environment: &Environment,
     pairs: &[FacePair],
+    chosen: Option<&[bool]>,
 ) -> Result<(Vec<Site>, Vec<DVec3>)> {
     let (low, high) = part.mesh.bounding_box();
     let size = (high - low).length();
     let planes = Planes::new(&part.faces, SAME_PLANE * size);
-    let mut groups: Vec<(usize, usize, PairKind, Vec<&FacePair>)> = Vec::new();
+    let mut groups: Vec<(PairKind, Vec<&FacePair>)> = Vec::new();
     let mut group_of = rustc_hash::FxHashMap::default();
     for pair in pairs {
         let (a, b) = (planes.of[pair.face_i as usize], planes.of[pair.face_ii as usize]);
-        let key = (a.min(b), a.max(b), pair.kind);
-        let group = *group_of.entry(key).or_insert_with(|| {
-            groups.push((key.0, key.1, key.2, Vec::new()));
+        let group = *group_of.entry((a.min(b), a.max(b), pair.kind)).or_insert_with(|| {
+            groups.push((pair.kind, Vec::new()));
             groups.len() - 1
         });
-        groups[group].3.push(pair);
+        groups[group].1.push(pair);
     }
-    let mut directions: Vec<DVec3> = Vec::new();
+    let centre_of_mass = part.mass_properties(1.0).centre_of_mass;
+    let mut finder = Finder {
+        part,
+        gripper,
+        options,
+        environment,
+        size,
+        centre_of_mass,
+        planes: &planes,
+        chosen,
+        directions: Vec::new(),
+    };
     let mut sites = Vec::new();
-    for (_, _, kind, pairs) in &groups {
-        sites.extend(group_sites(part, gripper, options, *kind, pairs, size, &mut directions)?);
+    for (kind, pairs) in &groups {
+        sites.extend(finder.sites(*kind, pairs)?);
     }
-    Ok((sites, directions))
+    Ok((sites, finder.directions))
 }
 
 /// Faces sorted into planes.
 struct Planes {
     /// Plane number of each face.
     of: Vec<usize>,
+    /// Faces of each plane, by its number.
+    faces: rustc_hash::FxHashMap<usize, Vec<u32>>,
 }
 
 impl Planes {
@@ -127,107 +163,243 @@ impl Planes {
                 }
             }
         }
-        Self { of }
+        let mut members: rustc_hash::FxHashMap<usize, Vec<u32>> = Default::default();
+        for face in faces.iter().filter(|face| face.reachable) {
+            members.entry(of[face.id as usize]).or_default().push(face.id);
+        }
+        Self { of, faces: members }
     }
 }
 
-fn group_sites(
-    part: &Part,
-    gripper: &Gripper,
-    options: &ProposeOptions,
-    kind: PairKind,
-    pairs: &[&FacePair],
+/// What all sites are found from.
+struct Finder<'a> {
+    part: &'a Part,
+    gripper: &'a Gripper,
+    options: &'a ProposeOptions,
+    environment: &'a Environment,
+    /// Diagonal of the part's bounding box [m].
     size: f64,
-    directions: &mut Vec<DVec3>,
-) -> Result<Vec<Site>> {
-    let face = |id: u32| &part.faces[id as usize];
-    let first = pairs[0];
-    let mut axis = (face(first.face_i).normal - face(first.face_ii).normal).normalize();
-    // Which of the two is face I is free: one sign per direction keeps the number of directions
-    // down.
-    if axis[axis.abs().max_position()] < 0.0 {
-        axis = -axis;
-    }
-    let direction = directions
-        .iter()
-        .position(|known| known.dot(axis) > 0.0 && known.cross(axis).length() < SAME_DIRECTION)
-        .unwrap_or_else(|| {
-            directions.push(axis);
-            directions.len() - 1
-        });
-    let axis = directions[direction];
-    let axes_from_part = axes(axis);
-    // Sides by the sign of the normal: pairs of one group may list their faces in either order.
-    let mut sides: [Vec<u32>; 2] = [Vec::new(), Vec::new()];
-    for id in pairs.iter().flat_map(|pair| [pair.face_i, pair.face_ii]) {
-        sides[usize::from(face(id).normal.dot(axis) < 0.0)].push(id);
-    }
-    for side in &mut sides {
-        side.sort_unstable();
-        side.dedup();
-    }
-    let patches =
-        [0, 1].map(|side| project(sides[side].iter().map(|&id| face(id)), &axes_from_part));
-    let overlap = overlay::intersect(&patches[0], &patches[1]);
-    let bounds = Bounds2::of(&gripper.pad);
-    let reach = gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
-    let spacing = options.spacing(gripper);
-    let centre = axes_from_part * part.mass_properties(1.0).centre_of_mass;
+    /// Of the part [m].
+    centre_of_mass: DVec3,
+    planes: &'a Planes,
+    chosen: Option<&'a [bool]>,
+    /// Closing directions so far.
+    directions: Vec<DVec3>,
+}
 
-    let mut found = Vec::new();
-    for overlap in stretches(overlap, 2.0 * reach) {
-        let turn = main_direction(&overlap);
-        let middle = {
-            let turned = Bounds2::of(
-                &overlap
-                    .iter()
-                    .flat_map(|polygon| &polygon.outer)
-                    .map(|&point| DVec2::from_angle(-turn).rotate(point))
-                    .collect::<Vec<_>>(),
-            );
-            DVec2::from_angle(turn).rotate(turned.centre())
-        };
-        let heights = heights(face(sides[0][0]), face(sides[1][0]), &axes_from_part, middle);
-        let mid_height = (heights[0] + heights[1]) / 2.0;
-        let origin = middle.extend(mid_height);
-        let cells = polygon::bounds(&overlap).size() / spacing;
-        if cells.element_product() > MOST_POSITIONS {
-            let problem = format!(
-                "{spacing} m makes {:.0} positions on one face pair",
-                cells.element_product()
-            );
-            return Err(Error::input("spacing", problem, "choose a larger step"));
+impl Finder<'_> {
+    /// The sites of pairs whose planes coincide.
+    fn sites(&mut self, kind: PairKind, pairs: &[&FacePair]) -> Result<Vec<Site>> {
+        let (part, gripper, options, size) = (self.part, self.gripper, self.options, self.size);
+        let (direction, sides) = self.sides(pairs);
+        let face = |id: u32| &part.faces[id as usize];
+        let axis = self.directions[direction];
+        let axes_from_part = axes(axis);
+        let patches =
+            [0, 1].map(|side| project(sides[side].iter().map(|&id| face(id)), &axes_from_part));
+        let overlap = overlay::intersect(&patches[0], &patches[1]);
+        let bounds = Bounds2::of(&gripper.pad);
+        let reach = gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
+        let spacing = options.spacing(gripper);
+        let centre = axes_from_part * self.centre_of_mass;
+
+        let mut found = Vec::new();
+        for overlap in stretches(overlap, 2.0 * reach) {
+            let turn = main_direction(&overlap);
+            let middle = {
+                let turned = Bounds2::of(
+                    &overlap
+                        .iter()
+                        .flat_map(|polygon| &polygon.outer)
+                        .map(|&point| DVec2::from_angle(-turn).rotate(point))
+                        .collect::<Vec<_>>(),
+                );
+                DVec2::from_angle(turn).rotate(turned.centre())
+            };
+            let heights = heights(face(sides[0][0]), face(sides[1][0]), &axes_from_part, middle);
+            let mid_height = (heights[0] + heights[1]) / 2.0;
+            let origin = middle.extend(mid_height);
+            let cells = polygon::bounds(&overlap).size() / spacing;
+            if cells.element_product() > MOST_POSITIONS {
+                let problem = format!(
+                    "{spacing} m makes {:.0} positions on one face pair",
+                    cells.element_product()
+                );
+                return Err(Error::input("spacing", problem, "choose a larger step"));
+            }
+            let local: Patch =
+                overlap.iter().map(|polygon| to_site(polygon, middle, turn)).collect();
+            let rise =
+                rise(&sides, part, &axes_from_part, axis, &overlap, heights) + SAME_PLANE * size;
+            let centre_of_mass = DVec2::from_angle(-turn).rotate(centre.truncate() - middle);
+            let (positions, grid) =
+                positions(&local, spacing, bounds.size().max_element() / 2.0, centre_of_mass);
+            let edges = straight_edges(&local);
+            let angles = angles(&edges, options, bounds.size().min_element());
+            let frame = Frame {
+                rotation: axes_from_part.transpose() * DMat3::from_rotation_z(turn),
+                origin: axes_from_part.transpose() * origin,
+            };
+            let mut site = Site {
+                kind,
+                part_from_site: frame,
+                width: (heights[0] - heights[1]).abs(),
+                direction,
+                origin,
+                turn,
+                faces: sides.clone(),
+                touched: sides.clone(),
+                rise,
+                flush: SAME_PLANE * size,
+                overlap: polygon::patch_area(&local),
+                extent: grid.bounds.size(),
+                bounds: Bounds2::of(&positions),
+                positions,
+                special: vec![Vec::new(); angles.len()],
+                angles,
+            };
+            let landmarks = Landmarks {
+                overlap: &local,
+                grid: &grid,
+                positions: &site.positions,
+                edges: &edges,
+                points: [
+                    centre_of_mass,
+                    polygon::patch_moments(&local).centroid,
+                    grid.bounds.centre(),
+                ],
+            };
+            site.special = self.special(&site, &landmarks);
+            site.bounds = special::bounds(&site.special)
+                .map_or(site.bounds, |bounds| bounds.union(site.bounds));
+            site.touched = self.touched(&site, reach);
+            found.push(site);
         }
-        let local: Patch = overlap.iter().map(|polygon| to_site(polygon, middle, turn)).collect();
-        let rise = rise(&sides, part, &axes_from_part, axis, &overlap, heights) + SAME_PLANE * size;
-        let centre_of_mass = DVec2::from_angle(-turn).rotate(centre.truncate() - middle);
-        let positions =
-            positions(&local, spacing, bounds.size().max_element() / 2.0, centre_of_mass);
-        let angles = angles(&local, options, bounds.size().min_element());
-        let frame = Frame {
-            rotation: axes_from_part.transpose() * DMat3::from_rotation_z(turn),
-            origin: axes_from_part.transpose() * origin,
-        };
-        found.push(Site {
-            kind,
-            part_from_site: frame,
-            width: (heights[0] - heights[1]).abs(),
-            direction,
-            origin,
-            turn,
-            faces: sides.clone(),
-            rise,
-            flush: SAME_PLANE * size,
-            overlap: polygon::patch_area(&local),
-            bounds: Bounds2::of(&positions),
-            positions,
-            angles,
-        });
+        Ok(found)
     }
-    Ok(found)
+
+    /// Index of the closing direction of pairs, and their faces by the side that they lie on.
+    fn sides(&mut self, pairs: &[&FacePair]) -> (usize, [Vec<u32>; 2]) {
+        let face = |id: u32| &self.part.faces[id as usize];
+        let first = pairs[0];
+        let mut axis = (face(first.face_i).normal - face(first.face_ii).normal).normalize();
+        // Which of the two is face I is free: one sign per direction keeps the number of directions
+        // down.
+        if axis[axis.abs().max_position()] < 0.0 {
+            axis = -axis;
+        }
+        let known =
+            |known: &DVec3| known.dot(axis) > 0.0 && known.cross(axis).length() < SAME_DIRECTION;
+        let direction = self.directions.iter().position(known).unwrap_or_else(|| {
+            self.directions.push(axis);
+            self.directions.len() - 1
+        });
+        let axis = self.directions[direction];
+        // Sides by the sign of the normal: pairs of one group may list their faces in either order.
+        let mut sides: [Vec<u32>; 2] = [Vec::new(), Vec::new()];
+        for id in pairs.iter().flat_map(|pair| [pair.face_i, pair.face_ii]) {
+            sides[usize::from(face(id).normal.dot(axis) < 0.0)].push(id);
+        }
+        for side in &mut sides {
+            side.sort_unstable();
+            side.dedup();
+        }
+        (direction, sides)
+    }
+
+    /// The special places of a site at each angle from which it may be approached.
+    fn special(&self, site: &Site, landmarks: &Landmarks<'_>) -> Vec<Vec<DVec2>> {
+        let ways: &[Jaws] =
+            if self.gripper.is_symmetric() { &[Jaws::Straight] } else { &Jaws::BOTH };
+        let ways: Vec<(Vec<DVec2>, Vec<Sweep>)> = ways
+            .iter()
+            .map(|&jaws| {
+                let motion = site.motion(self.gripper, self.options, self.options.approach, jaws);
+                let pad = super::work::oriented(&self.gripper.pad, jaws);
+                (pad, sweeps(self.gripper, &motion))
+            })
+            .collect();
+        let mut room = special::Room::default();
+        site.angles
+            .iter()
+            .map(|&angle| {
+                let mut found = Vec::new();
+                let frame = super::work::frame(site, DVec2::ZERO, angle);
+                if self.environment.allows(super::work::approach(&frame)) {
+                    for (pad, sweeps) in &ways {
+                        let borders =
+                            self.environment.borders(sweeps, &site.part_from_site, &frame);
+                        let posture = Posture { angle, pad, sweeps, borders: &borders };
+                        landmarks.places(&posture, &mut room, &mut found);
+                    }
+                }
+                found
+            })
+            .collect()
+    }
+
+    /// The faces that pads at a site may touch: those of its pairs, and others in the same planes
+    /// within reach of a pad.
+    fn touched(&self, site: &Site, reach: f64) -> [Vec<u32>; 2] {
+        let region = site.bounds.grown(reach);
+        let near = |&id: &u32| {
+            let face = &self.part.faces[id as usize];
+            let place = |&point: &DVec2| {
+                let point = face.part_from_face.point(point.extend(0.0));
+                site.part_from_site.point_inverse(point).truncate()
+            };
+            let outline: Vec<DVec2> =
+                face.polygons.iter().flat_map(|polygon| &polygon.outer).map(place).collect();
+            self.chosen.is_none_or(|chosen| chosen[id as usize])
+                && Bounds2::of(&outline).meets(region)
+        };
+        [0, 1].map(|side: usize| {
+            let mut faces = site.faces[side].clone();
+            let plane = self.planes.of[faces[0] as usize];
+            let others = self.planes.faces.get(&plane).map_or(&[][..], Vec::as_slice);
+            let others: Vec<u32> =
+                others.iter().filter(|id| !faces.contains(id)).copied().filter(near).collect();
+            faces.extend(others);
+            faces.sort_unstable();
+            faces
+        })
+    }
 }
 
 impl Site {
+    /// Places at an angle: those of the grid, or the special ones.
+    pub(super) fn places(&self, kind: Places, angle: usize) -> &[DVec2] {
+        match kind {
+            Places::Grid => &self.positions,
+            Places::Special => &self.special[angle],
+        }
+    }
+
+    /// How the jaws move on to the site's faces.
+    pub(super) fn motion(
+        &self,
+        gripper: &Gripper,
+        options: &ProposeOptions,
+        approach: f64,
+        jaws: Jaws,
+    ) -> Motion {
+        let [least, most] = gripper.stroke;
+        let room = match self.kind {
+            PairKind::External => most - self.width,
+            PairKind::Internal => self.width - 2.0 * gripper.outer_pad.unwrap_or(0.0) - least,
+        };
+        Motion {
+            kind: self.kind,
+            width: self.width,
+            opening: options.opening.min(room / 2.0).max(0.0),
+            touch: self.rise,
+            flush: self.flush,
+            clearance: options.clearance,
+            approach,
+            jaws,
+        }
+    }
+
     /// The two gripped planes' faces, indexed in the site's `(x, y)` for pads that reach `reach`
     /// from their origin; only one when both are the same.
     pub(super) fn patches(
@@ -237,7 +409,7 @@ impl Site {
         reach: f64,
     ) -> Vec<PatchIndex> {
         let [side_i, side_ii] = [0, 1].map(|side| -> Patch {
-            let faces = self.faces[side].iter().map(|&id| &part.faces[id as usize]);
+            let faces = self.touched[side].iter().map(|&id| &part.faces[id as usize]);
             project(faces, axes_from_part)
                 .iter()
                 .map(|polygon| to_site(polygon, self.origin.truncate(), self.turn))

@@ -11,8 +11,8 @@ use super::patch::{PatchIndex, Scratch, Touch, TurnedPad};
 use super::proposer::{Item, Prepared, Proposer};
 use super::site::Site;
 use crate::clash::{Phase, Sweep, Tree};
-use crate::geometry::polygon;
-use crate::gripper::{Jaws, half_turn};
+use crate::geometry::{clip_ring_convex, polygon, ring_area};
+use crate::gripper::{Jaws, half_turn, rectangle};
 use crate::model::{Contact, Frame, Grip, Patch, Polygon, Ring};
 use crate::part::PairKind;
 
@@ -85,11 +85,11 @@ impl Proposer<'_> {
             outcome.candidates += item.positions.len() as u64;
             self.survivors(item, prepared, tree, jaws, buffers, &mut outcome);
             let site = prepared.site;
-            let angle = site.angles[item.angle];
+            let (angle, places) = (site.angles[item.angle], site.places(item.places, item.angle));
             let pad = TurnedPad::new(&oriented(&self.gripper.pad, jaws), angle);
             let alive = std::mem::take(&mut buffers.alive);
             for &index in &alive {
-                let place = site.positions[item.positions.start + index as usize];
+                let place = places[item.positions.start + index as usize];
                 let contact = self.contact(
                     &prepared.patches,
                     &pad,
@@ -147,7 +147,7 @@ impl Proposer<'_> {
     ) {
         let site = prepared.site;
         let angle = site.angles[item.angle];
-        let positions = &site.positions[item.positions.clone()];
+        let positions = &site.places(item.places, item.angle)[item.positions.clone()];
         let mut reject = |reason: Rejection, count: usize| {
             if count > 0 {
                 outcome.rejections.push((reason, count as u64));
@@ -176,23 +176,31 @@ impl Proposer<'_> {
         }
 
         let pad = TurnedPad::new(&oriented(&self.gripper.pad, jaws), angle);
-        let floor = self.contact_floor(site, pad.area());
+        let floor = self.contact_floor(site, &pad);
         buffers.whole.clear();
         buffers.whole.resize(positions.len(), [true; 2]);
         let (scratch, whole) = (&mut buffers.scratch, &mut buffers.whole);
+        let mut small_on_pad = 0;
         let lost = keep(&mut buffers.alive, &mut |index| {
-            prepared.patches.iter().enumerate().all(|(side, patch)| {
+            let mut least = f64::INFINITY;
+            for (side, patch) in prepared.patches.iter().enumerate() {
                 match patch.touch(&pad, positions[index as usize], &mut scratch[side]) {
-                    Touch::Empty => false,
-                    Touch::Whole => true,
+                    Touch::Empty => return false,
+                    Touch::Whole => {}
                     Touch::Part(area) => {
                         whole[index as usize][side] = false;
-                        area >= floor
+                        least = least.min(area);
+                        if area < floor[0] {
+                            return false;
+                        }
                     }
                 }
-            })
+            }
+            small_on_pad += usize::from(least < floor[1]);
+            least >= floor[1]
         });
-        reject(Rejection::ContactTooSmall, lost);
+        reject(Rejection::ContactTooSmall, lost - small_on_pad);
+        reject(Rejection::PadShareTooSmall, small_on_pad);
 
         if !self.environment.is_empty() {
             let sweeps = &prepared.outer_sweeps[jaws as usize];
@@ -235,10 +243,14 @@ impl Proposer<'_> {
         buffers.alive.sort_unstable();
     }
 
-    /// Smallest contact area at a site [m^2]; reached up to rounding is enough.
-    pub(super) fn contact_floor(&self, site: &Site, pad: f64) -> f64 {
-        (self.options.min_contact * pad.min(site.overlap)).max(self.options.min_pad_share * pad)
-            * (1.0 - 1e-9)
+    /// Smallest contact areas at a site [m^2] by `min_contact` and by `min_pad_share`; reached up to
+    /// rounding is enough.
+    pub(super) fn contact_floor(&self, site: &Site, pad: &TurnedPad) -> [f64; 2] {
+        // No more of the pad than its overlap with the faces' bounds, middle over middle.
+        let bounds = rectangle(site.extent);
+        let most = ring_area(&clip_ring_convex(&pad.centred(), &bounds)).min(site.overlap);
+        [self.options.min_contact * most, self.options.min_pad_share * pad.area()]
+            .map(|floor| floor * (1.0 - 1e-9))
     }
 
     /// The part in the grip axes of a site at an angle.

@@ -226,7 +226,9 @@ fn compare(seed: u64, wanted: u64) -> (u64, u64, u64) {
         assert_eq!(rejected + grips.len() as u64, proposer.candidates());
         let pad_area = Bounds2::of(&gripper.pad).size().element_product();
         let mut pose = 0;
-        for site in &sites {
+        // The places of all grids first, then the special ones.
+        let both = sites.iter().map(|site| (site, false)).chain(sites.iter().map(|s| (s, true)));
+        for (site, special) in both {
             // 2e-5 of the part's diagonal, and what the faces' tilt takes, which the pads' rubber
             // takes up.
             assert!(
@@ -238,8 +240,8 @@ fn compare(seed: u64, wanted: u64) -> (u64, u64, u64) {
             let corners: Vec<[DVec3; 3]> = (0..part.mesh.triangles.len() as u32)
                 .map(|index| part.mesh.corners(index))
                 .collect();
-            for &angle in &site.angles {
-                for &position in &site.positions {
+            for (&angle, own) in site.angles.iter().zip(&site.special) {
+                for &position in if special { own } else { &site.positions } {
                     let orientations = if symmetric { 1 } else { 2 };
                     for flip in 0..orientations {
                         let id = pose * orientations + flip;

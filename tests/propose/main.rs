@@ -6,5 +6,6 @@ mod bodies;
 mod interference;
 mod options;
 mod parts;
+mod places;
 #[path = "../support/mod.rs"]
 mod support;

@@ -373,9 +373,12 @@ fn explanations_agree_with_the_run() {
         proposer.by_ref().flat_map(|chunk| chunk.grips).map(|grip| (grip.id, grip)).collect();
     let mut counts = std::collections::BTreeMap::<String, u64>::new();
     let mut id = 0;
-    for site in proposer.sites() {
-        for &angle in &site.angles {
-            for &position in &site.positions {
+    // The places of all grids first, then the special ones.
+    let sites = proposer.sites();
+    let both = sites.iter().map(|site| (site, false)).chain(sites.iter().map(|site| (site, true)));
+    for (site, special) in both {
+        for (&angle, own) in site.angles.iter().zip(&site.special) {
+            for &position in if special { own } else { &site.positions } {
                 let explanation =
                     proposer.explain(site.site, position, angle, Jaws::Straight).unwrap();
                 assert_eq!(

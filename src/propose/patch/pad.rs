@@ -46,6 +46,11 @@ impl TurnedPad {
         Self { area: ring_area(&ring), window, sides, bounds, ring }
     }
 
+    /// The outline with the middle of its bounds at the origin.
+    pub(in crate::propose) fn centred(&self) -> Ring {
+        self.ring.iter().map(|&point| point - self.bounds.centre()).collect()
+    }
+
     pub(in crate::propose) fn area(&self) -> f64 {
         self.area
     }

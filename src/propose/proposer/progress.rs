@@ -35,7 +35,12 @@ impl Proposer<'_> {
     pub fn resume(&mut self, progress: &Progress) -> Result<()> {
         let Progress { next, corners, tally } = progress;
         let there = match self.sites.get(next.site) {
-            Some(site) => next.angle <= site.angles.len() && next.position <= site.positions.len(),
+            Some(site) => {
+                next.angle <= site.angles.len()
+                    && (next.position == 0
+                        || next.angle < site.angles.len()
+                            && next.position <= site.places(next.places, next.angle).len())
+            }
             None => next.site == self.sites.len(),
         };
         if !(there

@@ -5,33 +5,37 @@ use glam::DVec2;
 use super::super::options::ProposeOptions;
 use super::super::patch::PatchIndex;
 use crate::geometry::contains;
-use crate::geometry::polygon::{self, rings};
+use crate::geometry::polygon::{self, Bounds2, rings};
 use crate::model::Polygon;
 
 /// Corners of the overlap that turn by less are points of a tessellated curve, not places of their
 /// own.
 const CORNER: f64 = 20.0 * std::f64::consts::PI / 180.0;
+/// Corners that turn by less are points of one line [rad].
+const COLLINEAR: f64 = 1e-3;
+/// Chords of a tessellated curve turn by less than this: twelve make a circle.
+const CHORD: f64 = 31.0 * std::f64::consts::PI / 180.0;
+/// Chords of one curve are no shorter than this share of each other.
+const SHORT: f64 = 0.5;
 /// At most this many corners of one site become positions.
 const MOST_CORNERS: usize = 200;
 /// At most this many edge directions of one site become approach angles (four each).
 const MOST_EDGE_DIRECTIONS: usize = 4;
 
-/// Directions of the boundary modulo a right angle, in `(-45, 45]` degrees, with the length that
-/// runs along each, longest first.
-fn edge_directions(patch: &[Polygon]) -> Vec<(f64, f64)> {
+/// Directions of edges modulo a right angle, in `(-45, 45]` degrees, with the length that runs along
+/// each, longest first.
+fn edge_directions(edges: impl Iterator<Item = DVec2>) -> Vec<(f64, f64)> {
     let right_angle = std::f64::consts::FRAC_PI_2;
-    let mut found: Vec<(f64, f64)> = Vec::new();
-    for ring in patch.iter().flat_map(rings) {
-        for (&a, &b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
-            let length = a.distance(b);
+    let mut found: Vec<(f64, f64)> = edges
+        .map(|edge| {
             // Rounding must not move an edge at 45 degrees to the other end of the interval.
-            let mut angle = (b - a).to_angle().rem_euclid(right_angle);
+            let mut angle = edge.to_angle().rem_euclid(right_angle);
             if angle > right_angle / 2.0 + 1e-6 {
                 angle -= right_angle;
             }
-            found.push((angle, length));
-        }
-    }
+            (angle, edge.length())
+        })
+        .collect();
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut merged: Vec<(f64, f64)> = Vec::new();
     for (angle, length) in found {
@@ -52,23 +56,78 @@ fn edge_directions(patch: &[Polygon]) -> Vec<(f64, f64)> {
     merged
 }
 
+/// A straight edge of a face.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Edge {
+    /// Unit outward normal.
+    pub(super) normal: DVec2,
+    /// The edge lies where `normal . x = offset` [m].
+    pub(super) offset: f64,
+    /// Length [m].
+    pub(super) length: f64,
+}
+
+/// The edges of a boundary that are straight in the part itself, longest first: no chords of
+/// a tessellated curve.
+pub(super) fn straight_edges(patch: &[Polygon]) -> Vec<Edge> {
+    let mut found = Vec::new();
+    for ring in patch.iter().flat_map(rings) {
+        // Chords along one line are one edge.
+        let turn = |a: DVec2, b: DVec2, c: DVec2| (b - a).angle_to(c - b);
+        let corners: Vec<DVec2> = (0..ring.len())
+            .filter(|&index| {
+                let before = ring[(index + ring.len() - 1) % ring.len()];
+                turn(before, ring[index], ring[(index + 1) % ring.len()]).abs() > COLLINEAR
+            })
+            .map(|index| ring[index])
+            .collect();
+        let count = corners.len();
+        let corner = |index: usize| corners[index % count];
+        let length = |index: usize| corner(index).distance(corner(index + 1));
+        for index in 0..count {
+            let (a, b) = (corner(index), corner(index + 1));
+            // A chord of a curve turns little into a neighbour that is no shorter by much; a
+            // straight edge ends in a corner, or in chords that are much shorter.
+            let ends = [
+                (turn(corner(index + count - 1), a, b), length(index + count - 1)),
+                (turn(a, b, corner(index + 2)), length(index + 1)),
+            ];
+            let chord =
+                ends.iter().any(|&(turn, next)| turn.abs() < CHORD && next > SHORT * length(index));
+            if !chord && a != b {
+                let normal = -(b - a).perp().normalize_or_zero();
+                found.push(Edge { normal, offset: normal.dot(a), length: a.distance(b) });
+            }
+        }
+    }
+    found.sort_by(|a, b| b.length.total_cmp(&a.length));
+    found
+}
+
 /// Angle of the site's `x` in the axes of the direction: along the boundary's main direction, when
 /// it has one.
 pub(super) fn main_direction(overlap: &[Polygon]) -> f64 {
-    let perimeter: f64 = edge_directions(overlap).iter().map(|direction| direction.1).sum();
-    match edge_directions(overlap).first() {
+    let segments = overlap
+        .iter()
+        .flat_map(rings)
+        .flat_map(|ring| ring.iter().zip(ring.iter().cycle().skip(1)).map(|(&a, &b)| b - a));
+    let directions = edge_directions(segments);
+    let perimeter: f64 = directions.iter().map(|direction| direction.1).sum();
+    match directions.first() {
         Some(&(angle, length)) if length > 0.15 * perimeter => angle,
         _ => 0.0,
     }
 }
 
-/// Approach angles: uniform, and along the site's edges, which the uniform ones may miss.
-pub(super) fn angles(overlap: &[Polygon], options: &ProposeOptions, pad: f64) -> Vec<f64> {
+/// Approach angles: uniform, and along the site's straight edges, which the uniform ones may miss.
+pub(super) fn angles(edges: &[Edge], options: &ProposeOptions, pad: f64) -> Vec<f64> {
     let turn = std::f64::consts::TAU;
     let count = (turn / options.angle_step).round().max(1.0) as usize;
     let mut angles: Vec<f64> = (0..count).map(|index| turn * index as f64 / count as f64).collect();
     if options.edge_angles {
-        let long = edge_directions(overlap).into_iter().filter(|direction| direction.1 > pad / 2.0);
+        let long = edge_directions(edges.iter().map(|edge| edge.normal.perp() * edge.length))
+            .into_iter()
+            .filter(|direction| direction.1 > pad / 2.0);
         for (direction, _) in long.take(MOST_EDGE_DIRECTIONS) {
             for quarter in 0..4 {
                 let angle = (direction + f64::from(quarter) * turn / 4.0).rem_euclid(turn);
@@ -85,6 +144,29 @@ pub(super) fn angles(overlap: &[Polygon], options: &ProposeOptions, pad: f64) ->
     angles
 }
 
+/// The grid of a site.
+#[derive(Debug)]
+pub(super) struct Grid {
+    /// Of the faces' overlap.
+    pub(super) bounds: Bounds2,
+    /// Its step [m].
+    pub(super) spacing: f64,
+    /// Steps to either side of the middle.
+    half: DVec2,
+    /// Its places, the first of the site's positions.
+    pub(super) count: usize,
+}
+
+impl Grid {
+    /// Whether `point` lies within `near` of one of its places, or of one left out for being far
+    /// from the faces.
+    pub(super) fn is_near(&self, point: DVec2, near: f64) -> bool {
+        let steps = (point - self.bounds.centre()) / self.spacing;
+        (steps - steps.round()).length() * self.spacing < near
+            && steps.abs().cmple(self.half + 1e-3).all()
+    }
+}
+
 /// A grid over the overlap, its corners and centroids, and the point nearest the centre of mass.
 /// `reach` is half the pad's longer side: where the overlap is lower than the pad, the grid goes on
 /// beyond its edges until the pad leaves as much of it uncovered as it covers: a low wall is held
@@ -94,7 +176,7 @@ pub(super) fn positions(
     spacing: f64,
     reach: f64,
     centre_of_mass: DVec2,
-) -> Vec<DVec2> {
+) -> (Vec<DVec2>, Grid) {
     let bounds = polygon::bounds(overlap);
     let index = PatchIndex::new(overlap.to_vec(), bounds.grown(1.6 * reach), reach / 2.0);
     let beyond = (DVec2::splat(2.0 * reach) - bounds.size()).max(DVec2::ZERO) / 2.0;
@@ -113,6 +195,7 @@ pub(super) fn positions(
         }
         y += 1.0;
     }
+    let grid = Grid { bounds, spacing, half, count: positions.len() };
     let mut extra: Vec<DVec2> = Vec::new();
     extra.push(nearest(overlap, centre_of_mass));
     extra.push(polygon::patch_moments(overlap).centroid);
@@ -132,14 +215,10 @@ pub(super) fn positions(
         extra.extend(corners);
     }
     let near = 1e-4 * spacing;
-    let on_grid = |point: DVec2| {
-        let steps = (point - bounds.centre()) / spacing;
-        (steps - steps.round()).length() * spacing < near && steps.abs().cmple(half + 1e-3).all()
-    };
     for point in extra {
         let useful = point.is_finite() && !index.is_far(point, reach / 2.0);
         if useful
-            && !on_grid(point)
+            && !grid.is_near(point, near)
             && !positions
                 .iter()
                 .rev()
@@ -149,7 +228,7 @@ pub(super) fn positions(
             positions.push(point);
         }
     }
-    positions
+    (positions, grid)
 }
 
 /// The point of the patch nearest to `point`.
@@ -182,7 +261,7 @@ mod tests {
     #[test]
     fn positions_cover_a_rectangle_and_its_special_points() {
         let face = [shape(rectangle(DVec2::new(0.1, 0.04)))];
-        let found = positions(&face, 0.01, 0.01, DVec2::new(0.2, 0.003));
+        let (found, _) = positions(&face, 0.01, 0.01, DVec2::new(0.2, 0.003));
         // 11 x 5 grid points, corners among them; the point nearest the centre of mass is not
         assert_eq!(found.len(), 56, "{found:?}");
         assert!(found.iter().any(|point| point.distance(DVec2::new(0.05, 0.003)) < 1e-12));
@@ -192,7 +271,7 @@ mod tests {
     fn a_low_face_is_held_from_beyond_its_edges() {
         // 6 mm high, pads of 20 mm: their middles go on for 7 mm above and below.
         let face = [shape(rectangle(DVec2::new(0.1, 0.006)))];
-        let found = positions(&face, 1e-3, 0.01, DVec2::ZERO);
+        let (found, _) = positions(&face, 1e-3, 0.01, DVec2::ZERO);
         let highest = found.iter().map(|point| point.y).fold(0.0, f64::max);
         assert!((highest - 0.010).abs() < 1e-9, "{highest}");
         assert!(found.iter().all(|point| point.x.abs() < 0.05 + 1e-9));
@@ -202,7 +281,7 @@ mod tests {
     fn positions_leave_out_what_no_pad_reaches() {
         let corners = [(-1., -1.), (1., -1.), (1., -0.9), (-0.9, -0.9), (-0.9, 1.), (-1., 1.)];
         let l_shape = [shape(corners.iter().map(|&(x, y)| DVec2::new(x, y)).collect())];
-        let found = positions(&l_shape, 0.05, 0.1, DVec2::ZERO);
+        let (found, _) = positions(&l_shape, 0.05, 0.1, DVec2::ZERO);
         assert!(found.len() > 200 && found.len() < 900, "{}", found.len());
         assert!(!found.iter().any(|point| point.min_element() > -0.5));
     }
@@ -229,7 +308,41 @@ mod tests {
         )];
         let options =
             ProposeOptions { angle_step: std::f64::consts::FRAC_PI_2, ..ProposeOptions::default() };
-        let found = angles(&square, &options, 0.5);
+        let found = angles(&straight_edges(&square), &options, 0.5);
         assert_eq!(found.len(), 8, "{found:?}");
+    }
+
+    #[test]
+    fn straight_edges_are_told_from_the_chords_of_fillets() {
+        // A rectangle of 40 x 20 mm with rounded corners, by chords of 15 or 30 degrees.
+        let rounded = |chords: u32| {
+            let quarter = std::f64::consts::FRAC_PI_2;
+            let mut ring = Vec::new();
+            for (k, (x, y)) in
+                [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].iter().enumerate()
+            {
+                for step in 0..=chords {
+                    let angle = quarter * (k as f64 + f64::from(step) / f64::from(chords));
+                    ring.push(DVec2::new(0.015 * x, 0.005 * y) + DVec2::from_angle(angle) * 0.005);
+                }
+            }
+            [shape(ring)]
+        };
+        for chords in [3, 6, 24] {
+            let edges = straight_edges(&rounded(chords));
+            let lengths: Vec<f64> = edges.iter().map(|edge| (edge.length * 1e5).round()).collect();
+            assert_eq!(lengths, [3000.0, 3000.0, 1000.0, 1000.0], "{chords}");
+            assert!((edges[0].offset - 0.01).abs() < 1e-12 && edges[0].normal.y.abs() > 0.999);
+        }
+        // Circles have none, a hexagon has six; points along an edge do not divide it.
+        let ring = |count: u32| {
+            let step = std::f64::consts::TAU / f64::from(count);
+            [shape((0..count).map(|k| DVec2::from_angle(f64::from(k) * step)).collect())]
+        };
+        assert!(straight_edges(&ring(12)).is_empty() && straight_edges(&ring(90)).is_empty());
+        assert_eq!(straight_edges(&ring(6)).len(), 6);
+        let mut divided = rectangle(DVec2::new(4.0, 2.0));
+        divided.insert(1, DVec2::new(1.3, -1.0));
+        assert_eq!(straight_edges(&[shape(divided)]).len(), 4);
     }
 }
