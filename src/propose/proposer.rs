@@ -37,7 +37,7 @@ const SAME_WIDTH: f64 = 1e-5;
 const MOST_WIDTHS: usize = 5;
 
 /// Counts of a run so far.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Tally {
     /// Antiparallel face pairs within the stroke.
     pub pairs: u64,

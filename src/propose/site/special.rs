@@ -43,6 +43,9 @@ pub(super) struct Landmarks<'a> {
 struct Line {
     normal: DVec2,
     offset: f64,
+    /// Whether places all along it are tried, a grid's step apart: where it is a border of what is
+    /// free. A pad flush with an edge is not far from the grid's.
+    row: bool,
 }
 
 impl Line {
@@ -116,7 +119,7 @@ impl Landmarks<'_> {
                 }
             }
         }
-        for line in &lines {
+        for line in lines.iter().filter(|line| line.row) {
             let (middle, along) = (line.foot(self.grid.bounds.centre()), line.normal.perp());
             let mut step = -steps;
             while step <= steps {
@@ -130,7 +133,7 @@ impl Landmarks<'_> {
         let mut lines: Vec<Line> = posture
             .borders
             .iter()
-            .map(|border| Line { normal: border.normal, offset: border.offset + CLEAR })
+            .map(|border| Line { normal: border.normal, offset: border.offset + CLEAR, row: true })
             .collect();
         let turn = DVec2::from_angle(posture.angle);
         let ring = posture.pad;
@@ -147,7 +150,7 @@ impl Landmarks<'_> {
             let direction = DVec2::from_angle(-posture.angle).rotate(edge.normal);
             let reach = ring.iter().map(|point| point.dot(direction)).fold(0.0, f64::max);
             if flush < MOST_LINES {
-                lines.push(Line { normal: edge.normal, offset: edge.offset - reach });
+                lines.push(Line { normal: edge.normal, offset: edge.offset - reach, row: false });
                 flush += 1;
             }
             // What rises beyond the edge: the fingers stay clear of it. From behind they come.
@@ -161,7 +164,11 @@ impl Landmarks<'_> {
                 })
                 .fold(0.0, f64::max);
             if direction.x > -0.5 && finger > reach + STANDS_OUT && clear < MOST_LINES {
-                lines.push(Line { normal: edge.normal, offset: edge.offset - finger - CLEAR });
+                lines.push(Line {
+                    normal: edge.normal,
+                    offset: edge.offset - finger - CLEAR,
+                    row: true,
+                });
                 clear += 1;
             }
         }
