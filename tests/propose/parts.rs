@@ -144,8 +144,9 @@ fn grips_on_real_parts_look_right() {
             assert_sound(&part, &gripper, grip);
         }
         let mut ids: Vec<u64> = grips.iter().map(|grip| grip.id).collect();
+        ids.sort_unstable();
         ids.dedup();
-        assert!(ids.len() == grips.len() && ids.is_sorted());
+        assert_eq!(ids.len(), grips.len());
     }
 }
 

@@ -74,7 +74,9 @@ fn plates_on_a_table_are_gripped_from_above_at_any_spacing() {
                     .map(|grip| patch_area(&grip.contact.face_i))
                     .fold(0.0, f64::max);
                 let across: f64 = 2.0 * gripper.pad.iter().map(|p| p.y).fold(0.0, f64::max);
-                assert!((most / (covered * across) - 1.0).abs() < 1e-3, "{place}: {most}");
+                // Flush with the table a finger may lie a few micrometres in it.
+                let more = most / across - covered;
+                assert!((-2e-6..5e-6).contains(&more), "{place}: {more}");
                 for grip in &grips {
                     for body in gripper
                         .finger(Jaw::I, grip.width)

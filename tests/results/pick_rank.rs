@@ -79,6 +79,25 @@ fn scores_equal_up_to_rounding_follow_the_ids() {
 }
 
 #[test]
+fn ties_go_to_the_centre_of_mass_then_to_symmetry_then_to_the_lower_number() {
+    let com = DVec3::new(0.01, 0.0, 0.0);
+    let mut list = vec![
+        at(0, com + DVec3::Y * 0.004, 0.2),
+        at(1, com + DVec3::Y * 0.002, 0.2),
+        at(2, com - DVec3::X * 0.002, 0.2),
+        at(3, com + DVec3::Z * (0.002 + 1e-12), 0.2),
+        at(4, com, 0.2001),
+    ];
+    // The contacts of 1 lie beside the plane in which the jaws close.
+    let contact = std::sync::Arc::make_mut(&mut list[1].grip.contact);
+    for point in contact.face_i.iter_mut().flat_map(|polygon| &mut polygon.outer) {
+        point.y += 1e-3;
+    }
+    let found = rank(list, com, SIZE, &Options::default());
+    assert_eq!(ids(&found.grips), [2, 3, 1, 0, 4]);
+}
+
+#[test]
 fn duplicates_by_symmetry_are_merged_only_when_they_score_and_look_the_same() {
     let com = DVec3::new(0.001, 0.002, 0.003);
     let list = vec![

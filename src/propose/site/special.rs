@@ -20,7 +20,7 @@ const MOST_LINES: usize = 8;
 /// Lines whose directions differ by less have no crossing worth trying (sine of the angle).
 const CROSSING: f64 = 0.2;
 /// Clear of a border by this much, which rounding cannot take away [m].
-const CLEAR: f64 = 1e-9;
+const CLEAR: f64 = 1e-6;
 /// A finger that stands out beyond the pad by more is tried by itself [m].
 const STANDS_OUT: f64 = 1e-6;
 
