@@ -1,13 +1,13 @@
 //! Contact-pair files: one case, a list, `{"cases": [..]}` or JSON Lines; in SI, about the origin
 //! midway between the faces.
 
-use std::io::Read;
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
+use crate::file;
 use crate::model::{Contact, Patch, Wrench};
 
 /// One contact pair under one wrench.
@@ -52,13 +52,9 @@ const SHAPE: &str = r#"a case is {"A_I":[{"outer":[[x,y],..],"holes":[..]}],"A_I
 /// place in it.
 pub fn read(path: &Path) -> Result<Vec<Case>> {
     let text = if path == Path::new("-") {
-        let mut text = String::new();
-        std::io::stdin()
-            .read_to_string(&mut text)
-            .map_err(|error| Error::io(path, "read", error))?;
-        text
+        file::text(file::read_from(std::io::stdin().lock(), path)?, path)?
     } else {
-        std::fs::read_to_string(path).map_err(|error| Error::io(path, "read", error))?
+        file::read_text(path)?
     };
     let name = path.display().to_string();
     // A stream of JSON values covers one value as well as JSON Lines.
@@ -97,15 +93,54 @@ pub fn read(path: &Path) -> Result<Vec<Case>> {
     Ok(cases)
 }
 
+/// Keys of a case.
+const KEYS: [&str; 6] = ["A_I", "A_II", "d", "Fn", "F", "M"];
+/// Most times that the faces may be farther apart than the contact areas are wide.
+const MOST_SLENDER: f64 = 500.0;
+
+/// Refuses a key that is ours but for its case: `f` beside `F` would be taken for a note.
+fn check_keys(place: &str, value: &serde_json::Value) -> Result<()> {
+    for key in value.as_object().into_iter().flat_map(|object| object.keys()) {
+        let meant = KEYS.iter().find(|known| known.eq_ignore_ascii_case(key));
+        if let Some(meant) = meant.filter(|known| *known != key) {
+            let problem = format!("key '{}' is none of a case", key.escape_debug());
+            return Err(Error::format(place, problem, format!("write '{meant}'")));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a distance in another unit than the areas: `"d": 20` for 20 mm.
+fn check_distance(place: &str, contact: &Contact, distance: f64) -> Result<()> {
+    let points = || {
+        let polygons = contact.face_i.iter().chain(&contact.face_ii);
+        polygons.flat_map(|polygon| polygon.outer.iter().copied())
+    };
+    let (low, high) = points()
+        .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let width = (high - low).max_element();
+    if width > 0.0 && distance.abs() > MOST_SLENDER * width {
+        return Err(Error::new(
+            ErrorKind::Value,
+            place,
+            format!("d is {distance} m, but the contact areas measure {width:.3e} m"),
+            "give d in metres, as the areas",
+        ));
+    }
+    Ok(())
+}
+
 /// One case from its JSON value; `place` is file and place for messages.
 ///
 /// # Errors
 /// When the value is not of the form.
 pub fn parse(place: &str, value: serde_json::Value) -> Result<Case> {
+    check_keys(place, &value)?;
     let raw: Raw = serde_json::from_value(value)
         .map_err(|error| Error::format(place, error.to_string(), SHAPE))?;
     let id = raw.id.map(|id| id.as_str().map_or_else(|| id.to_string(), str::to_string));
     let contact = Contact { face_i: raw.a_i, face_ii: raw.a_ii };
+    check_distance(place, &contact, raw.d)?;
     Ok(Case {
         id,
         contact,

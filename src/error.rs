@@ -3,6 +3,8 @@
 
 use std::path::Path;
 
+use crate::text::{shown, shown_lines};
+
 /// Result of every fallible function of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -150,11 +152,11 @@ impl Error {
 impl std::fmt::Display for Error {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if !self.place.is_empty() {
-            write!(formatter, "{}: ", self.place)?;
+            write!(formatter, "{}: ", shown(&self.place))?;
         }
-        formatter.write_str(&self.problem)?;
+        formatter.write_str(&shown_lines(&self.problem))?;
         if !self.remedy.is_empty() {
-            write!(formatter, "\n  remedy: {}", self.remedy)?;
+            write!(formatter, "\n  remedy: {}", shown_lines(&self.remedy))?;
         }
         Ok(())
     }

@@ -1,10 +1,11 @@
-//! Files written whole or not at all.
+//! Files written whole or not at all, and read within the memory allowed.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Read, Write};
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::memory::{self, Budget};
 
 /// Writes a file so that its name never stands for a part of it: the content goes to a temporary
 /// file in the same folder, is forced to the disk and takes the name at the end. A failure or a
@@ -46,6 +47,77 @@ pub fn write(
     Ok(())
 }
 
+/// Share of the memory that a text may take by default: what is made of it takes a few times as
+/// much.
+const TEXT_SHARE: u64 = 8;
+
+/// The bytes of a file, at most an eighth of [`memory::default_limit`]; no device or folder, but a
+/// pipe.
+///
+/// # Errors
+/// When it cannot be read, is a device or folder, or is larger.
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    let failed = |source| Error::io(path, "read", source);
+    let meta = std::fs::metadata(path).map_err(failed)?;
+    if meta.is_dir() {
+        return Err(failed(std::io::ErrorKind::IsADirectory.into()));
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        if meta.file_type().is_char_device() && !is_standard_input(path) {
+            let place = path.display().to_string();
+            return Err(Error::format(place, "is a device, not a file", "name a file"));
+        }
+    }
+    read_from(File::open(path).map_err(failed)?, path)
+}
+
+/// [`read`] from an open stream that `path` names.
+///
+/// # Errors
+/// When it cannot be read or is larger.
+pub fn read_from(stream: impl Read, path: &Path) -> Result<Vec<u8>> {
+    let budget = Budget::new(Some(memory::default_limit() / TEXT_SHARE));
+    let mut bytes = Vec::new();
+    stream
+        .take(budget.limit() + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|source| Error::io(path, "read", source))?;
+    budget.hold(&path.display().to_string(), bytes.len() as u64)?;
+    Ok(bytes)
+}
+
+/// [`read`] as text.
+///
+/// # Errors
+/// As [`read`], and when it is no UTF-8.
+pub fn read_text(path: &Path) -> Result<String> {
+    text(read(path)?, path)
+}
+
+/// `bytes` of `path` as text.
+///
+/// # Errors
+/// When they are no UTF-8; the message names the line.
+pub fn text(bytes: Vec<u8>, path: &Path) -> Result<String> {
+    String::from_utf8(bytes).map_err(|error| {
+        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = valid.iter().filter(|&&byte| byte == b'\n').count() + 1;
+        Error::format(
+            format!("{}:{line}", path.display()),
+            "is not a text in UTF-8",
+            "save the file as UTF-8 text",
+        )
+    })
+}
+
+/// Standard input by its name, which a terminal may be behind.
+#[cfg(unix)]
+fn is_standard_input(path: &Path) -> bool {
+    path == Path::new("/dev/stdin") || path.starts_with("/dev/fd") || path.starts_with("/proc/self")
+}
+
 #[cfg(unix)]
 fn builder() -> tempfile::Builder<'static, 'static> {
     use std::os::unix::fs::PermissionsExt;
@@ -81,6 +153,18 @@ mod tests {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
         write(&path, |writer| writer.write_all(b"new")).unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
+    }
+
+    #[test]
+    fn what_is_no_text_or_no_file_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("in.txt");
+        std::fs::write(&path, b"one\ntwo \xff").unwrap();
+        assert_eq!(read(&path).unwrap().len(), 9);
+        assert!(read_text(&path).unwrap_err().to_string().contains("in.txt:2"));
+        assert!(read(folder.path()).is_err());
+        #[cfg(unix)]
+        assert!(read(Path::new("/dev/zero")).unwrap_err().to_string().contains("device"));
     }
 
     #[test]

@@ -10,6 +10,8 @@ use std::sync::Arc;
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
+use crate::error::{Error, ErrorKind, Result};
+
 /// A closed loop of points [m]; the last point joins the first.
 pub type Ring = Vec<DVec2>;
 
@@ -37,6 +39,48 @@ pub struct Contact {
     /// Contact area on face II (at `x3 = -d/2`).
     #[serde(rename = "A_II")]
     pub face_ii: Patch,
+}
+
+/// Largest coordinate or distance that is taken [m]. Lengths enter in the fourth power, and to
+/// rounding a millimetre is lost beyond.
+pub(crate) const LARGEST_LENGTH: f64 = 1e9;
+/// Smallest extent of a contact area that is taken [m]: its fourth power leaves room above the
+/// smallest of numbers.
+const SMALLEST_EXTENT: f64 = 1e-30;
+
+impl Contact {
+    /// Refuses coordinates that numbers of double precision cannot work with; `place` names the
+    /// contact.
+    pub(crate) fn check(&self, place: &str) -> Result<()> {
+        for (name, patch) in [("A_I", &self.face_i), ("A_II", &self.face_ii)] {
+            let rings =
+                || patch.iter().flat_map(|polygon| polygon.holes.iter().chain([&polygon.outer]));
+            let bad = |problem: String, remedy: &str| {
+                Err(Error::new(ErrorKind::Geometry, format!("{place}{name}"), problem, remedy))
+            };
+            let mut extent = 0.0_f64;
+            for point in rings().flatten() {
+                if !point.is_finite() || point.abs().max_element() > LARGEST_LENGTH {
+                    return bad(
+                        format!("has the point ({:?}, {:?})", point.x, point.y),
+                        "give finite coordinates of at most 1e9 m",
+                    );
+                }
+            }
+            for ring in rings() {
+                let Some(&first) = ring.first() else { continue };
+                extent =
+                    ring.iter().map(|x| (*x - first).abs().max_element()).fold(extent, f64::max);
+            }
+            if extent > 0.0 && extent < SMALLEST_EXTENT {
+                return bad(
+                    format!("measures {extent:e} m"),
+                    "give an area of at least 1e-30 m in one direction",
+                );
+            }
+        }
+        Ok(())
+    }
 }
 
 /// A force [N] and a moment [N m] ON the body. The frame and the point of the moment are the

@@ -4,10 +4,7 @@ use std::fmt::Write;
 
 use glam::DVec2;
 
-/// Text for the inside of an element.
-pub(crate) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
-}
+pub(crate) use crate::text::markup as escape;
 
 /// Metres as millimetres with at most this many decimals, without trailing zeros.
 pub(crate) fn millimetres(value: f64, decimals: usize) -> String {

@@ -4,6 +4,7 @@
 use glam::DVec3;
 
 use crate::error::{Error, Result};
+use crate::model::LARGEST_LENGTH;
 
 /// A kind of quantity with the units accepted for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +27,8 @@ pub enum Quantity {
     Pressure,
     /// Seconds inside.
     Time,
+    /// Bytes inside.
+    Memory,
 }
 
 /// Standard gravity [m/s^2] (exact by definition).
@@ -75,6 +78,15 @@ impl Quantity {
                 ("psi", 6_894.757_293_168),
             ],
             Self::Time => &[("s", 1.0), ("ms", 1e-3), ("min", 60.0), ("h", 3600.0)],
+            Self::Memory => &[
+                ("GB", 1e9),
+                ("MB", 1e6),
+                ("kB", 1e3),
+                ("B", 1.0),
+                ("GiB", 1073741824.0),
+                ("MiB", 1048576.0),
+                ("KiB", 1024.0),
+            ],
         }
     }
 
@@ -123,6 +135,13 @@ impl Quantity {
         } else {
             value * factor
         };
+        if self == Self::Length && si.abs() > LARGEST_LENGTH && si.is_finite() {
+            return Err(Error::input(
+                place,
+                format!("'{text}' is longer than {LARGEST_LENGTH:.0e} m"),
+                "check the number and its unit",
+            ));
+        }
         if !si.is_finite() {
             return Err(Error::input(
                 place,

@@ -157,5 +157,5 @@ pub(crate) fn read_part(
     };
     let unit =
         Unit::ALL.into_iter().find(|unit| (unit.metres() / set.part.unit_m - 1.0).abs() < 1e-9);
-    Ok(Part::read(&path, &ReadOptions { unit })?)
+    Ok(Part::read(&path, &ReadOptions { unit, ..Default::default() })?)
 }

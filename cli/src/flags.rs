@@ -2,6 +2,7 @@
 //! them.
 
 use gripfast::error::Error;
+use gripfast::units::Quantity;
 
 /// An error in full for the terminal: with its causes, less those already named, and with the flags
 /// that set the options it is about.
@@ -32,6 +33,15 @@ pub(crate) fn warning(text: &str) -> String {
         Some(unit) => format!("{text} ({} {unit})", flag("unit")),
         None => text.to_string(),
     }
+}
+
+/// The bytes that `--max-memory` states.
+pub(crate) fn memory(text: &str) -> gripfast::error::Result<u64> {
+    let bytes = Quantity::Memory.parse("--max-memory", text)?;
+    if bytes < 1.0 {
+        return Err(Error::input("--max-memory", format!("is {text}"), "give a size above zero"));
+    }
+    Ok(bytes as u64)
 }
 
 /// The flag of an option.

@@ -9,6 +9,9 @@ use comfy_table::{Table, presets};
 use gripfast::file;
 use gripfast::geometry::Bounds2;
 use gripfast::gripper::{self, Body, Gripper, Shape, catalogue, check, drawing};
+use gripfast::text::shown;
+
+use crate::terminal;
 
 /// Lists, prints and checks grippers.
 #[derive(Debug, ClapArgs)]
@@ -49,13 +52,16 @@ enum Action {
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     match args.action {
         Action::List => list()?,
-        Action::Show { gripper } => print!("{}", catalogue::text(&gripper)?),
+        Action::Show { gripper } => {
+            write!(terminal::output(), "{}", catalogue::text(&gripper)?)?;
+        }
         Action::Check { gripper, svg } => {
             let gripper = gripper::find(&gripper)?;
-            println!("{}", describe(&gripper));
+            let mut out = terminal::output();
+            writeln!(out, "{}", describe(&gripper))?;
             if let Some(path) = svg {
                 file::write(&path, |writer| writer.write_all(drawing::svg(&gripper).as_bytes()))?;
-                println!("drawing: {}", path.display());
+                writeln!(out, "drawing: {}", path.display())?;
             }
         }
     }
@@ -79,10 +85,11 @@ fn list() -> anyhow::Result<()> {
             format!("{unverified} of {}", gripper.sources.len()),
         ]);
     }
-    println!("{table}");
-    println!(
-        "`gripfast gripper check NAME` says where each value comes from; unverified ones are estimates."
-    );
+    writeln!(
+        terminal::output(),
+        "{table}\n`gripfast gripper check NAME` says where each value comes from; unverified ones are \
+         estimates."
+    )?;
     Ok(())
 }
 
@@ -96,7 +103,7 @@ fn describe(gripper: &Gripper) -> String {
                 format!("UNVERIFIED: {}", source.text)
             }
         });
-        table.add_row([key, value, source]);
+        table.add_row([key, value, source].map(|text| shown(&text).into_owned()));
     };
     row("stroke".into(), range(gripper.stroke, 1e3, "mm"));
     row("force".into(), range(gripper.force, 1.0, "N"));
@@ -131,7 +138,7 @@ fn describe(gripper: &Gripper) -> String {
     });
     let warnings: Vec<String> =
         gripper::check(gripper).iter().map(|warning| format!("\nwarning: {warning}")).collect();
-    format!("{}\n{table}{throat}{}", gripper.name, warnings.concat())
+    format!("{}\n{table}{throat}{}", shown(&gripper.name), warnings.concat())
 }
 
 fn body_text(body: &Body) -> String {

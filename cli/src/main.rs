@@ -16,6 +16,7 @@ mod report;
 mod score;
 mod shell;
 mod solve;
+mod terminal;
 mod why;
 
 use std::path::Path;
@@ -53,10 +54,23 @@ enum Command {
     Pick(pick::Args),
     Completions(shell::CompletionsArgs),
     Man(shell::ManArgs),
+    /// Reads STEP files for another process of this program.
+    #[cfg(feature = "step")]
+    #[command(name = STEP_KERNEL, hide = true)]
+    StepKernel {
+        memory: u64,
+        seconds: u64,
+    },
 }
+
+/// The hidden subcommand in which the CAD kernel runs.
+#[cfg(feature = "step")]
+const STEP_KERNEL: &str = "step-kernel";
 
 fn main() -> ExitCode {
     quiet_vulkan();
+    #[cfg(feature = "step")]
+    step_apart();
     run()
 }
 
@@ -79,15 +93,35 @@ fn run() -> ExitCode {
                 Command::Pick(args) => pick::run(args),
                 Command::Completions(args) => shell::completions(args),
                 Command::Man(args) => shell::man(args),
+                #[cfg(feature = "step")]
+                Command::StepKernel { memory, seconds } => step_kernel(memory, seconds),
             });
     match outcome {
         Ok(code) => code,
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", flags::message(&error));
+            terminal::say(&format!("error: {}", flags::message(&error)));
             ExitCode::from(2)
         }
     }
+}
+
+/// STEP files are read in a process of their own: a fault of the CAD kernel is an error there.
+#[cfg(feature = "step")]
+fn step_apart() {
+    /// Processor time for one file [s]; the largest files of our collection take some ten.
+    const SECONDS: u64 = 600;
+    if let Ok(program) = std::env::current_exe() {
+        let arguments = vec![STEP_KERNEL.to_string()];
+        gripfast::part::StepProcess { program, arguments, seconds: SECONDS }.install();
+    }
+}
+
+#[cfg(feature = "step")]
+fn step_kernel(memory: u64, seconds: u64) -> anyhow::Result<ExitCode> {
+    let (input, output) = (std::io::stdin().lock(), std::io::stdout().lock());
+    gripfast::part::serve_step(memory, seconds, input, output)?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Whether the reader of our output has gone (`gripfast .. | head`): no failure of ours.

@@ -12,7 +12,7 @@ use gripfast::part::{FacePair, Part, PlanarFace, ReadOptions, Unit, drawing};
 use gripfast::units::Quantity;
 use serde_json::json;
 
-use crate::flags;
+use crate::{flags, terminal};
 
 /// Reads a part, checks its mesh, and lists its planar faces and the pairs of them that can be
 /// gripped.
@@ -43,6 +43,9 @@ pub(crate) struct Args {
     /// Also pairs that jaws opening into a slot can grip.
     #[arg(long)]
     internal: bool,
+    /// Most memory that reading may take, e.g. 2GB. Default: half of the machine's.
+    #[arg(long, value_name = "SIZE")]
+    max_memory: Option<String>,
     /// Drawing (SVG): three views with the planar faces numbered.
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
@@ -70,7 +73,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         _ => [0.0, f64::INFINITY],
     };
-    let part = Part::read(&args.part, &ReadOptions { unit: args.unit })?;
+    let max_memory = args.max_memory.as_deref().map(flags::memory).transpose()?;
+    let options = ReadOptions { unit: args.unit, max_memory, ..ReadOptions::default() };
+    let part = Part::read(&args.part, &options)?;
     let volume = part.mass_properties(1.0).volume;
     let density = match mass {
         Some(mass) if volume > 0.0 => Some(mass / volume),
@@ -85,19 +90,16 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if let Some(path) = &args.plot {
         gripfast::file::write(path, |writer| writer.write_all(drawing::svg(&part).as_bytes()))?;
-        eprintln!("wrote {}", path.display());
+        terminal::say(&format!("wrote {}", path.display()));
     }
-    let mut out = std::io::stdout().lock();
     if args.json {
+        let mut out = std::io::stdout().lock();
         serde_json::to_writer_pretty(&mut out, &to_json(&part, &pairs, density))
             .context("writing JSON")?;
         writeln!(out)?;
     } else {
-        write!(
-            out,
-            "{}",
-            to_text(&part, &pairs, density, if args.faces { usize::MAX } else { ROWS })
-        )?;
+        let rows = if args.faces { usize::MAX } else { ROWS };
+        write!(terminal::output(), "{}", to_text(&part, &pairs, density, rows))?;
     }
     Ok(if pairs.is_empty() { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }

@@ -245,7 +245,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let earlier = args.compare.as_deref().map(flags::earlier_weights).transpose()?;
     let every = flags::interval(&args.checkpoint)?;
 
-    let part = Part::read(&args.part, &ReadOptions { unit: args.unit })?;
+    let part = Part::read(&args.part, &ReadOptions { unit: args.unit, ..Default::default() })?;
     for line in part.health.warnings.iter() {
         note(&format!("warning: {}", crate::flags::warning(line)));
     }

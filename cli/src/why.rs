@@ -46,7 +46,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         .map_err(|error| Error::input(&file, format!("gripper: {error}"), "make the file again"))?;
     let path = args.part.unwrap_or_else(|| PathBuf::from(&set.part.file));
     let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == set.part.unit_m);
-    let part = Part::read(&path, &ReadOptions { unit })?;
+    let part = Part::read(&path, &ReadOptions { unit, ..Default::default() })?;
     let proposer =
         Proposer::new(&part, &gripper, &CandidateArgs::from_settings(&set.provenance.settings))?;
     let explanation = proposer.explain_pose(

@@ -42,7 +42,7 @@ pub use seeds::{NEGATED, RING, SeedSet};
 pub use top::Best;
 
 use crate::error::{Error, Result};
-use crate::model::{Contact, Wrench};
+use crate::model::{Contact, LARGEST_LENGTH, Wrench};
 use layout::SeedRecord;
 use prepare::{Chunk, Prepared, not_searched};
 
@@ -364,11 +364,11 @@ fn check(problem: &Problem<'_>, index: usize) -> Result<()> {
             "give a positive force",
         ));
     }
-    if !problem.distance.is_finite() {
+    if problem.distance.is_nan() || problem.distance.abs() > LARGEST_LENGTH {
         return Err(Error::input(
             place(),
             format!("distance between the faces {} m", problem.distance),
-            "give a finite distance",
+            "give a distance of at most 1e9 m",
         ));
     }
     for (load, wrench) in problem.wrenches.iter().enumerate() {

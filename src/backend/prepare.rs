@@ -99,22 +99,9 @@ impl Prepared {
     /// `None` when a face has no area.
     ///
     /// # Errors
-    /// A bad value when a coordinate is not finite.
+    /// Bad geometry when a coordinate is not finite or beyond 1e9 m.
     pub(crate) fn new(contact: &Contact, place: &str) -> Result<Option<Self>> {
-        for (name, patch) in [("A_I", &contact.face_i), ("A_II", &contact.face_ii)] {
-            for point in patch
-                .iter()
-                .flat_map(|polygon| polygon.outer.iter().chain(polygon.holes.iter().flatten()))
-            {
-                if !point.is_finite() {
-                    return Err(Error::input(
-                        place,
-                        format!("{name} has the vertex ({}, {})", point.x, point.y),
-                        "give finite coordinates",
-                    ));
-                }
-            }
-        }
+        contact.check(&format!("{place}, "))?;
         let [loops_i, loops_ii] =
             [&contact.face_i, &contact.face_ii].map(|patch| Loops::new(patch));
         let [edges_i, edges_ii] = [&loops_i, &loops_ii]

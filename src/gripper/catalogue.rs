@@ -25,7 +25,7 @@ pub fn text(name_or_path: &str) -> Result<String> {
         Some((_, text)) => Ok((*text).to_string()),
         None if is_file(name_or_path) => {
             let path = Path::new(name_or_path);
-            std::fs::read_to_string(path).map_err(|source| Error::io(path, "read", source))
+            crate::file::read_text(path)
         }
         None => Err(unknown(name_or_path)),
     }

@@ -108,7 +108,7 @@ struct Axes {
 /// # Errors
 /// When the file cannot be read, and as [`parse`].
 pub fn read(path: &Path) -> Result<Gripper> {
-    let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read", source))?;
+    let bytes = crate::file::read(path)?;
     let place = path.display().to_string();
     let text = String::from_utf8(bytes).map_err(|_| {
         Error::format(

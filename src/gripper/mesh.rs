@@ -24,7 +24,7 @@ const FILLED: f64 = 2e-3;
 /// # Errors
 /// As [`Part::read`].
 pub(super) fn hulls(path: &Path, unit: Option<Unit>) -> Result<Vec<Vec<DVec3>>> {
-    let part = Part::read(path, &ReadOptions { unit })?;
+    let part = Part::read(path, &ReadOptions { unit, ..Default::default() })?;
     let triangles: Vec<[DVec3; 3]> =
         (0..part.mesh.triangles.len() as u32).map(|index| part.mesh.corners(index)).collect();
     Ok(pieces(&part)

@@ -425,7 +425,7 @@ impl<'a> Solver<'a> {
                 return Some((found, node));
             }
             let step = Self::slope_at(&node, coupling).inverse() * left;
-            if size > 0.5 * before || !step.is_finite() {
+            if size > 0.5 * before || size == 0.0 || !step.is_finite() {
                 return None;
             }
             (x, before) = (x - step, size);

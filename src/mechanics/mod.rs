@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 
 use crate::contact::Loops;
 use crate::error::{Error, Result};
-use crate::model::{Contact, Score, Slip, Status, Wrench};
+use crate::model::{Contact, LARGEST_LENGTH, Score, Slip, Status, Wrench};
 
 use equilibrium::{Solver, State, Vector7};
 pub use pads::{Load, Pads};
@@ -124,11 +124,11 @@ pub(crate) fn check(contact: &Contact, distance: f64, force: f64, wrench: &Wrenc
     let bad = |what: &str, value: String, allowed: &str| {
         Err(Error::input(what, format!("is {value}"), format!("give {allowed}")))
     };
-    if !distance.is_finite() {
+    if distance.is_nan() || distance.abs() > LARGEST_LENGTH {
         return bad(
             "d",
             distance.to_string(),
-            "a finite distance [m], negative for a grip from inside",
+            "a distance of at most 1e9 m, negative for a grip from inside",
         );
     }
     if !(force.is_finite() && force > 0.0) {
@@ -141,20 +141,7 @@ pub(crate) fn check(contact: &Contact, distance: f64, force: f64, wrench: &Wrenc
             "finite numbers",
         );
     }
-    for (name, patch) in [("A_I", &contact.face_i), ("A_II", &contact.face_ii)] {
-        for ring in
-            patch.iter().flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes))
-        {
-            if let Some(point) = ring.iter().find(|point| !point.is_finite()) {
-                return bad(
-                    name,
-                    format!("has a point {:?}", point.to_array()),
-                    "finite coordinates [m]",
-                );
-            }
-        }
-    }
-    Ok(())
+    contact.check("")
 }
 
 /// An answer without a limit state.

@@ -96,8 +96,9 @@ pub fn region(pads: &Pads, normal: [f64; 2]) -> Ring {
         let turn = one.perp_dot(two);
         let (first_done, second_done) = (done[0] == rings[0].len(), done[1] == rings[1].len());
         // Parallel edges are taken together.
-        done[0] += usize::from(!first_done && (second_done || turn >= 0.0));
-        done[1] += usize::from(!second_done && (first_done || turn <= 0.0));
+        // An overflown turn takes both, so that the walk ends.
+        done[0] += usize::from(!first_done && (second_done || turn >= 0.0 || turn.is_nan()));
+        done[1] += usize::from(!second_done && (first_done || turn <= 0.0 || turn.is_nan()));
     }
     region
 }

@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, ErrorKind, Result};
-use crate::model::{Frame, Polygon};
+use crate::model::{Frame, LARGEST_LENGTH, Polygon};
 
 mod boundary;
 mod cracks;
@@ -31,6 +31,8 @@ mod unit;
 mod weld;
 
 pub use health::Health;
+#[cfg(feature = "step")]
+pub use read::{StepProcess, serve_step};
 pub use unit::Unit;
 
 /// A triangle mesh [m], welded, outward-oriented.
@@ -129,6 +131,11 @@ pub struct ReadOptions {
     /// Unit of the file's numbers. `None`: the file's own where it states one (3MF, glTF),
     /// otherwise millimetres.
     pub unit: Option<Unit>,
+    /// Most memory that reading may take [bytes]; a file that needs more is refused before it is
+    /// taken. `None`: [`crate::memory::default_limit`].
+    pub max_memory: Option<u64>,
+    /// Whether a glTF file may name buffers outside of its own folder.
+    pub outside_buffers: bool,
 }
 
 /// A part, read and checked.
@@ -150,6 +157,28 @@ pub struct Part {
     unit_mass: MassProperties,
 }
 
+/// Smallest extent of a part [m]: below it products of lengths leave the range of numbers.
+const SMALLEST_EXTENT: f64 = 1e-9;
+
+/// Refuses sizes with which nothing can be computed.
+fn check_extent(soup: &weld::Soup, unit: Unit, place: &str) -> Result<()> {
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for &vertex in &soup.vertices {
+        (low, high) = (low.min(vertex), high.max(vertex));
+    }
+    let largest = low.abs().max(high.abs()).max_element() * unit.metres();
+    let extent = (high - low).max_element() * unit.metres();
+    let problem = if largest > LARGEST_LENGTH {
+        format!("a coordinate is {largest:.3e} m; the largest is {LARGEST_LENGTH:.0e} m")
+    } else if !soup.vertices.is_empty() && extent < SMALLEST_EXTENT && extent > 0.0 {
+        format!("it measures {extent:.3e} m; the smallest part is {SMALLEST_EXTENT:.0e} m")
+    } else {
+        return Ok(());
+    };
+    let remedy = "check the unit of its numbers, or repair the file";
+    Err(Error::new(ErrorKind::Geometry, place, problem, remedy).with_options(&["unit"]))
+}
+
 impl Part {
     /// Reads, welds, repairs and orients the mesh in `path`, and finds its planar faces.
     ///
@@ -158,10 +187,11 @@ impl Part {
     ///
     /// # Errors
     /// When the file cannot be read, is not what its suffix says, is damaged, holds no triangle, or
-    /// holds more triangles than can be indexed. An open or otherwise faulty surface is no error:
+    /// holds more triangles than can be indexed or than the memory allowed takes, or when its size
+    /// is beyond 1e9 m or below 1e-9 m. An open or otherwise faulty surface is no error:
     /// see [`Part::health`].
     pub fn read(path: &Path, options: &ReadOptions) -> Result<Self> {
-        let soup = read::read(path)?;
+        let soup = read::read(path, options)?;
         let unit = options.unit.or(soup.unit);
         let stated = unit.is_some();
         let unit = unit.unwrap_or(Unit::Millimetre);
@@ -211,6 +241,7 @@ impl Part {
     }
 
     fn build(soup: weld::Soup, unit: Unit, place: &str) -> Result<Self> {
+        check_extent(&soup, unit, place)?;
         let mut repaired = repair::repair(soup, unit.metres(), place)?;
         let faces = faces::planar_faces(&mut repaired);
         let unit_mass = repaired.mass();

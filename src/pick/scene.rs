@@ -176,7 +176,7 @@ impl Scene {
     /// When the file or a mesh cannot be read, a field is unknown, or a value has no unit or makes
     /// no sense; the message names the place.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, "read", error))?;
+        let text = crate::file::read_text(path)?;
         Self::parse(&path.display().to_string(), &text, path.parent().unwrap_or(Path::new("")))
     }
 
@@ -277,7 +277,7 @@ fn obstacle(place: &str, index: usize, table: &ObstacleTable, folder: &Path) -> 
     let solid = match (&table.mesh, &table.size, &table.plane) {
         (Some(mesh), None, None) => {
             let unit = table.unit.as_deref().map(str::parse::<Unit>).transpose()?;
-            let part = Part::read(&folder.join(mesh), &ReadOptions { unit })?;
+            let part = Part::read(&folder.join(mesh), &ReadOptions { unit, ..Default::default() })?;
             Solid::Mesh { closed: part.health.watertight, mesh: part.mesh }
         }
         (None, Some(size), None) => {

@@ -9,6 +9,7 @@ mod export;
 mod figures;
 mod flag_names;
 mod gripper;
+mod hostile;
 mod part_dirty;
 mod part_drawing;
 mod pick;

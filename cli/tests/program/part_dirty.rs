@@ -114,7 +114,7 @@ fn ascii(triangles: &[Triangle], end: &str, solids: usize) -> Vec<u8> {
 fn read(folder: &Path, bytes: &[u8], unit: Option<Unit>) -> gripfast::error::Result<Part> {
     let path = folder.join("spoiled.stl");
     std::fs::write(&path, bytes).unwrap();
-    Part::read(&path, &ReadOptions { unit })
+    Part::read(&path, &ReadOptions { unit, ..Default::default() })
 }
 
 fn diagonal(triangles: &[Triangle]) -> f64 {

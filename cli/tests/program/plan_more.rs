@@ -258,6 +258,7 @@ fn box_and_grips(folder: &Path, gripper: &Gripper) -> (Part, ProposeOptions, Vec
         &file,
         &ReadOptions {
             unit: Some(Unit::ALL.into_iter().find(|unit| unit.metres() == 1e-3).unwrap()),
+            ..ReadOptions::default()
         },
     )
     .unwrap();

@@ -1,6 +1,7 @@
 //! Mesh files: the format is chosen by the suffix, the bytes are checked against it.
 
 mod gltf;
+mod guard;
 mod obj;
 mod off;
 mod ply;
@@ -10,14 +11,21 @@ mod step;
 mod stl;
 mod threemf;
 
+use std::cell::Cell;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
+use std::rc::Rc;
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
+use super::ReadOptions;
 use super::weld::{MAX_TRIANGLES, Soup, Welder};
 use crate::error::{Error, ErrorKind, Result};
+use crate::memory::Budget;
+
+#[cfg(feature = "step")]
+pub use step::{StepProcess, serve_step};
 
 /// Suffixes that are read, for messages.
 const KNOWN: &str = if cfg!(feature = "step") {
@@ -30,7 +38,7 @@ const KNOWN: &str = if cfg!(feature = "step") {
 ///
 /// # Errors
 /// As [`super::Part::read`].
-pub(super) fn read(path: &Path) -> Result<Soup> {
+pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Soup> {
     let place = path.display().to_string();
     let (suffix, zipped) = suffix(path);
     let step = matches!(suffix.as_str(), "step" | "stp");
@@ -52,57 +60,100 @@ pub(super) fn read(path: &Path) -> Result<Soup> {
             ),
         ));
     }
-    let file = File::open(path).map_err(|source| Error::io(path, "read", source))?;
-    let meta = file.metadata().map_err(|source| Error::io(path, "read", source))?;
-    if meta.is_dir() {
-        return Err(Error::format(place, "is a folder", "name a mesh file"));
+    // Asked before it is opened: opening a pipe waits for its writer.
+    let meta = std::fs::metadata(path).map_err(|source| Error::io(path, "read", source))?;
+    if !meta.is_file() {
+        let what = if meta.is_dir() { "a folder" } else { "a device, pipe or socket, not a file" };
+        return Err(Error::format(place, format!("is {what}"), "name a mesh file"));
     }
+    let file = File::open(path).map_err(|source| Error::io(path, "read", source))?;
     let size = (!zipped).then_some(meta.len());
+    let budget = Budget::new(options.max_memory);
+    budget.room(&place, meta.len())?;
     let reader: Box<dyn Read> = if zipped {
         Box::new(flate2::read::MultiGzDecoder::new(BufReader::new(file)))
     } else {
         Box::new(file)
     };
-    let mut source =
-        Source { place, path, size, reader: BufReader::with_capacity(1 << 18, reader) };
-    if source.peek()?.is_empty() {
-        return Err(Error::format(source.place, "the file is empty", "export the part again"));
-    }
-    let soup = match suffix.as_str() {
-        "stl" => stl::read(&mut source)?,
-        "obj" => obj::read(&mut source)?,
-        "ply" => ply::read(&mut source)?,
-        "off" => off::read(&mut source)?,
-        "3mf" => threemf::read(&mut source)?,
-        "gltf" | "glb" => gltf::read(&mut source)?,
-        #[cfg(feature = "step")]
-        "step" | "stp" => step::read(&mut source)?,
-        "" => {
-            return Err(Error::new(
-                ErrorKind::Unsupported,
-                source.place,
-                "the file name has no suffix to tell its format",
-                format!("name it with one of: {KNOWN}"),
-            ));
-        }
-        _ => {
-            return Err(Error::new(
-                ErrorKind::Unsupported,
-                source.place,
-                format!("unknown mesh format '.{suffix}'"),
-                format!("convert it to one of: {KNOWN}"),
-            ));
-        }
+    let passed = Rc::new(Cell::new(false));
+    let reader = Limited { inner: reader, left: budget.limit(), passed: Rc::clone(&passed) };
+    let mut source = Source {
+        place: place.clone(),
+        path,
+        size,
+        reader: BufReader::with_capacity(1 << 18, reader),
+        budget,
+        options,
     };
+    let soup = guard::guarded(&place, || read_as(&suffix, &mut source));
+    // Some libraries do not pass on why a stream failed.
+    if passed.get() {
+        return Err(source.budget.exceeded(&place, source.budget.limit()));
+    }
+    let soup = soup?;
     if soup.read == 0 {
         return Err(Error::new(
             ErrorKind::Geometry,
-            source.place,
+            place,
             "holds no triangle",
             "export the part as a surface mesh",
         ));
     }
     Ok(soup)
+}
+
+/// Reads the format that `suffix` names.
+fn read_as(suffix: &str, source: &mut Source<'_>) -> Result<Soup> {
+    if source.peek()?.is_empty() {
+        return Err(source.bad("the file is empty", "export the part again"));
+    }
+    match suffix {
+        "stl" => stl::read(source),
+        "obj" => obj::read(source),
+        "ply" => ply::read(source),
+        "off" => off::read(source),
+        "3mf" => threemf::read(source),
+        "gltf" | "glb" => gltf::read(source),
+        #[cfg(feature = "step")]
+        "step" | "stp" => step::read(source),
+        "" => Err(source
+            .bad(
+                "the file name has no suffix to tell its format",
+                &format!("name it with one of: {KNOWN}"),
+            )
+            .with_kind(ErrorKind::Unsupported)),
+        _ => Err(source
+            .bad(
+                format!("unknown mesh format '.{suffix}'"),
+                &format!("convert it to one of: {KNOWN}"),
+            )
+            .with_kind(ErrorKind::Unsupported)),
+    }
+}
+
+/// A stream that fails when it holds more than it may: a small compressed file can stand for a
+/// huge one.
+struct Limited<R> {
+    inner: R,
+    left: u64,
+    /// Set when it held more.
+    passed: Rc<Cell<bool>>,
+}
+
+impl<R: Read> Read for Limited<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        if self.left == 0 && !buffer.is_empty() {
+            if self.inner.read(&mut [0])? == 0 {
+                return Ok(0);
+            }
+            self.passed.set(true);
+            return Err(std::io::Error::other("holds more than the memory allowed"));
+        }
+        let most = buffer.len().min(usize::try_from(self.left).unwrap_or(usize::MAX));
+        let count = self.inner.read(&mut buffer[..most])?;
+        self.left -= count as u64;
+        Ok(count)
+    }
 }
 
 /// File name without folder, `.gz` and format suffix.
@@ -136,8 +187,17 @@ struct Source<'a> {
     path: &'a Path,
     /// Bytes in all, unknown for a compressed file.
     size: Option<u64>,
-    reader: BufReader<Box<dyn Read>>,
+    reader: BufReader<Limited<Box<dyn Read>>>,
+    /// Memory that the triangles and what is kept beside them may take.
+    budget: Budget,
+    options: &'a ReadOptions,
 }
+
+/// Memory that a triangle takes until the part is made [bytes]: 140 measured at the peak with a
+/// million of them, and a margin.
+const TRIANGLE_BYTES: u64 = 256;
+/// Longest line of a text format [bytes].
+const LONGEST_LINE: u64 = 1 << 24;
 
 impl Source<'_> {
     /// The bytes at hand without consuming them; empty at the end of the file.
@@ -146,6 +206,42 @@ impl Source<'_> {
             return Err(self.fault(fault));
         }
         Ok(self.reader.buffer())
+    }
+
+    /// The whole file.
+    fn bytes(&mut self) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        self.reader.read_to_end(&mut bytes).map_err(|fault| self.fault(fault))?;
+        self.hold(bytes.len() as u64)?;
+        Ok(bytes)
+    }
+
+    /// The next line with its end into `line`; false at the end of the file. `number` is the
+    /// line's, for the message.
+    fn line(&mut self, line: &mut Vec<u8>, number: usize) -> Result<bool> {
+        line.clear();
+        let outcome = (&mut self.reader).take(LONGEST_LINE).read_until(b'\n', line);
+        outcome.map_err(|fault| self.fault(fault))?;
+        if line.len() as u64 == LONGEST_LINE {
+            return Err(self
+                .bad_at(
+                    format!("line {number}"),
+                    format!("is longer than {} MiB", LONGEST_LINE >> 20),
+                    "export or copy the file again",
+                )
+                .with_kind(ErrorKind::Limit));
+        }
+        Ok(!line.is_empty())
+    }
+
+    /// Takes memory that is kept until the part is made.
+    fn hold(&self, bytes: u64) -> Result<()> {
+        self.budget.hold(&self.place, bytes)
+    }
+
+    /// Checks that `count` triangles fit.
+    fn room_for(&self, count: u64) -> Result<()> {
+        self.budget.room(&self.place, count.saturating_mul(TRIANGLE_BYTES))
     }
 
     /// A damaged or unreadable stream: a decompression fault is bad input, anything else the
@@ -175,14 +271,14 @@ impl Source<'_> {
         Error::format(format!("{}, {where_}", self.place), problem, remedy)
     }
 
-    /// Refuses more triangles than can be indexed.
+    /// Refuses more triangles than can be indexed or than fit.
     fn check_count(&self, welder: &Welder) -> Result<()> {
         if welder.count() > MAX_TRIANGLES {
             return Err(self
                 .bad(format!("more than {MAX_TRIANGLES} triangles"), "decimate the mesh")
                 .with_kind(ErrorKind::Limit));
         }
-        Ok(())
+        self.room_for(welder.count() as u64)
     }
 
     /// Adds polygon `number` (from 1) of an indexed format, cut into triangles. Points and lines
@@ -195,13 +291,10 @@ impl Source<'_> {
         number: usize,
     ) -> Result<()> {
         let corner = |index: u32| {
-            vertices.get(index as usize).copied().ok_or_else(|| {
-                let problem = format!(
-                    "refers to vertex {index} (counted from 0), but there are {}",
-                    vertices.len()
-                );
-                self.bad_at(format!("face {number}"), problem, "repair the file or export it again")
-            })
+            vertices
+                .get(index as usize)
+                .copied()
+                .ok_or_else(|| self.no_vertex(index, vertices.len(), number))
         };
         match *corners {
             [a, b, c] => welder.triangle([corner(a)?, corner(b)?, corner(c)?]),
@@ -214,6 +307,35 @@ impl Source<'_> {
             }
         }
         self.check_count(welder)
+    }
+
+    /// Adds triangle `number` (from 1) of an indexed mesh that is placed in the part.
+    fn placed_triangle(
+        &self,
+        welder: &mut Welder,
+        vertices: &[DVec3],
+        corners: [u32; 3],
+        place: DAffine3,
+        number: usize,
+    ) -> Result<()> {
+        let mut points = [DVec3::ZERO; 3];
+        for (point, index) in points.iter_mut().zip(corners) {
+            let vertex = *vertices
+                .get(index as usize)
+                .ok_or_else(|| self.no_vertex(index, vertices.len(), number))?;
+            *point = self.finite(place.transform_point3(vertex), index as usize + 1)?;
+        }
+        welder.triangle(points);
+        self.check_count(welder)
+    }
+
+    /// Face `number` refers to vertex `index`, which is not there.
+    fn no_vertex(&self, index: u32, count: usize, number: usize) -> Error {
+        self.bad_at(
+            format!("face {number}"),
+            format!("refers to vertex {index} (counted from 0), but there are {count}"),
+            "repair the file or export it again",
+        )
     }
 
     /// Checks that vertex `number` (from 1) is finite.

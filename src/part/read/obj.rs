@@ -25,6 +25,10 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
     let mut welder = Welder::default();
     let mut vertices = Vec::new();
     let (mut vertex, mut face) = (0, 0);
+    // The library gives 32-bit coordinates.
+    let held =
+        models.iter().map(|model| 4 * (model.mesh.positions.len() + model.mesh.indices.len()));
+    source.hold(held.sum::<usize>() as u64)?;
     for model in models {
         let mesh = model.mesh;
         vertices.clear();

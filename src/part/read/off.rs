@@ -1,7 +1,5 @@
 //! OFF in its text form. The format is a dozen lines to read, and no maintained library reads it.
 
-use std::io::BufRead;
-
 use glam::DVec3;
 
 use super::Source;
@@ -14,6 +12,8 @@ const REMEDY: &str = "repair the line or export the part again";
 struct Lines<'a, 'b> {
     source: &'a mut Source<'b>,
     number: usize,
+    /// The line as read, and without comment.
+    bytes: Vec<u8>,
     line: String,
 }
 
@@ -21,13 +21,7 @@ impl Lines<'_, '_> {
     /// The next line that says something; `what` is what was expected there.
     fn next(&mut self, what: &str) -> Result<&str> {
         loop {
-            let mut bytes = Vec::new();
-            let count = self
-                .source
-                .reader
-                .read_until(b'\n', &mut bytes)
-                .map_err(|fault| self.source.fault(fault))?;
-            if count == 0 {
+            if !self.source.line(&mut self.bytes, self.number + 1)? {
                 return Err(self.source.bad_at(
                     format!("line {}", self.number),
                     format!("the file ends where {what} should follow"),
@@ -35,7 +29,7 @@ impl Lines<'_, '_> {
                 ));
             }
             self.number += 1;
-            self.line = String::from_utf8_lossy(&bytes)
+            self.line = String::from_utf8_lossy(&self.bytes)
                 .split('#')
                 .next()
                 .unwrap_or_default()
@@ -67,7 +61,7 @@ impl Lines<'_, '_> {
 }
 
 pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
-    let mut lines = Lines { source, number: 0, line: String::new() };
+    let mut lines = Lines { source, number: 0, bytes: Vec::new(), line: String::new() };
     let header = lines.next("'OFF'")?.to_string();
     let mut words = header.split_ascii_whitespace();
     let keyword = words.next().unwrap_or_default().trim_start_matches('\u{feff}');
@@ -91,6 +85,7 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
     let mut vertices = Vec::new(); // the count is only a claim: nothing is reserved for it
     for number in 1..=counts[0] {
         lines.next("a vertex")?;
+        lines.source.hold(size_of::<DVec3>() as u64)?;
         let position: Vec<f64> = lines.numbers(3)?;
         vertices.push(lines.source.finite(DVec3::from_slice(&position), number)?);
     }
@@ -101,5 +96,12 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
         let corners: Vec<u32> = lines.numbers(corners.saturating_add(1).min(lines.line.len()))?;
         lines.source.polygon(&mut welder, &vertices, &corners[1..], number)?;
     }
-    Ok(welder.finish(None, Vec::new()))
+    let mut warnings = Vec::new();
+    if lines.next("").is_ok() {
+        warnings.push(format!(
+            "line {} and what follows were ignored: the file states {} faces",
+            lines.number, counts[1]
+        ));
+    }
+    Ok(welder.finish(None, warnings))
 }

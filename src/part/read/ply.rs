@@ -2,10 +2,11 @@
 
 use glam::DVec3;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
+use ply_rs_bw::ply::{Header, Property, PropertyAccess, PropertyAccessResult, PropertyType};
 
 use super::Source;
 use crate::error::{Error, Result};
+use crate::memory::Budget;
 use crate::part::weld::{Soup, Welder};
 
 pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
@@ -26,6 +27,7 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
     let mut reader = Reader::new(&mut source.reader);
     let header =
         Parser::<Skip>::new().read_header(&mut reader).map_err(|error| fault(&reader, error))?;
+    check(&place, &source.budget, &header)?;
     let (mut points, mut faces, mut has_faces) = (Vec::new(), Vec::new(), false);
     for (_, element) in &header.elements {
         match element.name.as_str() {
@@ -62,6 +64,47 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
         source.polygon(&mut welder, &vertices, &face.0, index + 1)?;
     }
     Ok(welder.finish(None, Vec::new()))
+}
+
+/// Refuses what the library would take for a surface without its coordinates or corners, and counts
+/// beyond the memory allowed: the library keeps a value for each.
+fn check(place: &str, budget: &Budget, header: &Header) -> Result<()> {
+    let bad = |problem: String| {
+        Err(Error::format(format!("{place}, header"), problem, "export the part as PLY again"))
+    };
+    for (name, element) in &header.elements {
+        let scalar = |axis: &str| {
+            element
+                .properties
+                .get(axis)
+                .is_some_and(|property| matches!(property.data_type, PropertyType::Scalar(_)))
+        };
+        let corners = ["vertex_index", "vertex_indices"].iter().any(|list| {
+            element
+                .properties
+                .get(*list)
+                .is_some_and(|property| matches!(property.data_type, PropertyType::List(..)))
+        });
+        if element.properties.is_empty() && element.count > 0 {
+            return bad(format!("element '{}' has no property", name.escape_debug()));
+        }
+        match name.as_str() {
+            "vertex" if !["x", "y", "z"].into_iter().all(scalar) => {
+                return bad("element 'vertex' lacks one of x, y, z".to_string());
+            }
+            "face" | "tri" if !corners => {
+                return bad("its faces have no list 'vertex_index'".to_string());
+            }
+            _ => {}
+        }
+        let each = match name.as_str() {
+            "vertex" => size_of::<Point>() + size_of::<DVec3>(),
+            "face" | "tri" => size_of::<Face>() + 16, // a list of up to four corners
+            _ => 0,
+        };
+        budget.hold(place, (element.count as u64).saturating_mul(each as u64))?;
+    }
+    Ok(())
 }
 
 fn first_line(text: &str) -> &str {

@@ -20,27 +20,32 @@
 #include <TopoDS_Face.hxx>
 #include <gp_Trsf.hxx>
 
-// Calls `triangle(user, nine coordinates)` for every triangle, millimetres, counter-clockwise from outside. Returns the number
+// Calls `stage(user, name)` before each step of the work and `triangle(user, nine coordinates)` for every triangle, millimetres, counter-clockwise from outside. Returns the number
 // of faces that could not be tessellated, or -1 with a message of at most `room` bytes.
 extern "C" int gripfast_step(const char* data, size_t size, double share, double most, double angle, void* user,
-                             void (*triangle)(void*, const double*), char* message, size_t room) noexcept {
+                             void (*stage)(void*, const char*), void (*triangle)(void*, const double*), char* message,
+                             size_t room) noexcept {
     const auto fail = [&](const char* text) {
         std::snprintf(message, room, "%s", text);
         return -1;
     };
     try {
         Message::DefaultMessenger()->ChangePrinters().Clear();
+        stage(user, "reading the text");
         std::istringstream stream(std::string(data, size));
         STEPControl_Reader reader;
         if (reader.ReadStream("part", stream) != IFSelect_RetDone) return fail("the STEP text cannot be read");
+        stage(user, "making the shapes");
         reader.TransferRoots();
         const TopoDS_Shape shape = reader.OneShape();
         if (shape.IsNull()) return fail("holds no shape");
         Bnd_Box box;
         BRepBndLib::Add(shape, box);
         if (box.IsVoid()) return fail("holds no surface");
+        stage(user, "tessellating");
         const double linear = std::min(most, share * std::sqrt(box.SquareExtent()));
         BRepMesh_IncrementalMesh mesher(shape, linear, Standard_False, angle, Standard_False);
+        stage(user, "collecting the triangles");
         int left_out = 0;
         for (TopExp_Explorer faces(shape, TopAbs_FACE); faces.More(); faces.Next()) {
             const TopoDS_Face& face = TopoDS::Face(faces.Current());

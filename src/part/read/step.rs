@@ -1,12 +1,16 @@
-//! STEP, by Open CASCADE: exact surfaces tessellated on reading.
+//! STEP, by Open CASCADE: exact surfaces tessellated on reading; in this process, or in one of its
+//! own that its faults cannot leave.
 
 use std::ffi::{CStr, c_char, c_double, c_int, c_void};
-use std::io::Read;
+use std::io::{BufReader, BufWriter, Read, Write};
+use std::path::PathBuf;
+use std::process::{Command, ExitStatus, Stdio};
+use std::sync::OnceLock;
 
 use glam::DVec3;
 
 use super::Source;
-use crate::error::Result;
+use crate::error::{Error, ErrorKind, Result};
 use crate::part::unit::Unit;
 use crate::part::weld::{Soup, Welder};
 
@@ -17,6 +21,96 @@ const DEFLECTION_MOST: f64 = 0.05;
 /// Largest angle between neighbouring triangles of a curved surface [rad].
 const DEFLECTION_ANGLE: f64 = 0.2;
 
+const REMEDY: &str = "export the part again as STEP AP203, AP214 or AP242, or as a mesh";
+
+static PROCESS: OnceLock<StepProcess> = OnceLock::new();
+
+/// A process of its own for the CAD kernel that reads STEP files: what ends it is an error of the
+/// reader, not the end of the program.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepProcess {
+    /// Executable that ends in a call of [`serve_step`].
+    pub program: PathBuf,
+    /// Its arguments; the limits of memory [bytes] and of processor time [s] follow them.
+    pub arguments: Vec<String>,
+    /// Most processor time for one file [s].
+    pub seconds: u64,
+}
+
+impl StepProcess {
+    /// From now on all STEP files of this program are read so. Without it they are read in the
+    /// program's own process. False when it was already set.
+    pub fn install(self) -> bool {
+        PROCESS.set(self).is_ok()
+    }
+}
+
+/// The other side of a [`StepProcess`]: the bytes of a STEP file on `input`, its triangles on
+/// `output`, within these limits of memory [bytes] and processor time [s].
+///
+/// # Errors
+/// When a limit cannot be set or a stream fails. A file that cannot be read is an answer, not an
+/// error.
+pub fn serve_step(
+    memory: u64,
+    seconds: u64,
+    mut input: impl Read,
+    output: impl Write,
+) -> std::io::Result<()> {
+    #[cfg(unix)]
+    {
+        use rlimit::Resource;
+        Resource::AS.set(memory, memory)?;
+        Resource::CPU.set(seconds, seconds + 1)?;
+        Resource::CORE.set(0, 0)?;
+    }
+    #[cfg(not(unix))]
+    let _ = (memory, seconds);
+    let mut bytes = Vec::new();
+    input.read_to_end(&mut bytes)?;
+    let mut output = BufWriter::new(output);
+    let mut failed = None;
+    let answer = tessellate(&bytes, &mut |record| {
+        let written = match record {
+            // What came before a crash must have left this process.
+            Record::Stage(name) => {
+                write_text(&mut output, b'S', name).and_then(|()| output.flush())
+            }
+            Record::Triangle(corners) => output.write_all(b"T").and_then(|()| {
+                corners.as_flattened().iter().try_for_each(|x| output.write_all(&x.to_le_bytes()))
+            }),
+        };
+        if let Err(error) = written {
+            failed.get_or_insert(error);
+        }
+    });
+    if let Some(error) = failed {
+        return Err(error);
+    }
+    match answer {
+        Ok(left_out) => {
+            output.write_all(b"E")?;
+            output.write_all(&left_out.to_le_bytes())?;
+        }
+        Err(message) => write_text(&mut output, b'F', &message)?,
+    }
+    output.flush()
+}
+
+fn write_text(output: &mut impl Write, mark: u8, text: &str) -> std::io::Result<()> {
+    let bytes = &text.as_bytes()[..text.len().min(255)];
+    output.write_all(&[mark, bytes.len() as u8])?;
+    output.write_all(bytes)
+}
+
+/// What the kernel says on its way.
+enum Record<'a> {
+    Stage(&'a str),
+    Triangle([[f64; 3]; 3]),
+}
+
+type Sink<'a> = &'a mut dyn FnMut(Record<'_>);
+
 #[allow(unsafe_code, reason = "the C++ side of this reader; its contract stands in step.cpp")]
 unsafe extern "C" {
     fn gripfast_step(
@@ -26,6 +120,7 @@ unsafe extern "C" {
         most: c_double,
         angle: c_double,
         user: *mut c_void,
+        stage: extern "C" fn(*mut c_void, *const c_char),
         triangle: extern "C" fn(*mut c_void, *const c_double),
         message: *mut c_char,
         room: usize,
@@ -34,19 +129,55 @@ unsafe extern "C" {
 
 #[allow(
     unsafe_code,
-    reason = "called back with the welder and nine numbers that `read` and step.cpp own for the call"
+    reason = "called back with the sink and nine numbers that `tessellate` and step.cpp own"
 )]
 extern "C" fn take(user: *mut c_void, nine: *const c_double) {
-    let (welder, nine) = unsafe { (&mut *user.cast::<Welder>(), &*nine.cast::<[[f64; 3]; 3]>()) };
-    welder.triangle(nine.map(DVec3::from_array));
+    // SAFETY: `user` is the sink that `tessellate` passed, `nine` an array of nine.
+    let (sink, nine) = unsafe { (&mut *user.cast::<Sink<'_>>(), &*nine.cast::<[[f64; 3]; 3]>()) };
+    sink(Record::Triangle(*nine));
+}
+
+#[allow(unsafe_code, reason = "called back with the sink and a name that step.cpp owns")]
+extern "C" fn enter(user: *mut c_void, name: *const c_char) {
+    // SAFETY: `user` is the sink that `tessellate` passed, `name` a text with its end.
+    let (sink, name) = unsafe { (&mut *user.cast::<Sink<'_>>(), CStr::from_ptr(name)) };
+    sink(Record::Stage(&name.to_string_lossy()));
+}
+
+/// Triangles of a STEP text in millimetres into `sink`; the number of faces left out, or why it
+/// cannot be read.
+fn tessellate(bytes: &[u8], mut sink: Sink<'_>) -> std::result::Result<i32, String> {
+    let mut message = [0_u8; 256];
+    #[allow(
+        unsafe_code,
+        reason = "pointers and lengths of live buffers; the callbacks get the sink back"
+    )]
+    // SAFETY: step.cpp reads `bytes` and writes `message` within the lengths given, calls back on
+    // this thread only, and keeps nothing.
+    let left_out = unsafe {
+        gripfast_step(
+            bytes.as_ptr().cast(),
+            bytes.len(),
+            DEFLECTION_SHARE,
+            DEFLECTION_MOST,
+            DEFLECTION_ANGLE,
+            (&raw mut sink).cast(),
+            enter,
+            take,
+            message.as_mut_ptr().cast(),
+            message.len(),
+        )
+    };
+    if left_out >= 0 {
+        return Ok(left_out);
+    }
+    Err(CStr::from_bytes_until_nul(&message)
+        .map_or_else(|_| "unreadable".into(), |text| text.to_string_lossy().into_owned()))
 }
 
 /// Reads and tessellates. The kernel converts the file's unit to millimetres.
 pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
-    let mut bytes = Vec::new();
-    if let Err(fault) = source.reader.read_to_end(&mut bytes) {
-        return Err(source.fault(fault));
-    }
+    let bytes = source.bytes()?;
     let start = String::from_utf8_lossy(&bytes[..bytes.len().min(256)]);
     if !start.trim_start_matches(['\u{feff}', ' ', '\t', '\r', '\n']).starts_with("ISO-10303-21") {
         return Err(source.bad(
@@ -55,33 +186,21 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
         ));
     }
     let mut welder = Welder::default();
-    let mut message = [0_u8; 256];
-    #[allow(
-        unsafe_code,
-        reason = "pointers and lengths of live buffers; the callback gets the welder back"
-    )]
-    let left_out = unsafe {
-        gripfast_step(
-            bytes.as_ptr().cast(),
-            bytes.len(),
-            DEFLECTION_SHARE,
-            DEFLECTION_MOST,
-            DEFLECTION_ANGLE,
-            (&raw mut welder).cast(),
-            take,
-            message.as_mut_ptr().cast(),
-            message.len(),
-        )
+    let left_out = match PROCESS.get() {
+        Some(process) => apart(source, process, &bytes, &mut welder)?,
+        None => {
+            let mut fault = None;
+            let left_out = tessellate(&bytes, &mut |record| {
+                if let (Record::Triangle(corners), None) = (record, &fault) {
+                    fault = add(source, &mut welder, corners).err();
+                }
+            });
+            match fault {
+                Some(fault) => return Err(fault),
+                None => left_out.map_err(|message| unreadable(source, &message))?,
+            }
+        }
     };
-    if left_out < 0 {
-        let message = CStr::from_bytes_until_nul(&message)
-            .map_or_else(|_| "unreadable".into(), CStr::to_string_lossy);
-        return Err(source.bad(
-            format!("cannot be read as STEP: {message}"),
-            "export the part again as STEP AP203, AP214 or AP242, or as a mesh",
-        ));
-    }
-    source.check_count(&welder)?;
     let warnings = match left_out {
         0 => Vec::new(),
         1 => vec!["1 face of the STEP file could not be tessellated and is missing".to_string()],
@@ -90,4 +209,121 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
         }
     };
     Ok(welder.finish(Some(Unit::Millimetre), warnings))
+}
+
+fn add(source: &Source<'_>, welder: &mut Welder, corners: [[f64; 3]; 3]) -> Result<()> {
+    let mut points = [DVec3::ZERO; 3];
+    for (k, (point, corner)) in points.iter_mut().zip(corners).enumerate() {
+        *point = source.finite(DVec3::from_array(corner), 3 * welder.count() + k + 1)?;
+    }
+    welder.triangle(points);
+    source.check_count(welder)
+}
+
+fn unreadable(source: &Source<'_>, message: &str) -> Error {
+    source.bad(format!("cannot be read as STEP: {}", message.escape_debug()), REMEDY)
+}
+
+/// Reads in a process of its own; the number of faces left out.
+fn apart(
+    source: &Source<'_>,
+    process: &StepProcess,
+    bytes: &[u8],
+    welder: &mut Welder,
+) -> Result<i32> {
+    let cannot = |action: &'static str| {
+        move |error: std::io::Error| Error::io(&process.program, action, error)
+    };
+    let mut child = Command::new(&process.program)
+        .args(&process.arguments)
+        .args([source.budget.limit().to_string(), process.seconds.to_string()])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .map_err(cannot("start the CAD kernel"))?;
+    // A child that has died already shows in its answer.
+    let _ = child.stdin.take().map(|mut input| input.write_all(bytes));
+    let mut stage = String::from("starting");
+    let answer = match child.stdout.take() {
+        Some(output) => answer(source, BufReader::new(output), welder, &mut stage),
+        None => Ok(None),
+    };
+    // A child that has said all, or whose answer is refused, is not waited for; one that has gone
+    // silent has ended, and how it ended is the answer.
+    if !matches!(answer, Ok(None)) {
+        let _ = child.kill();
+    }
+    let status = child.wait().map_err(cannot("wait for the CAD kernel"))?;
+    match answer? {
+        Some(left_out) => Ok(left_out),
+        None => Err(crashed(source, process, &stage, status)),
+    }
+}
+
+/// Takes what the child sends; the number of faces left out, `None` when the child ended before its
+/// last word.
+fn answer(
+    source: &Source<'_>,
+    mut output: impl Read,
+    welder: &mut Welder,
+    stage: &mut String,
+) -> Result<Option<i32>> {
+    let mut mark = [0];
+    let mut text = |output: &mut dyn Read| -> std::io::Result<String> {
+        let mut length = [0];
+        output.read_exact(&mut length)?;
+        let mut bytes = vec![0; usize::from(length[0])];
+        output.read_exact(&mut bytes)?;
+        Ok(String::from_utf8_lossy(&bytes).into_owned())
+    };
+    while output.read_exact(&mut mark).is_ok() {
+        match mark {
+            [b'S'] => match text(&mut output) {
+                Ok(name) => *stage = name,
+                Err(_) => return Ok(None),
+            },
+            [b'T'] => {
+                let mut numbers = [[0.0; 3]; 3];
+                for number in numbers.as_flattened_mut() {
+                    let mut bytes = [0; 8];
+                    if output.read_exact(&mut bytes).is_err() {
+                        return Ok(None);
+                    }
+                    *number = f64::from_le_bytes(bytes);
+                }
+                add(source, welder, numbers)?;
+            }
+            [b'E'] => {
+                let mut bytes = [0; 4];
+                return Ok(output.read_exact(&mut bytes).ok().map(|()| i32::from_le_bytes(bytes)));
+            }
+            [b'F'] => match text(&mut output) {
+                Ok(message) => return Err(unreadable(source, &message)),
+                Err(_) => return Ok(None),
+            },
+            _ => return Err(unreadable(source, "the CAD kernel's answer is not understood")),
+        }
+    }
+    Ok(None)
+}
+
+/// The error of a child that ended before its last word, in this stage.
+fn crashed(source: &Source<'_>, process: &StepProcess, stage: &str, status: ExitStatus) -> Error {
+    #[cfg(unix)]
+    let signal = std::os::unix::process::ExitStatusExt::signal(&status);
+    #[cfg(not(unix))]
+    let signal: Option<i32> = None;
+    /// The processor time is used up.
+    const TIME: i32 = 24;
+    if signal == Some(TIME) {
+        return source
+            .bad(
+                format!("the CAD kernel took more than {} s while {stage}", process.seconds),
+                REMEDY,
+            )
+            .with_kind(ErrorKind::Limit);
+    }
+    let how = signal.map_or_else(|| status.to_string(), |signal| format!("signal {signal}"));
+    source.bad(format!("the CAD kernel crashed while {stage} ({how})"), REMEDY)
 }

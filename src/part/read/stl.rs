@@ -75,6 +75,7 @@ fn binary(source: &mut Source<'_>) -> Result<Soup> {
             warnings.push(format!("{rest} bytes after the last stated triangle were ignored"));
         }
     }
+    source.room_for(u64::from(count))?;
     let mut welder = Welder::default();
     let fault = {
         let mut records = Rewind::new(&mut source.reader);
@@ -195,8 +196,7 @@ fn ascii(source: &mut Source<'_>) -> Result<Soup> {
     let mut filled = None; // corners seen in the open loop
     let mut number = 0_usize;
     loop {
-        line.clear();
-        if source.reader.read_until(b'\n', &mut line).map_err(|fault| source.fault(fault))? == 0 {
+        if !source.line(&mut line, number + 1)? {
             break;
         }
         number += 1;
@@ -225,6 +225,13 @@ fn ascii(source: &mut Source<'_>) -> Result<Soup> {
                             REMEDY,
                         ));
                     }
+                }
+                if words.next().is_some() {
+                    return Err(source.bad_at(
+                        place(),
+                        "a vertex of more than three numbers",
+                        REMEDY,
+                    ));
                 }
                 let count: &mut usize = filled.as_mut().ok_or_else(|| {
                     source.bad_at(place(), "'vertex' outside of 'outer loop'", REMEDY)

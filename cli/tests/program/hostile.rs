@@ -1,0 +1,163 @@
+//! Damaged and malicious input: the exit code of bad input, a message that says where, and nothing
+//! that a terminal would obey.
+
+use std::path::Path;
+use std::time::Duration;
+
+use crate::support::reference;
+
+struct Answer {
+    code: Option<i32>,
+    output: String,
+    errors: String,
+}
+
+/// Runs the program, which must end in time.
+fn run(arguments: &[&str]) -> Answer {
+    let output = assert_cmd::Command::cargo_bin("gripfast")
+        .unwrap()
+        .args(arguments)
+        .timeout(Duration::from_secs(60))
+        .output()
+        .unwrap();
+    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+    Answer {
+        code: output.status.code(),
+        output: text(&output.stdout),
+        errors: text(&output.stderr),
+    }
+}
+
+/// Bad input that says all of `says` and shows no hidden character.
+fn refused(arguments: &[&str], says: &[&str]) {
+    let answer = run(arguments);
+    assert_eq!(answer.code, Some(2), "{arguments:?}: {} {}", answer.output, answer.errors);
+    for text in says {
+        assert!(answer.errors.contains(text), "{arguments:?}: {}", answer.errors);
+    }
+    plain(&answer);
+}
+
+fn plain(answer: &Answer) {
+    for text in [&answer.output, &answer.errors] {
+        let hidden = |sign: char| (sign.is_control() && sign != '\n') || sign == '\u{202e}';
+        assert!(!text.contains(hidden), "{text:?}");
+    }
+}
+
+fn sample(name: &str) -> Option<String> {
+    Some(reference(&format!("trials/hostile/{name}"))?.display().to_string())
+}
+
+#[test]
+fn hostile_parts_end_with_an_error() {
+    for (name, says) in [
+        ("c12.3mf", &["vertex", "'1o'"][..]),
+        ("t_13.3mf", &["12 finite numbers"]),
+        ("pos_index.gltf", &["pos_index.gltf", "remedy"]),
+        ("mult.3mf", &["memory", "--max-memory"]),
+        ("esc.off", &["line 4", "\\u{1b}"]),
+    ] {
+        let Some(path) = sample(name) else { return };
+        refused(&["part", &path], says);
+    }
+}
+
+#[test]
+fn coordinates_beyond_numbers_are_refused() {
+    let Some(path) = sample("score_1e308.json") else { return };
+    refused(&["solve", &path], &["1e308", "at most 1e9 m"]);
+    refused(&["score", &path], &["1e308", "at most 1e9 m"]);
+}
+
+#[test]
+fn a_gripper_that_talks_to_the_terminal_is_shown_as_text() {
+    let Some(path) = sample("evil.toml") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let svg = folder.path().join("gripper.svg");
+    for arguments in [
+        vec!["gripper", "check", &path, "--svg", svg.to_str().unwrap()],
+        vec!["gripper", "show", &path],
+    ] {
+        let answer = run(&arguments);
+        assert_eq!(answer.code, Some(0), "{}", answer.errors);
+        plain(&answer);
+    }
+    let svg = std::fs::read_to_string(svg).unwrap();
+    assert!(!svg.contains("</script>") && !svg.contains(['\u{7}', '\u{202e}']));
+}
+
+#[test]
+fn the_memory_allowed_is_a_flag() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tetrahedron.off");
+    std::fs::write(
+        &path,
+        "OFF\n4 4 0\n0 0 0\n9 0 0\n0 9 0\n0 0 9\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n",
+    )
+    .unwrap();
+    let path = path.to_str().unwrap();
+    refused(&["part", path, "--max-memory", "500B"], &["500 B", "set by: --max-memory"]);
+    refused(&["part", path, "--max-memory", "0B"], &["--max-memory"]);
+    assert_eq!(run(&["part", path, "--max-memory", "1MB"]).code, Some(1)); // no pair of faces
+}
+
+#[test]
+fn a_case_with_a_distance_in_millimetres_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("case.json");
+    let write = |d: &str| {
+        let area = r#"[{"outer":[[-0.01,-0.01],[0.01,-0.01],[0.01,0.01],[-0.01,0.01]]}]"#;
+        let text =
+            format!(r#"{{"A_I":{area},"A_II":{area},{d},"Fn":100,"F":[1,0,0],"M":[0,0,0.1]}}"#);
+        std::fs::write(&path, text).unwrap();
+    };
+    let name = path.to_str().unwrap();
+    write(r#""d":20"#);
+    refused(&["solve", name], &["d is 20 m"]);
+    write(r#""d":0.02,"m":[0,0,9]"#);
+    refused(&["solve", name], &["key 'm'", "'M'"]);
+    write(r#""d":1e400"#);
+    refused(&["solve", name], &["case.json", "out of range"]);
+    write(r#""d":0.02,"note":"a case""#);
+    assert_eq!(run(&["solve", name]).code, Some(0));
+}
+
+#[cfg(unix)]
+#[test]
+fn devices_are_no_input() {
+    for arguments in [
+        &["solve", "/dev/zero"][..],
+        &["gripper", "check", "/dev/zero"],
+        &["plan", "/dev/zero", "--gripper", "generic", "--mass", "1kg"],
+    ] {
+        let answer = run(arguments);
+        assert_eq!(answer.code, Some(2), "{arguments:?}: {}", answer.errors);
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_and_a_closed_pipe_are_no_panic() {
+    use std::process::{Command, Stdio};
+    let program = assert_cmd::cargo::cargo_bin("gripfast");
+    let full = || std::fs::File::options().write(true).open("/dev/full").unwrap();
+    for arguments in [&["gripper", "list"][..], &["gripper", "show", "generic"]] {
+        let output =
+            Command::new(&program).args(arguments).stdout(full()).stderr(Stdio::piped()).output();
+        let output = output.unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(String::from_utf8_lossy(&output.stderr).starts_with("error: "));
+        let mut child = Command::new(&program)
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}");
+        assert!(output.stderr.is_empty());
+    }
+    assert!(Path::new("/dev/full").exists());
+}
