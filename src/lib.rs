@@ -24,6 +24,7 @@ pub mod plan;
 pub mod propose;
 pub mod rank;
 pub mod report;
+pub mod request;
 pub mod results;
 pub(crate) mod svg;
 pub mod text;

@@ -24,9 +24,6 @@ pub use scene::{Obstacle, Opening, Reach, Retreat, Scene, Solid};
 /// within it, so that reasons do not depend on the number of threads.
 const PIECE: usize = 64;
 
-/// Way of each jaw for lists that do not say how they were planned [m].
-const PLANNED_OPENING: f64 = 5e-3;
-
 /// Why a grip was passed over.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reason {
@@ -326,13 +323,7 @@ impl<'a> Picker<'a> {
             Opening::Full => f64::INFINITY,
             Opening::Jaw(way) => way,
             // As the interference of the list was checked.
-            Opening::Planned => self
-                .set
-                .provenance
-                .settings
-                .get("opening_m")
-                .and_then(serde_json::Value::as_f64)
-                .unwrap_or(PLANNED_OPENING),
+            Opening::Planned => self.set.provenance.request.candidates.opening.0,
         };
         self.gripper.opened_gap(grip, opening)
     }

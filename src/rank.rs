@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use crate::model::{Patch, Status};
+use crate::request::Scoring;
 use crate::results::RankedGrip;
 
 /// Scores that differ by less than this share count as equal, and other things decide (see [`rank`]):
@@ -31,7 +32,8 @@ pub struct Weights {
 impl Default for Weights {
     /// `k1 = 1`, `k2 = 1`.
     fn default() -> Self {
-        Self { k1: 1.0, k2: 1.0 }
+        let Scoring { k1, k2, .. } = Scoring::default();
+        Self { k1, k2 }
     }
 }
 

@@ -5,6 +5,7 @@
 //! that are not finite are null.
 
 mod file;
+mod version1;
 
 use std::collections::BTreeMap;
 
@@ -13,11 +14,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::{Bounds, Grip, Pressure, Slip, Status, Wrench};
 use crate::part::MassProperties;
+use crate::request::Request;
+use crate::units::{Force, Length};
 
 /// Marks a native result file.
 pub const FORMAT: &str = "gripfast-grips";
 /// Version of the layout of [`GripSet`].
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// A ranked list of grips on one part with one gripper under one set of loads.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -42,15 +45,54 @@ pub struct GripSet {
 
 /// How a result was made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Provenance {
     /// Program version.
     pub gripfast: String,
-    /// The command line.
+    /// The command line; empty where a program called the library.
     pub command: Vec<String>,
     /// `cpu`, or the GPU adapter's name and driver.
     pub backend: String,
-    /// The settings that decide the answer, by name, in SI units.
-    pub settings: BTreeMap<String, serde_json::Value>,
+    /// What was asked for, whole. Of a file of version 1 `loads` is empty, because it did not say;
+    /// the load cases themselves are [`GripSet::loads`].
+    pub request: Request,
+    /// What was used where the request leaves the choice to the gripper or a rule.
+    pub resolved: Resolved,
+    /// Whether every candidate was looked at; else the run was interrupted.
+    pub complete: bool,
+    /// What a user should know of the part before relying on the numbers.
+    pub warnings: Vec<String>,
+}
+
+impl Provenance {
+    /// That of a complete run on the processor by this version.
+    pub fn new(request: Request, resolved: Resolved) -> Self {
+        Self {
+            gripfast: env!("CARGO_PKG_VERSION").to_owned(),
+            command: Vec::new(),
+            backend: "cpu".to_owned(),
+            request,
+            resolved,
+            complete: true,
+            warnings: Vec::new(),
+        }
+    }
+}
+
+/// The values of options whose default depends on the gripper or on other options.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Resolved {
+    /// Gripping force.
+    pub force: Force,
+    /// Step of the position grid.
+    pub spacing: Length,
+    /// Friction coefficient of the pads; `None` where neither request nor gripper states one.
+    pub pad_friction: Option<f64>,
+    /// Slip twists tried for each load.
+    pub seeds: usize,
+    /// Best grips kept, at most.
+    pub keep: usize,
 }
 
 /// The part as the result file carries it.

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use glam::DVec3;
 use gripfast::error::{Error, Result};
 use gripfast::gripper::Gripper;
 use gripfast::propose::{Cone, Ground, ProposeOptions};
+use gripfast::request::Side;
 use gripfast::units::{Quantity, direction};
 use serde_json::{Value, json};
 
@@ -44,7 +45,7 @@ pub(crate) struct CandidateArgs {
     faces_in: Vec<String>,
     /// Grips that close on the part from outside, that open in a slot or bore (needs a gripper with
     /// outer pads), or both.
-    #[arg(long, value_enum, default_value = "outside")]
+    #[arg(long, value_parser = words!(Side), default_value_t)]
     grips: Side,
     /// List each grip with exchanged jaws as well.
     #[arg(long)]
@@ -55,14 +56,6 @@ pub(crate) struct CandidateArgs {
     /// Distance kept between gripper and part, but for the pads.
     #[arg(long, default_value = "0mm")]
     clearance: String,
-}
-
-/// From where the pads push at the faces.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Side {
-    Outside,
-    Inside,
-    Both,
 }
 
 impl CandidateArgs {

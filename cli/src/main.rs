@@ -1,5 +1,18 @@
 //! The `gripfast` program: flags to options, options to calls of the library, answers to text. Thin.
 
+/// Parses one of an enum's words, or of some of them, as a flag's value.
+macro_rules! words {
+    ($name:ty) => {
+        words!($name, <$name>::WORDS)
+    };
+    ($name:ty, $words:expr) => {
+        clap::builder::TypedValueParser::try_map(
+            clap::builder::PossibleValuesParser::new($words),
+            |text| text.parse::<$name>(),
+        )
+    };
+}
+
 mod backend;
 mod bench;
 mod candidates;

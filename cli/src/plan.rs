@@ -9,8 +9,8 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args as ClapArgs, ValueEnum};
-use gripfast::backend::{Polish, ScoreOptions};
+use clap::Args as ClapArgs;
+use gripfast::backend::ScoreOptions;
 use gripfast::error::Error;
 use gripfast::export::{self, Format};
 use gripfast::gripper::{self, Jaws};
@@ -22,6 +22,7 @@ use gripfast::propose::Proposer;
 use gripfast::rank::{self, Weights};
 
 use gripfast::report;
+use gripfast::request::{Polish, Refiner, Separation};
 use gripfast::results::{self, GripSet, PartSummary, Provenance, RankedGrip, Summary};
 use gripfast::units::Quantity;
 
@@ -29,7 +30,6 @@ use super::backend::{self, BackendArgs};
 use super::candidates::CandidateArgs;
 use super::export::GLB_TOP;
 use super::report::WHOLE;
-use super::solve::{RefinerArg, SeparationArg};
 use super::why;
 use flags::{check_force, finite, not_negative};
 use search::{Partial, Search};
@@ -97,15 +97,15 @@ pub(crate) struct Args {
     closing_friction: f64,
     /// Pads that separate under a load: solve with the contact left, or discard the grip as the
     /// paper does.
-    #[arg(long, value_enum, default_value = "solve", help_heading = "Scoring")]
-    separation: SeparationArg,
+    #[arg(long, value_parser = words!(Separation), default_value_t, help_heading = "Scoring")]
+    separation: Separation,
     /// What gets the final f64 solution: the loads that can be a grip's worst; the same, and only
     /// for grips that can be among the best ones kept; or all loads (kept in the result).
-    #[arg(long, value_enum, default_value = "worst", help_heading = "Scoring")]
-    polish: PolishArg,
+    #[arg(long, value_parser = words!(Polish), default_value_t, help_heading = "Scoring")]
+    polish: Polish,
     /// Minimiser that polishes the final answers.
-    #[arg(long, value_enum, default_value = "newton", help_heading = "Scoring")]
-    refiner: RefinerArg,
+    #[arg(long, value_parser = words!(Refiner), default_value_t, help_heading = "Scoring")]
+    refiner: Refiner,
     /// Threads [default: all cores].
     #[arg(long, help_heading = "Scoring")]
     threads: Option<usize>,
@@ -176,13 +176,6 @@ pub(crate) struct Args {
     quiet: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum PolishArg {
-    Worst,
-    Top,
-    All,
-}
-
 /// Grips kept in the result file where `--keep` is not given.
 const KEEP: usize = 10_000;
 
@@ -190,7 +183,7 @@ impl Args {
     /// How many of the best grips are kept. A choice of grips that differ needs more than it shows,
     /// and so does a list in which one stands for many.
     fn kept(&self) -> usize {
-        let few = self.polish == PolishArg::Top && !self.diverse && !self.merge_symmetric;
+        let few = self.polish == Polish::Top && !self.diverse && !self.merge_symmetric;
         self.keep.unwrap_or(if few { 0 } else { KEEP }).max(self.top).max(1)
     }
 }
@@ -227,11 +220,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         score: ScoreOptions {
             // The other loads of grips that are kept come after the ranking.
             polish: Polish::Worst,
-            separation: args.separation.into(),
-            refiner: args.refiner.into(),
+            separation: args.separation,
+            refiner: args.refiner,
         },
     };
-    if args.polish == PolishArg::Top && settings.weights.k1 < 0.0 {
+    if args.polish == Polish::Top && settings.weights.k1 < 0.0 {
         return Err(Error::input(
             "--polish top",
             "needs a score that falls with mu_s, and --k1 is negative",
@@ -296,7 +289,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let found = Search {
         assessor: &assessor,
         keep,
-        race: args.polish == PolishArg::Top,
+        race: args.polish == Polish::Top,
         partial: partial.as_ref(),
         quiet: args.quiet,
     }
@@ -340,7 +333,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             ("noise_samples".into(), noise.samples.into()),
         ]);
     }
-    let every = args.polish == PolishArg::All;
+    let every = args.polish == Polish::All;
     if every || args.report.is_some() {
         let printed = &shown[..shown.len().min(WHOLE)];
         let chosen = grips

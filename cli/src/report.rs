@@ -7,11 +7,11 @@ use anyhow::Context;
 use clap::Args as ClapArgs;
 use gripfast::backend::{Backend, Polish, ScoreOptions, SeedSet};
 use gripfast::error::Error;
-use gripfast::mechanics::{Refiner, Separation};
 use gripfast::part::{Part, ReadOptions, Unit};
 use gripfast::plan::{Assessor, Settings};
 use gripfast::rank::Weights;
 use gripfast::report;
+use gripfast::request::{Refiner, Separation};
 use gripfast::results::{GripSet, PartSummary, RankedGrip};
 
 /// Corners of the bounding box may differ by this share of its diagonal from the result's.

@@ -9,19 +9,19 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use clap::{Args as ClapArgs, ValueEnum};
+use clap::Args as ClapArgs;
 use glam::{DMat3, DVec3};
-use gripfast::backend::{Backend, Batch, Polish, Problem, ScoreOptions, Scored, SeedSet};
+use gripfast::backend::{Backend, Batch, Problem, ScoreOptions, Scored, SeedSet};
 use gripfast::error::Error;
 use gripfast::load::{LoadSet, wrench_in_grip};
 use gripfast::model::{Contact, Score, Wrench};
 use gripfast::part::MassProperties;
+use gripfast::request::{Polish, Refiner, Separation};
 use gripfast::results::{FORMAT, GripSet};
 use gripfast::units::Quantity;
 use serde_json::Value;
 
 use super::backend::{self, BackendArgs};
-use super::solve::{RefinerArg, SeparationArg};
 
 /// Scores many contact pairs under many loads: the worst load of each and the friction coefficient
 /// it needs.
@@ -44,14 +44,14 @@ pub(crate) struct Args {
     force: Option<String>,
     /// Which loads are solved exactly: those that can be the worst, or all (then `mu_by_load` is in
     /// the output).
-    #[arg(long, value_enum, default_value = "worst")]
-    polish: PolishArg,
+    #[arg(long, value_parser = words!(Polish, ["worst", "all"]), default_value_t)]
+    polish: Polish,
     /// Pads that separate under a load: solve with the contact left, or discard as the paper does.
-    #[arg(long, value_enum, default_value = "solve")]
-    separation: SeparationArg,
+    #[arg(long, value_parser = words!(Separation), default_value_t)]
+    separation: Separation,
     /// Minimiser that polishes the solution.
-    #[arg(long, value_enum, default_value = "newton")]
-    refiner: RefinerArg,
+    #[arg(long, value_parser = words!(Refiner), default_value_t)]
+    refiner: Refiner,
     #[command(flatten)]
     backend: BackendArgs,
     /// Output file, written whole or not at all. Default: standard output.
@@ -63,21 +63,6 @@ pub(crate) struct Args {
     /// No summary on standard error.
     #[arg(long, short)]
     quiet: bool,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum PolishArg {
-    Worst,
-    All,
-}
-
-impl From<PolishArg> for Polish {
-    fn from(arg: PolishArg) -> Self {
-        match arg {
-            PolishArg::Worst => Self::Worst,
-            PolishArg::All => Self::All,
-        }
-    }
 }
 
 /// Grips scored at a time, fewer when they have many loads: what bounds the memory.
@@ -156,11 +141,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         .transpose()?;
     let (names, common): (Vec<String>, Vec<Wrench>) =
         common.unwrap_or_default().into_iter().map(|case| (case.name, case.wrench)).unzip();
-    let options = ScoreOptions {
-        polish: args.polish.into(),
-        separation: args.separation.into(),
-        refiner: args.refiner.into(),
-    };
+    let options =
+        ScoreOptions { polish: args.polish, separation: args.separation, refiner: args.refiner };
     let job = Job {
         backend: &selection.backend,
         seeds: &seeds,

@@ -7,9 +7,10 @@ use std::process::ExitCode;
 use clap::{Args as ClapArgs, ValueEnum};
 use gripfast::case::{self, Case};
 use gripfast::lab::{earlier, paper};
-use gripfast::mechanics::{self, Options, Pads, Refiner, Separation, inverse};
+use gripfast::mechanics::{self, Options, Pads, inverse};
 use gripfast::model::{Score, Slip, Status};
 use gripfast::report::contact_svg;
+use gripfast::request::{Refiner, Separation};
 
 /// Scores contact pairs: the smallest friction coefficient that holds each one's load.
 #[derive(Debug, ClapArgs)]
@@ -33,11 +34,11 @@ pub(crate) struct Args {
     plot: Option<PathBuf>,
     /// Pads that separate under the load: solve with the contact left, or discard as the paper
     /// does.
-    #[arg(long, value_enum, default_value = "solve")]
-    separation: SeparationArg,
+    #[arg(long, value_parser = words!(Separation), default_value_t)]
+    separation: Separation,
     /// Minimiser that polishes the solution.
-    #[arg(long, value_enum, default_value = "newton")]
-    refiner: RefinerArg,
+    #[arg(long, value_parser = words!(Refiner), default_value_t)]
+    refiner: Refiner,
     /// How to solve: our method, the paper's error function, or the earlier method with the slip
     /// centre at the centroid.
     #[arg(long, value_enum, default_value = "gripfast")]
@@ -58,36 +59,6 @@ enum Method {
     Paper,
     /// Slip centre at the centroid, uniform pressure (the paper's section 2).
     Centroid,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum SeparationArg {
-    Solve,
-    Discard,
-}
-
-impl From<SeparationArg> for Separation {
-    fn from(arg: SeparationArg) -> Self {
-        match arg {
-            SeparationArg::Solve => Self::Solve,
-            SeparationArg::Discard => Self::Discard,
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum RefinerArg {
-    Newton,
-    Shanno,
-}
-
-impl From<RefinerArg> for Refiner {
-    fn from(arg: RefinerArg) -> Self {
-        match arg {
-            RefinerArg::Newton => Self::Newton,
-            RefinerArg::Shanno => Self::Shanno,
-        }
-    }
 }
 
 /// Answers of the questions asked the other way round.
@@ -117,11 +88,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !(args.safety.is_finite() && args.safety > 0.0) {
         anyhow::bail!("--safety {}: give a positive number", args.safety);
     }
-    let options = Options {
-        separation: args.separation.into(),
-        refiner: args.refiner.into(),
-        ..Options::default()
-    };
+    let options =
+        Options { separation: args.separation, refiner: args.refiner, ..Options::default() };
     let mut out = std::io::stdout().lock();
     let cases = case::read(&args.case)?;
     let mut any = false;
@@ -284,8 +252,8 @@ fn print(
         let solver = match (args.method, args.refiner) {
             (Method::Paper, _) => "the paper's method, all starts",
             (Method::Centroid, _) => "centroid method",
-            (_, RefinerArg::Newton) => "refiner newton",
-            (_, RefinerArg::Shanno) => "refiner shanno",
+            (_, Refiner::Newton) => "refiner newton",
+            (_, Refiner::Shanno) => "refiner shanno",
         };
         if let Some(bounds) = score.bounds {
             writeln!(

@@ -2,37 +2,7 @@
 
 use super::Backend;
 use crate::error::{Error, ErrorKind, Result};
-
-/// Which backend is asked for.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Choice {
-    /// A GPU where there is one, else the processor. A GPU lost on the way is replaced by the
-    /// processor.
-    #[default]
-    Auto,
-    /// The processor.
-    Cpu,
-    /// A GPU; an error where there is none, or when it is lost.
-    Gpu,
-}
-
-impl std::str::FromStr for Choice {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        match text {
-            "auto" => Ok(Self::Auto),
-            "cpu" => Ok(Self::Cpu),
-            "gpu" => Ok(Self::Gpu),
-            _ => Err(Error::input(
-                "backend",
-                format!("`{text}` is not a backend"),
-                "use auto, cpu or gpu",
-            )
-            .with_options(&["backend"])),
-        }
-    }
-}
+use crate::request::Choice;
 
 /// A backend and the reason for it, for people.
 #[derive(Debug)]

@@ -36,8 +36,9 @@ pub use gpu::{
     Timeline, list as list_adapters,
 };
 
-pub use choice::{Choice, Selection, select};
-pub use score::{Polish, ScoreOptions, Scored};
+pub use crate::request::{Choice, Polish};
+pub use choice::{Selection, select};
+pub use score::{ScoreOptions, Scored};
 pub use seeds::{NEGATED, RING, SeedSet};
 pub use top::Best;
 

@@ -13,10 +13,9 @@ use super::{Backend, Batch, F32_TOLERANCE, Problem, Seed, SeedSet, SeedStatus};
 use crate::error::Result;
 use crate::mechanics::slip::{self, Field};
 use crate::mechanics::twist_out::TwistOut;
-use crate::mechanics::{
-    Options, Pads, Refiner, Search, Separation, Start, refused, solve_next, solve_pads,
-};
+use crate::mechanics::{Options, Pads, Search, Start, refused, solve_next, solve_pads};
 use crate::model::{Contact, Score, Status};
+use crate::request::{Polish, Refiner, Separation};
 
 /// Values of `mu_s` that differ by less than this share count as equal, and the first load is taken
 /// as the worst: answers from different seeds agree better than this.
@@ -25,20 +24,11 @@ pub(crate) const TIE: f64 = 1e-9;
 /// Loads seeded at a time, which bounds the memory whatever the size of the batch.
 pub(super) const BLOCK: usize = 1 << 19;
 
-/// Which loads are solved exactly.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
-pub enum Polish {
-    /// Those that can be a grip's worst one.
-    #[default]
-    Worst,
-    /// All of them.
-    All,
-}
-
 /// How [`Backend::score`] works.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ScoreOptions {
-    /// Which loads are solved.
+    /// Which loads are solved; [`Polish::Top`] is as [`Polish::Worst`] here, and
+    /// [`Backend::score_best`] leaves grips out.
     pub polish: Polish,
     /// What to do with grips that separate.
     pub separation: Separation,

@@ -211,20 +211,11 @@ impl<'a> View<'a> {
             (Some(opened), _) if grip.grip.inside => opened.min(gap),
             (Some(opened), _) => opened.max(gap),
             (None, Some(gripper)) => {
-                gripper.opened_gap(&grip.grip, self.setting("opening_m").unwrap_or(f64::INFINITY))
+                let planned = self.set.provenance.request.candidates.opening;
+                gripper.opened_gap(&grip.grip, planned.0)
             }
             (None, None) => gap,
         }
-    }
-
-    /// A number among the settings of the run.
-    fn setting(&self, name: &str) -> Option<f64> {
-        self.set
-            .provenance
-            .settings
-            .get(name)
-            .and_then(serde_json::Value::as_f64)
-            .filter(|value| value.is_finite())
     }
 
     /// Whether the pads' friction holds the worst load; without a known friction, whether any

@@ -13,7 +13,7 @@ const LEAST_SHARE: f64 = 0.5;
 
 pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result<()> {
     let frame = string(&view.options.part_frame);
-    let force = view.setting("force_n").unwrap_or(0.0);
+    let force = view.set.provenance.resolved.force.0;
     let header = format!("{{stamp: {{sec: 0, nanosec: 0}}, frame_id: {frame}}}");
     let names =
         view.options.joints.iter().map(|joint| string(&joint.name)).collect::<Vec<_>>().join(", ");

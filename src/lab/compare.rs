@@ -4,8 +4,9 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use crate::lab::earlier::{self, Weights};
+use crate::lab::earlier;
 use crate::rank::ties;
+use crate::request::EarlierWeights;
 use crate::results::{Comparison, EarlierScore, RankedGrip};
 
 /// Grips named in [`Comparison::risen`] and [`Comparison::fallen`], at most.
@@ -18,7 +19,7 @@ pub fn compare(
     grips: &mut [RankedGrip],
     centre_of_mass: DVec3,
     force: f64,
-    weights: &Weights,
+    weights: &EarlierWeights,
 ) -> Comparison {
     grips
         .par_iter_mut()
@@ -79,7 +80,7 @@ fn earlier(
     ranked: &RankedGrip,
     centre_of_mass: DVec3,
     force: f64,
-    weights: &Weights,
+    weights: &EarlierWeights,
 ) -> Option<EarlierScore> {
     let grip = &ranked.grip;
     let centre = grip.part_from_grip.point_inverse(centre_of_mass).truncate();

@@ -13,6 +13,7 @@ use crate::error::Result;
 use crate::mechanics::pads::Pads;
 use crate::mechanics::twist_out::{TwistOut, alpha, delta_d};
 use crate::model::{Contact, Pressure, Score, Slip, Status, Wrench};
+use crate::request::EarlierWeights;
 
 /// What the earlier method knows about a contact pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,27 +22,6 @@ pub struct Centroid {
     pub slip_centre: DVec2,
     /// `tau_s/(mu_s N)` [m]: mean distance of the contact from the slip centre.
     pub mean_radius: f64,
-}
-
-/// Weights of the earlier evaluation function.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Weights {
-    /// Of the resistance to twisting out, `Delta_d`.
-    pub k1: f64,
-    /// Of the resistance to slip, `tau_s/(mu_s N)`.
-    pub k2: f64,
-    /// Of the tolerance to misalignment while closing, `alpha` [m per radian makes the sum a pure
-    /// number].
-    pub k3: f64,
-    /// Keeps the function finite at the centre of mass [m].
-    pub epsilon: f64,
-}
-
-impl Default for Weights {
-    /// One each, and 1 mm: the paper states none.
-    fn default() -> Self {
-        Self { k1: 1.0, k2: 1.0, k3: 1.0, epsilon: 1e-3 }
-    }
 }
 
 /// Slip centre and mean radius under uniform pressure; `None` unless both areas are positive.
@@ -131,7 +111,7 @@ pub fn evaluation(
     contact: &Contact,
     d: f64,
     centre_of_mass: DVec2,
-    weights: &Weights,
+    weights: &EarlierWeights,
 ) -> Option<f64> {
     let grip = centroid(contact)?;
     let w = TwistOut::new(contact).least_lever()?.width;
@@ -216,7 +196,7 @@ mod tests {
     #[test]
     fn evaluation_function_of_unit_squares() {
         let contact = pair(square(0.0, 1.0), square(0.0, 1.0));
-        let weights = Weights { k1: 2.0, k2: 3.0, k3: 0.5, epsilon: 0.25 };
+        let weights = EarlierWeights { k1: 2.0, k2: 3.0, k3: 0.5, epsilon: 0.25 };
         let got = evaluation(&contact, 1.0, DVec2::new(3.0, 4.0), &weights).unwrap();
         let want =
             (2.0 * (2f64.sqrt() - 1.0) + 3.0 * SQUARE) / 5.25 + 0.5 * std::f64::consts::FRAC_PI_4;

@@ -10,11 +10,12 @@ use glam::{DMat2, DVec2};
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use crate::contact::{Loops, friction, moments};
+use crate::request::Refiner;
 
 use super::pads::{Load, Pads};
 use super::pressure::{self, face_pressure, separates};
 use super::shanno;
-use super::slip::{self, Field, Refiner, Support};
+use super::slip::{self, Field, Support};
 use super::states::Node;
 
 pub(super) type Vector7 = SVector<f64, 7>;

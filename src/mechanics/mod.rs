@@ -17,20 +17,10 @@ use crate::contact::Loops;
 use crate::error::{Error, Result};
 use crate::model::{Contact, LARGEST_LENGTH, Score, Slip, Status, Wrench};
 
+pub use crate::request::{Refiner, Separation};
 use equilibrium::{Solver, State, Vector7};
 pub use pads::{Load, Pads};
 use pressure::face_pressure;
-pub use slip::Refiner;
-
-/// What to do with a grip whose pads separate under the load.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Separation {
-    /// Find the contact that is left and solve with it (paper 3.6).
-    #[default]
-    Solve,
-    /// Refuse it with [`Status::Separating`] (the paper's rule, 5.3).
-    Discard,
-}
 
 /// Whether to look for further solutions where several are possible.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::contact::{Friction, Loops, friction, moments};
 use crate::model::Bounds;
+use crate::request::Refiner;
 
 use super::pads::Pads;
 use super::pressure::{face_pressure, first_moment, separates};
@@ -81,17 +82,6 @@ pub struct Solution {
     pub evaluations: u32,
     /// Iterations of the minimiser.
     pub iterations: u32,
-}
-
-/// Which minimiser refines a solution.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
-pub enum Refiner {
-    /// Damped Newton with the analytic Hessian or Jacobian.
-    #[default]
-    Newton,
-    /// Shanno's conjugate-direction method (the paper's reference [17]), in variables scaled by the
-    /// Hessian or Jacobian at the start.
-    Shanno,
 }
 
 /// Below this residual, relative to the load, a solution is at rounding level.

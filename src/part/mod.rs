@@ -30,10 +30,10 @@ mod topology;
 mod unit;
 mod weld;
 
+pub use crate::units::Unit;
 pub use health::Health;
 #[cfg(feature = "step")]
 pub use read::{StepProcess, serve_step};
-pub use unit::Unit;
 
 /// A triangle mesh [m], welded, outward-oriented.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -1,78 +1,8 @@
-//! Units of length of mesh files.
-
-use std::str::FromStr;
+//! Whether a part has the size of a part in the unit that its file was read in.
 
 use glam::DVec3;
 
-use crate::error::Error;
-
-/// Unit of the numbers in a mesh file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Unit {
-    /// 1 m.
-    Metre,
-    /// 0.01 m.
-    Centimetre,
-    /// 0.001 m.
-    Millimetre,
-    /// 1e-6 m.
-    Micrometre,
-    /// 0.0254 m.
-    Inch,
-    /// 0.3048 m.
-    Foot,
-}
-
-impl Unit {
-    /// All units, the commonest in mesh files first.
-    pub const ALL: [Self; 6] =
-        [Self::Millimetre, Self::Metre, Self::Inch, Self::Centimetre, Self::Micrometre, Self::Foot];
-
-    /// Length of the unit [m].
-    pub fn metres(self) -> f64 {
-        match self {
-            Self::Metre => 1.0,
-            Self::Centimetre => 1e-2,
-            Self::Millimetre => 1e-3,
-            Self::Micrometre => 1e-6,
-            Self::Inch => 0.0254,
-            Self::Foot => 0.3048,
-        }
-    }
-
-    /// Symbol as users write it.
-    pub fn symbol(self) -> &'static str {
-        match self {
-            Self::Metre => "m",
-            Self::Centimetre => "cm",
-            Self::Millimetre => "mm",
-            Self::Micrometre => "um",
-            Self::Inch => "in",
-            Self::Foot => "ft",
-        }
-    }
-}
-
-impl FromStr for Unit {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self, Error> {
-        Self::ALL.into_iter().find(|unit| unit.symbol() == text).ok_or_else(|| {
-            Error::input(
-                "unit",
-                format!("unknown unit '{text}'"),
-                "use one of: mm, cm, m, um, in, ft",
-            )
-            .with_options(&["unit"])
-        })
-    }
-}
-
-impl std::fmt::Display for Unit {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        formatter.write_str(self.symbol())
-    }
-}
+use crate::units::Unit;
 
 /// Largest extents [m] between which a part is taken for what a two-finger gripper might handle.
 const PLAUSIBLE: (f64, f64) = (1e-3, 5.0);
@@ -119,13 +49,5 @@ mod tests {
         assert!(implausible_size(extents * 1e3, Unit::Metre, true).is_none());
         let warning = implausible_size(DVec3::splat(2e4) * 1e-3, Unit::Millimetre, false).unwrap();
         assert!(warning.contains("the unit um "), "{warning}");
-    }
-
-    #[test]
-    fn symbols_parse_back() {
-        for unit in Unit::ALL {
-            assert_eq!(unit.symbol().parse::<Unit>().unwrap(), unit);
-        }
-        assert!("yd".parse::<Unit>().is_err());
     }
 }

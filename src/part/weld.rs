@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::unit::Unit;
+use crate::units::Unit;
 
 /// Triangles of a file in the file's own unit, corners with equal coordinates shared.
 #[derive(Debug, Default)]

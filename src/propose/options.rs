@@ -6,6 +6,9 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::geometry::Bounds2;
 use crate::gripper::Gripper;
+use crate::request::{Candidates, Region, Side};
+
+pub use crate::request::{Cone, Ground};
 
 /// What to propose.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -57,47 +60,39 @@ pub struct ProposeOptions {
 }
 
 impl Default for ProposeOptions {
+    /// Those of a request that says nothing.
     fn default() -> Self {
-        Self {
-            spacing: None,
-            angle_step: 15_f64.to_radians(),
-            edge_angles: true,
-            min_contact: 0.25,
-            min_pad_share: 0.02,
-            max_offset: None,
-            approach_cone: None,
-            keep_out: Vec::new(),
-            ground: None,
-            faces: None,
-            faces_in: Vec::new(),
-            outside: true,
-            inside: false,
-            flips: false,
-            opening: 5e-3,
-            min_opening: 0.05e-3,
-            clearance: 0.0,
-            approach: 0.1,
-            chunk: 65_536,
-        }
+        Self::from(&Candidates::default())
     }
 }
 
-/// Directions within an angle of an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Cone {
-    /// Axis in the part frame; any length.
-    pub axis: DVec3,
-    /// Half the opening angle [rad].
-    pub half_angle: f64,
-}
-
-/// The half-space `normal . x >= offset` of the part frame.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Ground {
-    /// Points up; any length.
-    pub normal: DVec3,
-    /// Height of the ground along the unit normal [m].
-    pub offset: f64,
+impl From<&Candidates> for ProposeOptions {
+    fn from(candidates: &Candidates) -> Self {
+        let corners = |regions: &[Region]| {
+            regions.iter().map(|region| [region.low, region.high]).collect::<Vec<_>>()
+        };
+        Self {
+            spacing: candidates.spacing.map(|spacing| spacing.0),
+            angle_step: candidates.angle_step.0,
+            edge_angles: candidates.edge_angles,
+            min_contact: candidates.min_contact,
+            min_pad_share: candidates.min_pad_share,
+            max_offset: candidates.max_offset.map(|offset| offset.0),
+            approach_cone: candidates.approach,
+            keep_out: corners(&candidates.keep_out),
+            ground: candidates.ground,
+            faces: candidates.faces.clone(),
+            faces_in: corners(&candidates.faces_in),
+            outside: candidates.grips != Side::Inside,
+            inside: candidates.grips != Side::Outside,
+            flips: candidates.flips,
+            opening: candidates.opening.0,
+            min_opening: candidates.min_opening.0,
+            clearance: candidates.clearance.0,
+            approach: candidates.approach_distance.0,
+            chunk: 65_536,
+        }
+    }
 }
 
 impl ProposeOptions {

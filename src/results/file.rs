@@ -60,9 +60,15 @@ impl GripSet {
         let first_line = bytes.iter().position(|byte| *byte == b'\n').unwrap_or(bytes.len());
         let set = match serde_json::from_slice::<Self>(&bytes[..first_line]) {
             Ok(head) => head.with_lines(place, &bytes[first_line..])?,
-            Err(_) => {
-                serde_json::from_slice(bytes).map_err(|error| explain(place, bytes, &error))?
-            }
+            Err(_) => match old_set(place, &bytes[..first_line])? {
+                Some(head) => head.with_lines(place, &bytes[first_line..])?,
+                None => match serde_json::from_slice(bytes) {
+                    Ok(set) => set,
+                    Err(error) => {
+                        old_set(place, bytes)?.ok_or_else(|| explain(place, bytes, &error))?
+                    }
+                },
+            },
         };
         set.check(place)?;
         Ok(set)
@@ -79,7 +85,7 @@ impl GripSet {
                 Error::input(
                     format!("{place}:{}", index + 1),
                     format!("not a grip: {error}"),
-                    "the file is cut off or was changed by hand; write it anew",
+                    "the file is cut off or was changed by hand; write it again",
                 )
             })?;
             self.grips.push(grip);
@@ -95,7 +101,7 @@ impl GripSet {
                 Error::input(
                     format!("{place}, grips[{index}] (id {})", ranked.grip.id),
                     problem,
-                    "write the file anew with `gripfast plan`",
+                    "write the file again with `gripfast plan`",
                 )
             };
             let pose = ranked.grip.part_from_grip;
@@ -259,6 +265,24 @@ fn field(writer: &mut impl Write, name: &str, value: &impl Serialize) -> std::io
     writer.write_all(b",\n")
 }
 
+/// A whole set of version 1, or the first line of one, in this version; `None` where the text is
+/// neither.
+fn old_set(place: &str, text: &[u8]) -> Result<Option<GripSet>> {
+    match serde_json::from_slice::<Marks>(text) {
+        Ok(Marks { format: Some(format), version: Some(1) }) if format == FORMAT => {}
+        _ => return Ok(None),
+    }
+    let Ok(value) = serde_json::from_slice(text) else { return Ok(None) };
+    let value = super::version1::upgrade(place, value)?;
+    serde_json::from_value(value).map(Some).map_err(|error| {
+        Error::input(
+            place,
+            format!("not a result file: {error}"),
+            "write the file again with `gripfast plan`",
+        )
+    })
+}
+
 /// Why the content is no result of this version.
 fn explain(place: &str, bytes: &[u8], error: &serde_json::Error) -> Error {
     // The marks first: of a file of another kind or version nothing else in it matters.
@@ -268,7 +292,7 @@ fn explain(place: &str, bytes: &[u8], error: &serde_json::Error) -> Error {
         return error;
     }
     let remedy = if error.is_eof() {
-        "the file is cut off; write it anew"
+        "the file is cut off; write it again"
     } else {
         "give a result file written by `gripfast plan -o`"
     };
@@ -301,7 +325,7 @@ fn check_marks(place: &str, format: Option<&str>, version: Option<u64>) -> Resul
         _ => Err(Error::input(
             place,
             format!("the result format's version is missing or older than {VERSION}"),
-            "write the file anew with `gripfast plan`",
+            "write the file again with `gripfast plan`",
         )),
     }
 }

@@ -257,7 +257,12 @@ fn seeds_start_the_solver_close(backend: &Backend) {
         for (i, wrench) in wrenches.iter().enumerate() {
             let w = nalgebra::Vector3::new(wrench.force.x, wrench.force.y, wrench.moment.z);
             let [from_few, from_many] = [&few, &many].map(|seeds| {
-                slip::solve(&fields, w, Some(seeds[i].twist.into()), slip::Refiner::Newton)
+                slip::solve(
+                    &fields,
+                    w,
+                    Some(seeds[i].twist.into()),
+                    gripfast::mechanics::Refiner::Newton,
+                )
             });
             assert!(
                 from_few.residual < 1e-12 && from_many.residual < 1e-12,

@@ -5,9 +5,9 @@ use std::path::Path;
 use gripfast::error::{Error, Result};
 use gripfast::export::{self, Format};
 use gripfast::gripper::Gripper;
-use gripfast::lab::earlier;
 use gripfast::part::{MassProperties, Part};
 use gripfast::plan::noise::Noise;
+use gripfast::request::EarlierWeights;
 use gripfast::units::Quantity;
 
 use super::Args;
@@ -114,10 +114,10 @@ pub(super) fn noise(args: &Args) -> Result<Option<Noise>> {
 }
 
 /// The weights of `--compare=K1,K2,K3,EPSILON`; an empty text stands for the usual ones.
-pub(super) fn earlier_weights(text: &str) -> Result<earlier::Weights> {
+pub(super) fn earlier_weights(text: &str) -> Result<EarlierWeights> {
     let flag = "--compare";
     if text.is_empty() {
-        return Ok(earlier::Weights::default());
+        return Ok(EarlierWeights::default());
     }
     let parts: Vec<&str> = text.split(',').map(str::trim).collect();
     let [k1, k2, k3, epsilon] = parts[..] else {
@@ -143,7 +143,7 @@ pub(super) fn earlier_weights(text: &str) -> Result<earlier::Weights> {
             "give a length above zero: a grip at the centre of mass is divided by it",
         ));
     }
-    Ok(earlier::Weights { k1: weight(k1)?, k2: weight(k2)?, k3: weight(k3)?, epsilon })
+    Ok(EarlierWeights { k1: weight(k1)?, k2: weight(k2)?, k3: weight(k3)?, epsilon })
 }
 
 /// The format of `-o FILE` by its ending, refused now rather than after the search.

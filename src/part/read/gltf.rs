@@ -14,8 +14,8 @@ use rustc_hash::FxHashMap;
 
 use super::Source;
 use crate::error::{Error, ErrorKind, Result};
-use crate::part::unit::Unit;
 use crate::part::weld::{Soup, Welder};
+use crate::units::Unit;
 
 /// Most nodes placed: a damaged file may refer to itself.
 const MOST_PLACED: usize = 1 << 20;

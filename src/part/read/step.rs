@@ -11,8 +11,8 @@ use glam::DVec3;
 
 use super::Source;
 use crate::error::{Error, ErrorKind, Result};
-use crate::part::unit::Unit;
 use crate::part::weld::{Soup, Welder};
+use crate::units::Unit;
 
 /// Largest distance of the triangles from a curved surface: this share of the part's diagonal, ...
 const DEFLECTION_SHARE: f64 = 1e-4;

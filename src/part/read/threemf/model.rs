@@ -11,7 +11,7 @@ use rustc_hash::FxHashMap;
 use super::super::Source;
 use super::REMEDY;
 use crate::error::{Error, ErrorKind, Result};
-use crate::part::unit::Unit;
+use crate::units::Unit;
 
 /// Deepest nesting of elements; the format needs six.
 const DEEPEST: usize = 64;
