@@ -87,7 +87,7 @@ impl<'a> Picker<'a> {
             Error::input(
                 "gripper in the result file",
                 format!("cannot be read: {error}"),
-                "write the result anew with `gripfast plan`",
+                "write the result again with `gripfast plan`",
             )
         })?;
         let obstacles: Vec<Ready> = scene.obstacles.iter().map(ready).collect();

@@ -1,323 +1,359 @@
 //! The main job: from a part, a gripper and loads to a ranked list of grips.
 //!
-//! Candidates flow through in chunks: proposed, scored under every load, measured; only the best
-//! [`Settings::keep`] stay.
+//! A [`Plan`] is made from a [`Request`]: it reads the part, the gripper and the loads.
+//! [`Plan::run`] proposes candidates chunk by chunk, scores them under every load and keeps the
+//! best; an [`Observer`] sees what it finds on the way, a flag stops it, and the state in a file
+//! beside the result lets a later run resume it. All of it runs on threads of its own.
+//!
+//! ```
+//! use std::sync::atomic::AtomicBool;
+//!
+//! use gripfast::plan::Plan;
+//! use gripfast::request::{Choice, Request};
+//! use gripfast::units::{Angle, Length, Mass};
+//!
+//! let mut request = Request::new("data/parts/hex_nut.stl", "generic");
+//! request.mass = Some(Mass(0.02));
+//! request.candidates.spacing = Some(Length(0.006));
+//! request.candidates.angle_step = Angle(1.6);
+//! request.scoring.backend = Choice::Cpu;
+//! let plan = Plan::new(request)?;
+//! let outcome = plan.run(&mut (), &AtomicBool::new(false))?;
+//! assert!(outcome.set.grips[0].worst.mu_s.is_some());
+//! # Ok::<(), gripfast::error::Error>(())
+//! ```
 
+mod assess;
 pub mod checkpoint;
+mod collect;
 pub mod noise;
+mod output;
+mod prepare;
+mod search;
 
-use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
-use glam::DVec3;
-use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use glam::{DVec2, DVec3};
+use rayon::ThreadPool;
 
-use crate::backend::{Backend, Batch, Best, Polish, Problem, ScoreOptions, Scored, SeedSet};
+use crate::backend::{Backend, SeedSet, select};
 use crate::error::Result;
-use crate::geometry::patch_area;
-use crate::load::wrench_in_grip;
-use crate::mechanics::twist_out::{self, TwistOut};
-use crate::mechanics::{Options, Pads, Search, inverse, refused};
-use crate::model::{Grip, Patch, Status, Wrench};
-use crate::part::MassProperties;
-use crate::rank::{self, Ranking, Weights};
-use crate::results::{LoadCase, LoadScore, RankedGrip};
+use crate::export::Format;
+use crate::gripper::{Gripper, Jaws};
+use crate::lab::compare;
+use crate::part::{MassProperties, Part};
+use crate::propose::{Explanation, ProposeOptions, Proposer};
+use crate::rank;
+use crate::request::{Polish, Request};
+use crate::results::{
+    self, GripSet, LoadCase, PartSummary, Provenance, RankedGrip, Resolved, Summary,
+};
+use crate::units::{Force, Length};
+use noise::Noise;
+use search::{Found, Search};
 
-/// What decides the answer, beside part, gripper and loads.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
-    /// Gripping force [N].
-    pub force: f64,
-    /// Weights of the score.
-    pub weights: Weights,
-    /// Position uncertainty of the part along the pads while closing [m], for alpha.
-    pub delta: f64,
-    /// Pad friction while closing, for alpha.
-    pub mu_c: f64,
-    /// Pad friction, for safety and the force needed.
-    pub pad_friction: Option<f64>,
-    /// How loads are solved.
-    pub score: ScoreOptions,
-}
+pub use assess::{Assessor, Settings};
+pub use collect::{Collector, OUTRANKED};
+pub use output::{GLB_TOP, WHOLE, solve_every_load};
+pub use prepare::PlanBuilder;
 
-/// Scores grips of one part under one set of loads.
+/// The main job, ready to run.
 #[derive(Debug)]
-pub struct Assessor<'a> {
-    /// The loads, part frame, about the centre of mass.
-    pub loads: &'a [LoadCase],
-    /// The part's mass properties.
-    pub mass: MassProperties,
-    /// Settings.
-    pub settings: &'a Settings,
-    /// Where the seeds are computed.
-    pub backend: &'a Backend,
-    /// The twists tried.
-    pub seeds: &'a SeedSet,
+pub struct Plan {
+    request: Request,
+    part: Part,
+    gripper: Gripper,
+    mass: MassProperties,
+    loads: Vec<LoadCase>,
+    propose: ProposeOptions,
+    settings: Settings,
+    seeds: SeedSet,
+    /// Of the result file.
+    format: Option<Format>,
+    command: Vec<String>,
+    warnings: Vec<String>,
+    threads: ThreadPool,
 }
 
-/// Loads of one call of the backend: bounds the memory whatever the number of grips and loads.
-const LOADS_AT_ONCE: usize = 1 << 20;
-/// The same where the answer of every load is kept for a while, some 250 bytes each.
-const ANSWERS_AT_ONCE: usize = 1 << 17;
+/// How far a run has come.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Progress {
+    /// Candidates looked at so far, those of the run that it resumes included.
+    pub done: u64,
+    /// Candidates in all.
+    pub total: u64,
+    /// Grips that hold so far.
+    pub grips: u64,
+}
 
-impl Assessor<'_> {
-    /// Scores every grip under its worst load, in order. The answers depend neither on the number
-    /// of threads nor on the backend.
+/// Sees a run while it goes; every method does nothing unless it is overridden, and `()` sees
+/// nothing at all.
+pub trait Observer: Send {
+    /// After every chunk of candidates, and once before the first.
+    fn progress(&mut self, _progress: Progress) {}
+
+    /// The grips of a chunk in the order of their ids, each with its worst load solved, also those
+    /// that do not hold ([`crate::model::Status::holds`]). Their ranks are not known yet.
+    fn grips(&mut self, _grips: &[RankedGrip]) {}
+
+    /// Something good to know, such as the backend in use.
+    fn note(&mut self, _text: &str) {}
+
+    /// Something to look at before relying on the result.
+    fn warning(&mut self, _text: &str) {}
+
+    /// The state of the run was written to this file.
+    fn checkpoint(&mut self, _file: &Path) {}
+}
+
+impl Observer for () {}
+
+/// What a run came to.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Outcome {
+    /// The ranked grips with all that is known of them, as in the result file.
+    pub set: GripSet,
+    /// Ids of the grips to show, best first: the first ones, or those that differ.
+    pub shown: Vec<u64>,
+    /// The file from which the run can be resumed, where it was interrupted.
+    pub checkpoint: Option<PathBuf>,
+}
+
+impl Outcome {
+    /// The grips to show, best first.
+    pub fn shown(&self) -> Vec<&RankedGrip> {
+        self.set.grips.iter().filter(|ranked| self.shown.contains(&ranked.grip.id)).collect()
+    }
+}
+
+impl Plan {
+    /// Reads the part, the gripper and the loads that a request names.
     ///
     /// # Errors
-    /// As [`Backend::score`].
-    pub fn assess(&self, grips: Vec<Grip>) -> Result<Vec<RankedGrip>> {
-        self.assess_blocks(grips, None)
+    /// When one of them cannot be read, or an option is out of its range.
+    pub fn new(request: Request) -> Result<Self> {
+        Self::builder(request).build()
     }
 
-    /// As [`Assessor::assess`], but without the grips whose bounds show that they cannot be among
-    /// the `best`, the merits so far. The weight `k1` must not be negative.
+    /// As [`Plan::new`], with a part, a gripper or loads that are already in memory.
+    pub fn builder(request: Request) -> PlanBuilder {
+        PlanBuilder::new(request)
+    }
+
+    /// What was asked for.
+    pub fn request(&self) -> &Request {
+        &self.request
+    }
+
+    /// The part.
+    pub fn part(&self) -> &Part {
+        &self.part
+    }
+
+    /// Its mass properties.
+    pub fn mass(&self) -> &MassProperties {
+        &self.mass
+    }
+
+    /// The gripper.
+    pub fn gripper(&self) -> &Gripper {
+        &self.gripper
+    }
+
+    /// The load cases, in the part frame about the centre of mass.
+    pub fn loads(&self) -> &[LoadCase] {
+        &self.loads
+    }
+
+    /// What a user should know of the part before relying on the numbers.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Why a pose is a grip, or is not: `position` [m] and approach angle [rad] in the plane of the
+    /// face pair of this number.
     ///
     /// # Errors
-    /// As [`Backend::score_best`].
-    pub fn assess_best(&self, grips: Vec<Grip>, best: &mut Best) -> Result<Vec<RankedGrip>> {
-        self.assess_blocks(grips, Some(best))
+    /// As [`Proposer::new`] and [`Proposer::explain`].
+    pub fn explain(&self, site: usize, position: DVec2, angle: f64) -> Result<Explanation> {
+        self.threads.install(|| {
+            Proposer::new(&self.part, &self.gripper, &self.propose)?.explain(
+                site,
+                position,
+                angle,
+                Jaws::Straight,
+            )
+        })
     }
 
-    fn assess_blocks(
+    /// Finds and ranks the grips, and writes the files that the request names. When `stop` becomes
+    /// true, the run ends after the chunk in flight with what it has.
+    ///
+    /// The grips, their numbers and their order depend neither on the number of threads nor on the
+    /// backend nor on interruptions.
+    ///
+    /// # Errors
+    /// When no backend is there, an option does not fit the part, the state to resume belongs to
+    /// another request, or a file cannot be written.
+    pub fn run(&self, observer: &mut dyn Observer, stop: &AtomicBool) -> Result<Outcome> {
+        self.threads.install(|| self.run_here(observer, stop))
+    }
+
+    fn run_here(&self, observer: &mut dyn Observer, stop: &AtomicBool) -> Result<Outcome> {
+        self.warnings.iter().for_each(|text| observer.warning(text));
+        let scoring = &self.request.scoring;
+        let selection = select(scoring.backend, scoring.adapter.as_deref())?;
+        observer.note(&format!("backend {}", selection.reason));
+        let assessor = self.assessor(&selection.backend);
+        let mut proposer = Proposer::new(&self.part, &self.gripper, &self.propose)?;
+        let partial = self.partial()?;
+        let search = Search {
+            assessor: &assessor,
+            keep: self.request.kept(),
+            race: scoring.polish == Polish::Top,
+            partial: partial.as_ref(),
+            resume: self.request.output.resume,
+        };
+        let found = search.run(&mut proposer, observer, stop)?;
+        let (complete, checkpoint) = (found.complete, found.checkpoint.clone());
+        let (set, shown) = self.finish(&proposer, &assessor, found)?;
+        self.write(&set)?;
+        if let Some(partial) = partial.filter(|_| complete) {
+            partial.remove()?;
+        }
+        Ok(Outcome { set, shown, checkpoint })
+    }
+
+    fn assessor<'a>(&'a self, backend: &'a Backend) -> Assessor<'a> {
+        Assessor {
+            loads: &self.loads,
+            mass: self.mass,
+            settings: &self.settings,
+            backend,
+            seeds: &self.seeds,
+        }
+    }
+
+    /// Orders what was found and adds what only the grips of the list need; the ids of those to
+    /// show.
+    fn finish(
         &self,
-        grips: Vec<Grip>,
-        mut best: Option<&mut Best>,
-    ) -> Result<Vec<RankedGrip>> {
-        let mut ranked = Vec::with_capacity(grips.len());
-        let mut grips = grips.into_iter().peekable();
-        while grips.peek().is_some() {
-            let block: Vec<Grip> =
-                grips.by_ref().take((LOADS_AT_ONCE / self.loads.len().max(1)).max(1)).collect();
-            ranked.extend(self.assess_block(block, best.as_deref_mut())?);
+        proposer: &Proposer<'_>,
+        assessor: &Assessor<'_>,
+        found: Found,
+    ) -> Result<(GripSet, Vec<u64>)> {
+        let selection = &self.request.selection;
+        let (low, high) = self.part.mesh.bounding_box();
+        let (centre, size) = (self.mass.centre_of_mass, (high - low).length());
+        let ranking = found.collector.finish(centre, size, &self.rank_options());
+        let mut rejections = proposer.tally().rejections.clone();
+        for (reason, count) in &ranking.rejections {
+            *rejections.entry(reason.clone()).or_default() += count;
         }
-        Ok(ranked)
-    }
-
-    fn assess_block(&self, grips: Vec<Grip>, best: Option<&mut Best>) -> Result<Vec<RankedGrip>> {
-        let wrenches: Vec<Vec<Wrench>> = grips.par_iter().map(|grip| self.wrenches(grip)).collect();
-        let batch = Batch {
-            problems: grips
-                .iter()
-                .zip(&wrenches)
-                .map(|(grip, wrenches)| self.problem(grip, wrenches))
-                .collect(),
+        let mut grips = ranking.grips;
+        assessor.finish(&mut grips);
+        let comparison = selection
+            .compare
+            .map(|weights| compare::compare(&mut grips, centre, self.settings.force, &weights));
+        let shown: Vec<u64> = if selection.diverse {
+            let chosen = rank::choose_diverse(&grips, selection.top, size);
+            chosen.into_iter().map(|ranked| ranked.grip.id).collect()
+        } else {
+            grips.iter().take(selection.top).map(|ranked| ranked.grip.id).collect()
         };
-        let scored = match best {
-            None => self.backend.score(&batch, self.seeds, &self.settings.score)?,
-            Some(best) => {
-                let alphas: Vec<f64> = grips
-                    .par_iter()
-                    .map(|grip| self.alpha(grip, &TwistOut::new(&grip.contact)).0)
-                    .collect();
-                let merit = |index: usize, mu: f64| self.settings.weights.score(mu, alphas[index]);
-                self.backend.score_best(&batch, self.seeds, &self.settings.score, best, &merit)?
-            }
-        };
-        let jobs = grips
-            .into_par_iter()
-            .zip(wrenches.par_iter())
-            .zip(scored)
-            .filter(|(_, scored)| !scored.outranked);
-        Ok(jobs.map(|((grip, wrenches), scored)| self.measure(grip, wrenches, &scored)).collect())
-    }
-
-    /// The loads as a grip sees them.
-    fn wrenches(&self, grip: &Grip) -> Vec<Wrench> {
-        self.loads
-            .iter()
-            .map(|load| {
-                wrench_in_grip(&load.wrench, self.mass.centre_of_mass, &grip.part_from_grip)
-            })
-            .collect()
-    }
-
-    fn problem<'a>(&self, grip: &'a Grip, wrenches: &'a [Wrench]) -> Problem<'a> {
-        Problem {
-            contact: &grip.contact,
-            distance: grip.distance(),
-            force: self.settings.force,
-            wrenches,
-        }
-    }
-
-    /// Alpha [rad] and the least lever [m].
-    ///
-    /// The width counts for grips from inside too: jaws that push outwards right a part up to `asin
-    /// w/d`, which is more than `atan w/d`.
-    fn alpha(&self, grip: &Grip, lever: &TwistOut) -> (f64, f64) {
-        let least = lever.least_lever().map_or(0.0, |lever| lever.width);
-        (twist_out::alpha(grip.width, least, self.settings.delta, self.settings.mu_c), least)
-    }
-
-    /// A grip's numbers from its worst load; what takes more solving is left to
-    /// [`Assessor::finish`].
-    fn measure(&self, grip: Grip, wrenches: &[Wrench], scored: &Scored) -> RankedGrip {
-        let (load, score) = scored.worst.unwrap_or((0, refused(Status::NoContact, 0)));
-        let wrench = wrenches.get(load).copied().unwrap_or_default();
-        let lever = TwistOut::new(&grip.contact);
-        let (alpha, least) = self.alpha(&grip, &lever);
-        let share = |left: f64, patch: &Patch| left / patch_area(patch);
-        let contact_share = share(score.contact_area_i, &grip.contact.face_i)
-            .min(share(score.contact_area_ii, &grip.contact.face_ii));
-        RankedGrip {
-            rank: 0,
-            score: None,
-            alpha,
-            delta_d: twist_out::delta_d(grip.width, least),
-            contact_share,
-            twist_margin: lever.margin(self.settings.force, &wrench),
-            safety: self
-                .settings
-                .pad_friction
-                .zip(score.mu_s)
-                .filter(|(_, mu)| *mu > 0.0)
-                .map(|(friction, mu)| friction / mu),
-            force_needed: None,
-            load_multiple: None,
-            earlier: None,
-            pose_noise: None,
-            worst: LoadScore {
-                load: load as u32,
-                wrench,
-                status: score.status,
-                mu_s: score.mu_s,
-                slip: score.slip,
-                pressure: score.pressure,
-                bounds: score.bounds,
-                residual: score.residual,
+        self.add_noise(proposer, assessor, &mut grips, &shown)?;
+        self.solve_other_loads(assessor, &mut grips, &shown)?;
+        let set = GripSet {
+            format: results::FORMAT.into(),
+            version: results::VERSION,
+            provenance: self.provenance(found.backend, found.complete),
+            part: self.part_summary([low, high]),
+            gripper: output::gripper_json(&self.gripper)?,
+            loads: self.loads.clone(),
+            summary: Summary {
+                pairs: proposer.tally().pairs,
+                candidates: proposer.tally().candidates,
+                ranked: ranking.ranked,
+                rejections,
+                comparison,
             },
-            merged: Vec::new(),
-            mu_by_load: scored.all.iter().map(|score| score.mu_s).collect(),
-            grip,
-        }
-    }
-
-    /// Solves every load exactly for the grips that do not have all of them yet, and keeps each
-    /// load's `mu_s`. Nothing else changes.
-    ///
-    /// # Errors
-    /// As [`Backend::score`].
-    pub fn solve_every_load(&self, grips: &mut [&mut RankedGrip]) -> Result<()> {
-        let options = ScoreOptions { polish: Polish::All, ..self.settings.score };
-        let mut open: Vec<&mut &mut RankedGrip> =
-            grips.iter_mut().filter(|ranked| ranked.mu_by_load.len() != self.loads.len()).collect();
-        for block in open.chunks_mut((ANSWERS_AT_ONCE / self.loads.len().max(1)).max(1)) {
-            let wrenches: Vec<Vec<Wrench>> =
-                block.par_iter().map(|ranked| self.wrenches(&ranked.grip)).collect();
-            let problems = block
-                .iter()
-                .zip(&wrenches)
-                .map(|(ranked, wrenches)| self.problem(&ranked.grip, wrenches));
-            let scored = self.backend.score(
-                &Batch { problems: problems.collect() },
-                self.seeds,
-                &options,
-            )?;
-            for (ranked, scored) in block.iter_mut().zip(scored) {
-                ranked.mu_by_load = scored.all.iter().map(|score| score.mu_s).collect();
-            }
-        }
-        Ok(())
-    }
-
-    /// Adds what only the grips of the final list need: the gripping force needed and the largest
-    /// multiple under the worst load.
-    pub fn finish(&self, grips: &mut [RankedGrip]) {
-        let Some(friction) = self.settings.pad_friction else { return };
-        // For thousands of grips only limit states on the branch from d = 0 count, which errs
-        // towards more force.
-        let options = Options {
-            separation: self.settings.score.separation,
-            search: Search::Off,
-            ..Options::default()
+            grips,
         };
-        grips.par_iter_mut().for_each(|ranked| {
-            let grip = &ranked.grip;
-            let Some(pads) = Pads::new(&grip.contact) else { return };
-            ranked.force_needed = inverse::force_needed(
-                &pads,
-                grip.distance(),
-                &ranked.worst.wrench,
-                friction,
-                &options,
-            );
-            let multiple = ranked.force_needed.map_or(0.0, |needed| self.settings.force / needed);
-            ranked.load_multiple = multiple.is_finite().then_some(multiple);
-        });
+        Ok((set, shown))
     }
-}
 
-/// Among the rejections of a run: grips left unsolved because their bounds put them behind the best
-/// ones kept.
-pub const OUTRANKED: &str = "outranked";
-
-/// Scores closer than this share may tie in the ranking ([`rank::TIE`], neighbour by neighbour).
-const CLOSE: f64 = 1e-6;
-
-/// Collects scored grips chunk by chunk, keeping the best.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Collector {
-    kept: Vec<RankedGrip>,
-    /// Number of kept grips at which the next cut is worth it.
-    full: usize,
-    ranked: u64,
-    rejections: BTreeMap<String, u64>,
-}
-
-impl Collector {
-    /// Takes a chunk; afterwards at most `2 keep` grips, those that tie with them, and the chunk
-    /// are held.
-    pub fn add(&mut self, grips: Vec<RankedGrip>, keep: usize, weights: Weights) {
-        for mut grip in grips {
-            match grip.worst.mu_s.filter(|_| grip.worst.status.holds()) {
-                Some(mu) => {
-                    let score = weights.score(mu, grip.alpha);
-                    grip.score = score.is_finite().then_some(score);
-                    self.ranked += 1;
-                    self.kept.push(grip);
-                }
-                None => {
-                    *self.rejections.entry(rank::status_name(grip.worst.status)).or_default() += 1
-                }
-            }
-        }
-        if self.kept.len() > keep.saturating_mul(2).max(self.full) {
-            let value = |grip: &RankedGrip| grip.score.unwrap_or(f64::INFINITY);
-            self.kept.sort_by(|a, b| value(b).total_cmp(&value(a)).then(a.grip.id.cmp(&b.grip.id)));
-            // Those that tie with the last one stay: the ranking orders them by other things, and
-            // all of them must be there.
-            let last = self.kept.get(keep.max(1) - 1).map_or(f64::NEG_INFINITY, value);
-            let least = if last.is_finite() { last - CLOSE * last.abs() } else { last };
-            self.kept.truncate(self.kept.partition_point(|grip| value(grip) >= least));
-            self.full = 2 * self.kept.len();
+    fn rank_options(&self) -> rank::Options {
+        rank::Options {
+            weights: self.settings.weights,
+            keep_flips: self.propose.flips,
+            merge_duplicates: self.request.selection.merge_symmetric,
+            top: Some(self.request.kept()),
+            ..rank::Options::default()
         }
     }
 
-    /// Counts grips of a chunk that were left unsolved because they cannot be among the best.
-    pub fn outrank(&mut self, grips: u64) {
-        if grips > 0 {
-            *self.rejections.entry(OUTRANKED.to_owned()).or_default() += grips;
+    /// Tries the grips to show at uncertain poses, where the request asks for it.
+    fn add_noise(
+        &self,
+        proposer: &Proposer<'_>,
+        assessor: &Assessor<'_>,
+        grips: &mut [RankedGrip],
+        shown: &[u64],
+    ) -> Result<()> {
+        let Some(error) = self.request.selection.pose_noise else { return Ok(()) };
+        let samples = self.request.selection.noise_samples;
+        let noise = Noise { shift: error.shift.0, turn: error.turn.0, samples };
+        let mut chosen: Vec<&mut RankedGrip> =
+            grips.iter_mut().filter(|ranked| shown.contains(&ranked.grip.id)).collect();
+        noise.assess(proposer, assessor, &mut chosen)
+    }
+
+    /// Solves the loads that cannot be the worst, for all grips or for those on a page.
+    fn solve_other_loads(
+        &self,
+        assessor: &Assessor<'_>,
+        grips: &mut [RankedGrip],
+        shown: &[u64],
+    ) -> Result<()> {
+        let every = self.request.scoring.polish == Polish::All;
+        if !every && self.request.output.report.is_none() {
+            return Ok(());
         }
+        let shown = &shown[..shown.len().min(WHOLE)];
+        let chosen = grips
+            .iter_mut()
+            .enumerate()
+            .filter(|(place, ranked)| every || *place < WHOLE || shown.contains(&ranked.grip.id));
+        let mut chosen: Vec<&mut RankedGrip> = chosen.map(|(_, ranked)| ranked).collect();
+        assessor.solve_every_load(&mut chosen)
     }
 
-    /// Scores of the best grips so far, infinite where no friction is needed.
-    pub fn scores(&self) -> impl Iterator<Item = f64> {
-        self.kept.iter().map(|grip| grip.score.unwrap_or(f64::INFINITY))
+    fn provenance(&self, backend: String, complete: bool) -> Provenance {
+        let mut resolved = Resolved::default();
+        resolved.force = Force(self.settings.force);
+        resolved.spacing = Length(self.propose.spacing(&self.gripper));
+        resolved.pad_friction = self.settings.pad_friction;
+        resolved.seeds = self.seeds.len();
+        resolved.keep = self.request.kept();
+        let mut provenance = Provenance::new(self.request.clone(), resolved);
+        provenance.command.clone_from(&self.command);
+        provenance.backend = backend;
+        provenance.complete = complete;
+        provenance.warnings.clone_from(&self.warnings);
+        provenance
     }
 
-    /// Grips ranked so far.
-    pub fn ranked(&self) -> u64 {
-        self.ranked
-    }
-
-    /// The final order with counts; `size` is the diagonal of the part's bounding box [m].
-    pub fn finish(self, centre_of_mass: DVec3, size: f64, options: &rank::Options) -> Ranking {
-        let mut ranking = rank::rank(self.kept, centre_of_mass, size, options);
-        for (reason, count) in self.rejections {
-            *ranking.rejections.entry(reason).or_default() += count;
+    fn part_summary(&self, [bbox_min, bbox_max]: [DVec3; 2]) -> PartSummary {
+        PartSummary {
+            file: self.part.file.display().to_string(),
+            unit_m: self.part.unit_m,
+            triangles: self.part.mesh.triangles.len(),
+            bbox_min,
+            bbox_max,
+            mass: self.mass,
         }
-        ranking.ranked = self.ranked - ranking.rejections.get("duplicate").copied().unwrap_or(0);
-        ranking
     }
 }

@@ -370,13 +370,16 @@ impl Request {
                 "polish",
                 "'top' needs a score that falls with mu_s, and k1 is negative",
                 "use 'worst'",
-            ));
+            )
+            .with_options(&["polish", "k1"]));
         }
         if self.mass.is_some() && self.density.is_some() {
-            return Err(Error::input("mass", "is given beside a density", "give one of them"));
+            return Err(Error::input("mass", "is given beside a density", "give one of them")
+                .with_options(&["mass", "density"]));
         }
         if self.scoring.threads == Some(0) {
-            return Err(Error::input("threads", "is 0", "give one or more, or none for all cores"));
+            return Err(Error::input("threads", "is 0", "give one or more, or none for all cores")
+                .with_options(&["threads"]));
         }
         self.selection.check()?;
         let checkpoint = self.output.checkpoint;
@@ -385,7 +388,8 @@ impl Request {
                 "checkpoint",
                 format!("'{checkpoint}' is no time to wait"),
                 "give zero (after every chunk) or more, e.g. 30s",
-            ));
+            )
+            .with_options(&["checkpoint"]));
         }
         Ok(())
     }
@@ -402,14 +406,16 @@ impl Selection {
                 "pose_noise",
                 format!("'{noise}' is negative"),
                 "give how far the pose may be off either way, zero or more",
-            ));
+            )
+            .with_options(&["pose_noise"]));
         }
         if !(1..=MOST_SAMPLES).contains(&self.noise_samples) {
             return Err(Error::input(
                 "noise_samples",
                 format!("is {}", self.noise_samples),
                 format!("give 1 to {MOST_SAMPLES}"),
-            ));
+            )
+            .with_options(&["noise_samples"]));
         }
         if let Some(EarlierWeights { k1, k2, k3, epsilon }) = self.compare {
             for weight in [k1, k2, k3] {
@@ -420,35 +426,39 @@ impl Selection {
                     "compare",
                     format!("EPSILON is {epsilon} m"),
                     "give a length above zero: a grip at the centre of mass is divided by it",
-                ));
+                )
+                .with_options(&["compare"]));
             }
         }
         Ok(())
     }
 }
 
-fn finite(field: &str, value: f64) -> Result<()> {
+fn finite(field: &'static str, value: f64) -> Result<()> {
     if value.is_finite() {
         Ok(())
     } else {
-        Err(Error::input(field, format!("is {value}"), "give a finite number"))
+        Err(Error::input(field, format!("is {value}"), "give a finite number")
+            .with_options(&[field]))
     }
 }
 
-fn not_negative(field: &str, value: f64) -> Result<()> {
+fn not_negative(field: &'static str, value: f64) -> Result<()> {
     if value.is_finite() && value >= 0.0 {
         Ok(())
     } else {
-        Err(Error::input(field, format!("is {value}"), "give a number, zero or more"))
+        Err(Error::input(field, format!("is {value}"), "give a number, zero or more")
+            .with_options(&[field]))
     }
 }
 
 fn wrong(place: String, problem: String) -> Error {
-    Error::input(
+    Error::format(
         place,
         format!("not a request: {problem}"),
-        "`gripfast plan .. --print-request` shows what one looks like",
+        "write one with the option print_request and change that",
     )
+    .with_options(&["print_request"])
 }
 
 /// A list of texts, or one text whose parts commas join.

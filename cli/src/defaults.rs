@@ -45,6 +45,13 @@ pub(crate) fn apply(
         return Ok(arguments);
     };
     let name = arguments[place].to_string_lossy().into_owned();
+    // A stored request is whole: the project's defaults would change it.
+    if arguments[place + 1..].iter().any(|argument| {
+        let text = argument.to_string_lossy();
+        text == "--request" || text.starts_with("--request=")
+    }) {
+        return Ok(arguments);
+    }
     let (Some(subcommand), Some(defaults)) = (command.find_subcommand(&name), table.get(&name))
     else {
         return Ok(arguments);

@@ -7,11 +7,9 @@ use std::process::ExitCode;
 use clap::Args as ClapArgs;
 use gripfast::export::{self, Convention, Format, Joint, Options, Origin};
 use gripfast::part::{Part, ReadOptions, Unit};
+use gripfast::plan::GLB_TOP;
 use gripfast::results::GripSet;
 use gripfast::units::Quantity;
-
-/// Grippers drawn into a GLB when `--top` is not given: more hide the part.
-pub(crate) const GLB_TOP: usize = 10;
 
 /// Writes a result file in the format of another program.
 #[derive(Debug, ClapArgs)]

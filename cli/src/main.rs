@@ -15,7 +15,6 @@ macro_rules! words {
 
 mod backend;
 mod bench;
-mod candidates;
 mod defaults;
 mod devices;
 mod export;
@@ -35,7 +34,7 @@ mod why;
 use std::path::Path;
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 /// Finds and ranks every two-finger grip on a CAD part by the smallest friction coefficient that
 /// holds it.
@@ -87,11 +86,23 @@ fn main() -> ExitCode {
     run()
 }
 
+/// The command line, with help that states the defaults.
+fn command() -> clap::Command {
+    plan::with_defaults(Cli::command())
+}
+
+/// Parses the command line, or says what is wrong with it and ends.
+fn parse(line: Vec<std::ffi::OsString>) -> Cli {
+    let mut command = command();
+    let matches = command.try_get_matches_from_mut(line).unwrap_or_else(|error| error.exit());
+    Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut command).exit())
+}
+
 /// Parses the command line and runs the subcommand.
 fn run() -> ExitCode {
     let outcome =
-        defaults::apply(&Cli::command(), std::env::args_os().collect(), Path::new(defaults::FILE))
-            .and_then(|line| match Cli::parse_from(line).command {
+        defaults::apply(&command(), std::env::args_os().collect(), Path::new(defaults::FILE))
+            .and_then(|line| match parse(line).command {
                 Command::Part(args) => part::run(args),
                 Command::Plan(args) => plan::run(*args),
                 Command::Solve(args) => solve::run(args),

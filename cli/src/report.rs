@@ -5,19 +5,14 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use clap::Args as ClapArgs;
-use gripfast::backend::{Backend, Polish, ScoreOptions, SeedSet};
 use gripfast::error::Error;
 use gripfast::part::{Part, ReadOptions, Unit};
-use gripfast::plan::{Assessor, Settings};
-use gripfast::rank::Weights;
+use gripfast::plan::{WHOLE, solve_every_load};
 use gripfast::report;
-use gripfast::request::{Refiner, Separation};
-use gripfast::results::{GripSet, PartSummary, RankedGrip};
+use gripfast::results::{GripSet, PartSummary};
 
 /// Corners of the bounding box may differ by this share of its diagonal from the result's.
 const SAME_BOX: f64 = 1e-6;
-/// The best grips of a list, for which a page shows the friction over all loads.
-pub(crate) const WHOLE: usize = 20;
 
 /// Writes a result file as one HTML page with the part in three dimensions, which needs no network.
 #[derive(Debug, ClapArgs)]
@@ -53,7 +48,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         Some(path) => Some(read_part(path, &set.part)?),
         None => recorded_part(&args.grips, &set.part),
     };
-    if let Err(error) = solve_every_load(&mut set) {
+    if let Err(error) = solve_every_load(&mut set, WHOLE) {
         eprintln!("warning: {error}\n  the page shows the worst loads only");
     }
     report::write(&set, part.as_ref().map(|part| &part.mesh), &output)?;
@@ -62,47 +57,6 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         .len();
     eprintln!("{}: {} grips, {:.1} MB", output.display(), set.grips.len(), size as f64 / 1e6);
     Ok(ExitCode::SUCCESS)
-}
-
-/// Solves all loads of the best grips, as they were solved for the result.
-fn solve_every_load(set: &mut GripSet) -> gripfast::error::Result<()> {
-    let setting = |name: &str| set.provenance.settings.get(name);
-    let Some(force) = setting("force_n").and_then(serde_json::Value::as_f64) else {
-        return Err(Error::input(
-            "result file",
-            "does not say the gripping force (settings.force_n)",
-            "write it anew with `gripfast plan`",
-        ));
-    };
-    let is =
-        |name: &str, value: &str| setting(name).and_then(serde_json::Value::as_str) == Some(value);
-    let score = ScoreOptions {
-        polish: Polish::All,
-        separation: if is("separation", "discard") {
-            Separation::Discard
-        } else {
-            Separation::Solve
-        },
-        refiner: if is("refiner", "shanno") { Refiner::Shanno } else { Refiner::Newton },
-    };
-    let settings = Settings {
-        force,
-        weights: Weights::default(),
-        delta: 0.0,
-        mu_c: 0.0,
-        pad_friction: None,
-        score,
-    };
-    let seeds = SeedSet::default();
-    let assessor = Assessor {
-        loads: &set.loads,
-        mass: set.part.mass,
-        settings: &settings,
-        backend: &Backend::Cpu,
-        seeds: &seeds,
-    };
-    assessor
-        .solve_every_load(&mut set.grips.iter_mut().take(WHOLE).collect::<Vec<&mut RankedGrip>>())
 }
 
 /// The part that the result names; says why when it cannot be had.

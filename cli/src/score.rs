@@ -320,12 +320,7 @@ impl Job<'_> {
                 }
             }
             Source::Result(set) => {
-                let force = self
-                    .force
-                    .or_else(|| set.provenance.settings.get("force_n").and_then(Value::as_f64));
-                let force = force.ok_or_else(|| {
-                    Error::input(self.name, "states no gripping force", "give --force")
-                })?;
+                let force = self.force.unwrap_or(set.provenance.resolved.force.0);
                 let own: Vec<Wrench> = set.loads.iter().map(|load| load.wrench).collect();
                 let loads = if self.given { self.common } else { &own };
                 for ranked in set.grips {

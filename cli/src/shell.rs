@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args as ClapArgs, CommandFactory};
+use clap::Args as ClapArgs;
 
 /// Prints a shell's completion script.
 #[derive(Debug, ClapArgs)]
@@ -27,7 +27,7 @@ pub(crate) struct ManArgs {
 
 pub(crate) fn completions(args: CompletionsArgs) -> anyhow::Result<ExitCode> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut super::Cli::command(), "gripfast", &mut script);
+    clap_complete::generate(args.shell, &mut super::command(), "gripfast", &mut script);
     std::io::stdout().write_all(&script)?;
     Ok(ExitCode::SUCCESS)
 }
@@ -37,7 +37,7 @@ pub(crate) fn man(args: ManArgs) -> anyhow::Result<ExitCode> {
         gripfast::error::Error::io(&args.folder, "write manual pages into", error)
     };
     std::fs::create_dir_all(&args.folder).map_err(failed)?;
-    clap_mangen::generate_to(super::Cli::command(), &args.folder).map_err(failed)?;
+    clap_mangen::generate_to(super::command(), &args.folder).map_err(failed)?;
     writeln!(std::io::stdout(), "manual pages written to {}", args.folder.display())?;
     Ok(ExitCode::SUCCESS)
 }

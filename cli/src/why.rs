@@ -8,11 +8,9 @@ use clap::Args as ClapArgs;
 use gripfast::error::{Error, Result};
 use gripfast::gripper::Gripper;
 use gripfast::part::{Part, ReadOptions, Unit};
-use gripfast::propose::{Explanation, Proposer};
+use gripfast::propose::{Explanation, ProposeOptions, Proposer};
 use gripfast::results::{GripSet, RankedGrip};
 use gripfast::units::Quantity;
-
-use super::candidates::CandidateArgs;
 
 /// Explains one grip of a result file: every test with body and place, and what its score is made
 /// of.
@@ -47,8 +45,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let path = args.part.unwrap_or_else(|| PathBuf::from(&set.part.file));
     let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == set.part.unit_m);
     let part = Part::read(&path, &ReadOptions { unit, ..Default::default() })?;
-    let proposer =
-        Proposer::new(&part, &gripper, &CandidateArgs::from_settings(&set.provenance.settings))?;
+    let options = ProposeOptions::from(&set.provenance.request.candidates);
+    let proposer = Proposer::new(&part, &gripper, &options)?;
     let explanation = proposer.explain_pose(
         ranked.grip.face_i,
         ranked.grip.face_ii,
@@ -103,8 +101,7 @@ fn limits(out: &mut impl Write, ranked: &RankedGrip, set: &GripSet) -> std::io::
     if let (Some(safety), Some(needed), Some(multiple)) =
         (ranked.safety, ranked.force_needed, ranked.load_multiple)
     {
-        let friction =
-            set.provenance.settings.get("pad_friction").and_then(serde_json::Value::as_f64);
+        let friction = set.provenance.resolved.pad_friction;
         let friction = friction.map_or(String::new(), |friction| format!(" {friction}"));
         writeln!(
             out,

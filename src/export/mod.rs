@@ -17,7 +17,7 @@ mod yaml;
 use std::io::Write;
 use std::path::Path;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::gripper::Gripper;
 use crate::model::Frame;
 use crate::part::Mesh;
@@ -94,8 +94,9 @@ impl Format {
             return Err(Error::input(
                 place,
                 "YAML is used by isaac_grasp and by moveit",
-                "add --format isaac_grasp or --format moveit",
-            ));
+                "name the format: isaac_grasp or moveit",
+            )
+            .with_options(&["format"]));
         }
         let endings =
             Self::ALL.iter().flat_map(|known| known.2.iter().map(move |ending| (known.0, *ending)));
@@ -108,8 +109,9 @@ impl Format {
                 Error::input(
                     place,
                     "the file's ending names no format",
-                    format!("add --format, one of: {names}"),
+                    format!("name the format, one of: {names}"),
                 )
+                .with_options(&["format"])
             })
     }
 
@@ -182,7 +184,7 @@ impl<'a> View<'a> {
             return Err(Error::input(
                 "gripper in the result file",
                 format!("cannot be read: {error}"),
-                "write the result anew with `gripfast plan`",
+                "write the result again with `gripfast plan`",
             ));
         }
         Ok(Self { set, gripper: gripper.ok(), options, grip_from_tool, convention })
@@ -293,15 +295,18 @@ pub fn write_to(
 /// When the format is not built in.
 pub fn check(format: Format) -> Result<()> {
     match format {
-        Format::Parquet if !cfg!(feature = "parquet") => Err(Error::input(
-            "--format parquet",
+        Format::Parquet if !cfg!(feature = "parquet") => Err(Error::new(
+            ErrorKind::Unsupported,
+            "format parquet",
             "this build has no Parquet",
-            "use a released binary or build with `cargo build --release --features parquet`; csv holds the same columns",
+            "use a released binary or build with the feature `parquet`; csv holds the same columns",
         )),
-        Format::Acronym if !cfg!(feature = "hdf5") => Err(Error::input(
-            "--format acronym",
+        Format::Acronym if !cfg!(feature = "hdf5") => Err(Error::new(
+            ErrorKind::Unsupported,
+            "format acronym",
             "this build has no HDF5",
-            "use a released binary or build with `cargo build --release --features hdf5`; graspgen holds the same poses as JSON",
+            "use a released binary or build with the feature `hdf5`; graspgen holds the same poses \
+             as JSON",
         )),
         _ => Ok(()),
     }

@@ -51,8 +51,8 @@ impl Stated {
         }
     }
 
-    /// The frame in the grip frame; `flag` is what asked for it.
-    fn frame(self, flag: &str, gripper: Option<&Gripper>) -> Result<Frame> {
+    /// The frame in the grip frame; `option` is what asked for it.
+    fn frame(self, option: &'static str, gripper: Option<&Gripper>) -> Result<Frame> {
         let stated = gripper.and_then(|gripper| match self {
             Self::Flange => gripper.grip_from_flange,
             Self::Tool => gripper.grip_from_tool,
@@ -60,10 +60,14 @@ impl Stated {
         let name = self.name();
         stated.ok_or_else(|| {
             Error::input(
-                format!("{flag} {name}"),
+                format!("{option} {name}"),
                 format!("the gripper of this result states no {name}"),
-                format!("add [{name}] to the gripper file and plan anew, or give the distance behind the pads, e.g. --origin 103.4mm"),
+                format!(
+                    "add [{name}] to the gripper file and plan again, or give as origin the \
+                     distance behind the pads, e.g. 103.4mm"
+                ),
             )
+            .with_options(&["origin"])
         })
     }
 }
@@ -122,7 +126,7 @@ impl Convention {
             Self::GraspNet | Self::DexNet => {
                 DMat3::from_cols(approach, closing, approach.cross(closing))
             }
-            Self::Stated(stated) => stated.frame("--convention", gripper)?.rotation,
+            Self::Stated(stated) => stated.frame("convention", gripper)?.rotation,
         })
     }
 }
@@ -237,7 +241,7 @@ pub fn grip_from_tool(
     let origin = match origin {
         Origin::Pads => DVec3::ZERO,
         Origin::Behind(distance) => DVec3::X * -distance,
-        Origin::Stated(stated) => stated.frame("--origin", gripper)?.origin,
+        Origin::Stated(stated) => stated.frame("origin", gripper)?.origin,
     };
     Ok(Frame { rotation: convention.rotation(gripper)?, origin })
 }
@@ -259,10 +263,10 @@ mod tests {
             let words: Vec<&str> = convention.axes().split([' ', ',']).collect();
             assert_eq!((words[1], words[4]), ("approach", "closing"));
             assert_eq!((axis(words[0]), axis(words[3])), (DVec3::X, DVec3::Z), "{name}");
-            assert_eq!(Convention::parse("--convention", name).unwrap(), convention);
+            assert_eq!(Convention::parse("convention", name).unwrap(), convention);
         }
         assert!(
-            Convention::parse("--convention", "other")
+            Convention::parse("convention", "other")
                 .unwrap_err()
                 .to_string()
                 .contains("graspgen (z approach, x closing)")
@@ -275,16 +279,16 @@ mod tests {
             + "\n[tool]\norigin = [\"5mm\", \"0mm\", \"0mm\"]\nz = [1, 0, 0]\ny = [0, 1, 1]\n";
         let gripper = crate::gripper::parse(&text, "test").unwrap();
         let [convention, origin] = [
-            Convention::parse("--convention", "tool").unwrap(),
-            Convention::parse("--convention", "flange").unwrap(),
+            Convention::parse("convention", "tool").unwrap(),
+            Convention::parse("convention", "flange").unwrap(),
         ];
         let tool =
-            grip_from_tool(convention, Origin::parse("--origin", "tool").unwrap(), Some(&gripper))
+            grip_from_tool(convention, Origin::parse("origin", "tool").unwrap(), Some(&gripper))
                 .unwrap();
         assert_eq!(tool, gripper.grip_from_tool.unwrap());
         assert!((tool.rotation.y_axis - DVec3::new(0.0, 1.0, 1.0).normalize()).length() < 1e-15);
         let flange =
-            grip_from_tool(origin, Origin::parse("--origin", "flange").unwrap(), Some(&gripper))
+            grip_from_tool(origin, Origin::parse("origin", "flange").unwrap(), Some(&gripper))
                 .unwrap();
         assert_eq!(flange, gripper.grip_from_flange.unwrap());
         let franka = crate::gripper::find("franka-hand").unwrap();
@@ -299,16 +303,16 @@ mod tests {
 
     #[test]
     fn origins_and_joints_from_text() {
-        assert_eq!(Origin::parse("--origin", "103.4mm").unwrap(), Origin::Behind(0.1034));
-        assert!(Origin::parse("--origin", "103.4").is_err());
-        let joint = Joint::parse("--joint", "finger_joint:-9.41:0.8").unwrap();
+        assert_eq!(Origin::parse("origin", "103.4mm").unwrap(), Origin::Behind(0.1034));
+        assert!(Origin::parse("origin", "103.4").is_err());
+        let joint = Joint::parse("joint", "finger_joint:-9.41:0.8").unwrap();
         assert!((joint.position(0.085) - 0.00015).abs() < 1e-12);
         assert_eq!(
-            Joint::parse("--joint", "a:0.5").unwrap(),
+            Joint::parse("joint", "a:0.5").unwrap(),
             Joint { name: "a".into(), scale: 0.5, offset: 0.0 }
         );
         for bad in ["", ":1", "a:x", "a:1:2:3", "a:nan"] {
-            assert!(Joint::parse("--joint", bad).is_err(), "{bad}");
+            assert!(Joint::parse("joint", bad).is_err(), "{bad}");
         }
     }
 }

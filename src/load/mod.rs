@@ -1,13 +1,12 @@
 //! Load cases: what pulls at the part while it is held, as wrenches in the part frame about the
 //! centre of mass.
 //!
-//! A [`LoadSet`] is what the user asked for (the flag `--loads` and its companions);
-//! [`LoadSet::cases`] turns it into [`LoadCase`]s through the part's mass properties, and
+//! A [`LoadSet`] is what the user asked for; [`LoadSet::cases`] turns it into [`LoadCase`]s through the part's mass properties, and
 //! [`wrench_in_grip`] carries one into a grip frame. Wrenches act ON the body: gravity along `-z`
 //! on 1 kg is the force `(0, 0, -9.80665)` N.
 
-mod flag;
 mod list;
+mod source;
 mod table;
 mod trajectory;
 
@@ -15,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::geometry::sphere;
 use crate::model::{Frame, Wrench};
 use crate::part::MassProperties;
@@ -103,17 +102,28 @@ impl LoadSet {
         }
     }
 
-    /// Parses the value of `--loads`: sources joined by commas, each one of `gravity` (six axes),
+    /// Parses sources joined by commas, each one of `gravity` (six axes),
     /// `gravity:DIR`, `gravity:N`, `gravity-cone:DIR:ANGLE`, `ball:N`, `ball:N:FORCE`,
     /// `ball:N+moments`, `ball:N:FORCE+moments:MOMENT` or a file ending in `.csv` or `.json`. `DIR`
-    /// is `+x`, `-z`, ... or three numbers joined by slashes. `place` is the flag for messages.
+    /// is `+x`, `-z`, ... or three numbers joined by slashes. `place` is the option for messages.
     ///
     /// # Errors
     /// When a source is none of these; the message lists them.
     pub fn parse(place: &str, text: &str) -> Result<Self> {
-        let sources: Vec<_> = text
-            .split(',')
-            .map(|source| flag::source(place, source.trim()))
+        Self::from_sources(place, text.split(','))
+    }
+
+    /// As [`LoadSet::parse`], from one text for each source.
+    ///
+    /// # Errors
+    /// As [`LoadSet::parse`].
+    pub fn from_sources<'a>(
+        place: &str,
+        sources: impl IntoIterator<Item = &'a str>,
+    ) -> Result<Self> {
+        let sources: Vec<_> = sources
+            .into_iter()
+            .map(|source| source::source(place, source.trim()))
             .collect::<Result<_>>()?;
         Ok(Self::new(sources))
     }
@@ -167,17 +177,19 @@ impl LoadSet {
         }
         if self.acceleration.is_some() && !accelerated {
             return Err(Error::input(
-                "--accel",
-                "an acceleration acts on top of gravity, but no gravity load is asked for",
-                "add `gravity` to --loads, or state the wrenches in a file",
-            ));
+                "acceleration",
+                "it acts on top of gravity, but no gravity load is requested",
+                "add `gravity` to the loads, or state the wrenches in a file",
+            )
+            .with_options(&["accel", "loads"]));
         }
         if cases.is_empty() {
             return Err(Error::input(
-                "--loads",
+                "loads",
                 "no load case",
                 "ask for at least one, e.g. `gravity`",
-            ));
+            )
+            .with_options(&["loads"]));
         }
         Ok(cases)
     }
@@ -200,13 +212,14 @@ impl LoadSet {
             }));
             return Ok(());
         };
-        check_count("--accel", acceleration.directions)?;
+        check_count("acceleration", acceleration.directions)?;
         if !(acceleration.magnitude.is_finite() && acceleration.magnitude >= 0.0) {
             return Err(Error::input(
-                "--accel",
-                format!("{} m/s2 is not an acceleration", acceleration.magnitude),
-                "give a finite size, e.g. 2g",
-            ));
+                "acceleration",
+                format!("{} m/s2 is not one", acceleration.magnitude),
+                "give a finite size, zero or more, e.g. 2g",
+            )
+            .with_options(&["accel"]));
         }
         let total = directions.len().saturating_mul(acceleration.directions + 1);
         if total > room {
@@ -321,10 +334,11 @@ fn unit(direction: DVec3) -> Result<DVec3> {
     let largest = direction.abs().max_element();
     if !(largest.is_finite() && largest > 0.0) {
         return Err(Error::input(
-            "--loads",
+            "loads",
             format!("{direction} is not a direction"),
             "give three finite numbers, not all zero",
-        ));
+        )
+        .with_options(&["loads"]));
     }
     Ok((direction / largest).normalize())
 }
@@ -334,10 +348,11 @@ fn checked_mass(mass: &MassProperties) -> Result<f64> {
         return Ok(mass.mass);
     }
     Err(Error::input(
-        "--loads",
+        "loads",
         format!("the part's mass is {} kg, and gravity and inertia need one", mass.mass),
-        "state --mass or --density",
-    ))
+        "state a mass or a density",
+    )
+    .with_options(&["mass", "density"]))
 }
 
 fn check_count(place: &str, count: usize) -> Result<()> {
@@ -349,5 +364,11 @@ fn check_count(place: &str, count: usize) -> Result<()> {
 }
 
 fn too_many(count: usize) -> Error {
-    Error::input("--loads", format!("{count} load cases"), format!("ask for at most {MAX_CASES}"))
+    Error::new(
+        ErrorKind::Limit,
+        "loads",
+        format!("{count} load cases"),
+        format!("ask for at most {MAX_CASES}"),
+    )
+    .with_options(&["loads"])
 }

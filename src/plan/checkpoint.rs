@@ -1,4 +1,4 @@
-//! The state of an unfinished run in a file, from which a later run goes on.
+//! The state of an unfinished run in a file, from which a later run resumes.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::Collector;
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::gripper::Gripper;
 use crate::part::{MassProperties, Part};
 use crate::propose::{Progress, ProposeOptions};
@@ -73,8 +73,9 @@ impl<'a> Checkpoint<'a> {
     pub fn read(path: &Path, inputs: &BTreeMap<String, Value>) -> Result<Checkpoint<'static>> {
         let place = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
-        let remedy = "start anew without --resume";
-        let wrong = |problem: String| Error::input(&place, problem, remedy);
+        let remedy = "start from the beginning, without resuming";
+        let wrong =
+            |problem: String| Error::format(&place, problem, remedy).with_options(&["resume"]);
         #[derive(Deserialize)]
         struct Marks {
             format: String,
@@ -96,11 +97,13 @@ impl<'a> Checkpoint<'a> {
         }
         let problem =
             format!("belongs to another question; these differ: {}", differences.join("; "));
-        Err(Error::input(
+        Err(Error::new(
+            ErrorKind::Mismatch,
             place,
             problem,
-            "repeat the command of the unfinished run with --resume, or start anew without it",
-        ))
+            "resume with the options of the unfinished run, or start from the beginning",
+        )
+        .with_options(&["resume"]))
     }
 }
 

@@ -14,14 +14,14 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use rustc_hash::FxHashMap;
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::display::{Display, TRIANGLE_BUDGET};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gripper::{Body, Gripper, Shape};
 use crate::model::{Contact, Frame, Slip};
 use crate::part::Mesh;
-use crate::results::{GripSet, RankedGrip};
+use crate::results::{GripSet, Provenance, RankedGrip};
 
 /// Grips that the page lists; a longer ranking is cut there and the page says so.
 pub(super) const MAX_GRIPS: usize = 100_000;
@@ -105,13 +105,33 @@ impl Payload {
                 Err(error) => (Value::Null, Value::String(error.to_string())),
             };
         let header = json!({
-            "format": "gripfast-report", "version": 1, "provenance": set.provenance, "part": set.part, "display": display,
+            "format": "gripfast-report", "version": 1, "provenance": provenance(set), "part": set.part, "display": display,
             "gripper": gripper, "gripper_problem": gripper_problem, "loads": set.loads, "summary": set.summary,
             "grips": { "total": set.grips.len(), "shown": grips.len() }, "statuses": statuses, "by_load": by_load,
             "asked": asked(set), "sections": columns.sections,
         });
         Ok(Self { header: script_safe(&header)?, data: packed(&columns.bytes)? })
     }
+}
+
+/// Where the numbers come from, with every option of the run by name.
+fn provenance(set: &GripSet) -> Value {
+    let Provenance { gripfast, command, backend, request, resolved, complete, warnings, .. } =
+        &set.provenance;
+    let mut settings = Map::new();
+    for value in [json!(request), json!(resolved), json!({ "complete": complete })] {
+        let Value::Object(fields) = value else { continue };
+        for (name, value) in fields {
+            match value {
+                Value::Object(group) => settings.extend(group),
+                value => drop(settings.insert(name, value)),
+            }
+        }
+    }
+    json!({
+        "gripfast": gripfast, "command": command, "backend": backend, "settings": settings,
+        "warnings": warnings,
+    })
 }
 
 /// JSON that cannot end the `script` element it stands in.

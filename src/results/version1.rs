@@ -112,7 +112,7 @@ struct OldComparison {
 /// When it lacks something that this version needs.
 pub(super) fn upgrade(place: &str, mut set: Value) -> Result<Value> {
     let wrong = |error: serde_json::Error| {
-        Error::input(
+        Error::format(
             place,
             format!("a result of version 1 that does not say enough: {error}"),
             "write the file again with `gripfast plan`",

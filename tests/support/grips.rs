@@ -10,9 +10,12 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 use gripfast::gripper::{Body, Gripper, Shape, rectangle};
 use gripfast::model::{Bounds, Contact, Frame, Grip, Polygon, Pressure, Slip, Status, Wrench};
 use gripfast::part::MassProperties;
+use gripfast::request::Request;
 use gripfast::results::{
-    FORMAT, GripSet, LoadCase, LoadScore, PartSummary, Provenance, RankedGrip, Summary, VERSION,
+    FORMAT, GripSet, LoadCase, LoadScore, PartSummary, Provenance, RankedGrip, Resolved, Summary,
+    VERSION,
 };
+use gripfast::units::{Force, Length, Mass};
 
 /// 20 x 10 mm pads, 40 mm fingers, a palm, 85 mm stroke.
 pub(crate) fn gripper() -> Gripper {
@@ -121,15 +124,7 @@ pub(crate) fn grip_set(count: u64) -> GripSet {
     GripSet {
         format: FORMAT.into(),
         version: VERSION,
-        provenance: Provenance {
-            gripfast: "0.0.0".into(),
-            command: vec!["gripfast".into(), "plan".into(), "a \"quoted\"\nname: #1.stl".into()],
-            backend: "cpu".into(),
-            settings: BTreeMap::from([
-                ("force_n".to_owned(), serde_json::json!(80.0)),
-                ("opening_m".to_owned(), serde_json::json!(0.005)),
-            ]),
-        },
+        provenance: provenance(),
         part: PartSummary {
             file: "box.stl".into(),
             unit_m: 0.001,
@@ -163,4 +158,22 @@ pub(crate) fn grip_set(count: u64) -> GripSet {
         },
         grips,
     }
+}
+
+fn provenance() -> Provenance {
+    let mut resolved = Resolved::default();
+    resolved.force = Force(80.0);
+    resolved.spacing = Length(0.004);
+    resolved.pad_friction = Some(0.6);
+    resolved.seeds = 81;
+    resolved.keep = 10_000;
+    let mut request = Request::new("box.stl", "test \"gripper\"");
+    request.mass = Some(Mass(0.1296));
+    request.candidates.opening = Length(0.005);
+    let mut provenance = Provenance::new(request, resolved);
+    provenance.gripfast = "0.0.0".into();
+    provenance.command =
+        vec!["gripfast".into(), "plan".into(), "a \"quoted\"\nname: #1.stl".into()];
+    provenance.warnings = vec!["the surface is \"open\"".into()];
+    provenance
 }

@@ -4,7 +4,6 @@
 #![allow(dead_code, reason = "each suite uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a failing fixture should stop the test")]
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -15,9 +14,11 @@ use gripfast::load::{LoadSet, wrench_in_grip};
 use gripfast::mechanics::{Options, Pads, inverse, solve_pads, twist_out};
 use gripfast::model::{Contact, Frame, Grip, Patch, Status};
 use gripfast::part::{FacePair, Mesh, Part, ReadOptions};
+use gripfast::request::Request;
 use gripfast::results::{
-    FORMAT, GripSet, LoadScore, PartSummary, Provenance, RankedGrip, Summary, VERSION,
+    FORMAT, GripSet, LoadScore, PartSummary, Provenance, RankedGrip, Resolved, Summary, VERSION,
 };
+use gripfast::units::Force;
 
 /// Gripping force of the fixture [N].
 const FORCE: f64 = 80.0;
@@ -81,16 +82,7 @@ pub(crate) fn plan(
     GripSet {
         format: FORMAT.into(),
         version: VERSION,
-        provenance: Provenance {
-            gripfast: env!("CARGO_PKG_VERSION").into(),
-            command: ["test", "fixture", "of", "the", "report"].map(String::from).to_vec(),
-            backend: "cpu".into(),
-            settings: BTreeMap::from([
-                ("force".into(), FORCE.into()),
-                ("loads".into(), loads.into()),
-                ("k1".into(), 1.0.into()),
-            ]),
-        },
+        provenance: provenance(part, loads),
         part: PartSummary {
             file: part.file.display().to_string(),
             unit_m: part.unit_m,
@@ -104,6 +96,16 @@ pub(crate) fn plan(
         summary,
         grips,
     }
+}
+
+fn provenance(part: &Part, loads: &str) -> Provenance {
+    let mut request = Request::new(&part.file, "generic");
+    request.loads = vec![loads.to_owned()];
+    let mut resolved = Resolved::default();
+    resolved.force = Force(FORCE);
+    let mut provenance = Provenance::new(request, resolved);
+    provenance.command = ["test", "fixture", "of", "the", "report"].map(String::from).to_vec();
+    provenance
 }
 
 /// The grip with its pads about a place of the grid over face I, when both pads touch enough.

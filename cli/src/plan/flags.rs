@@ -1,192 +1,418 @@
-//! Flags of `plan` to values, each with its own refusal.
+//! The flags of `plan`: one for each field of a [`Request`], of the same name.
 
-use std::path::Path;
+use std::path::PathBuf;
 
-use gripfast::error::{Error, Result};
-use gripfast::export::{self, Format};
-use gripfast::gripper::Gripper;
-use gripfast::part::{MassProperties, Part};
-use gripfast::plan::noise::Noise;
-use gripfast::request::EarlierWeights;
-use gripfast::units::Quantity;
+use clap::{Args as ClapArgs, Command};
+use gripfast::error::Error;
+use gripfast::request::{
+    Choice, Cone, EarlierWeights, Ground, Polish, PoseError, Refiner, Region, Request, Separation,
+    Side,
+};
+use gripfast::units::{Acceleration, Angle, Density, Force, Length, Mass, Time, Unit};
+use serde_json::{Map, Value};
 
-use super::Args;
+/// Finds and ranks the grips (grasps) on a part.
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "EXAMPLES:\n  gripfast plan bracket.stl --gripper robotiq-2f85 --mass 350g\n  \
+gripfast plan bracket.stl --gripper my-gripper.toml --density 2700kg/m3 --force 80N --accel 2g -o grips.json\n  \
+gripfast plan bracket.stl --gripper franka-hand --mass 350g --loads ball:500 --top 20 --diverse --report bracket.html\n  \
+gripfast plan bracket.stl --gripper franka-hand --mass 350g --pose-noise 1mm,2deg --compare\n  \
+gripfast plan housing.stl --gripper wsg50-110 --mass 2kg --spacing 0.5mm --loads ball:500 -o housing.parquet --resume\n  \
+gripfast plan bracket.stl --gripper generic --mass 350g --print-request > bracket.toml; gripfast plan --request bracket.toml --force 40N\n  \
+for part in *.stl; do gripfast plan \"$part\" --gripper generic --density 2700kg/m3 -q -o \"${part%.stl}.json\" >\"${part%.stl}.txt\"; done\n\n\
+A run with -o keeps its state in FILE.partial and removes it at the end: after an interrupt, a kill or a power cut the same \
+command with --resume resumes it and comes to the same result.\n\n\
+`gripfast gripper list` names the grippers that come with the program."
+)]
+pub(crate) struct Args {
+    /// Part file: STL, OBJ, PLY, ...
+    #[arg(required_unless_present = "request")]
+    part: Option<PathBuf>,
+    /// Gripper from the catalogue, or a gripper file.
+    #[arg(long, short, required_unless_present = "request")]
+    gripper: Option<String>,
+    /// Mass of the part, e.g. 350g.
+    #[arg(long, conflicts_with = "density")]
+    mass: Option<Mass>,
+    /// Density of the part's material, e.g. 2700kg/m3.
+    #[arg(long)]
+    density: Option<Density>,
+    /// Gripping force, e.g. 80N [default: the gripper's largest].
+    #[arg(long)]
+    force: Option<Force>,
+    /// Unit of the part file's numbers [default: the file's own, else mm].
+    #[arg(long)]
+    unit: Option<Unit>,
+    /// Acceleration in any direction on top of gravity, e.g. 2g.
+    #[arg(long)]
+    accel: Option<Acceleration>,
+    /// Loads: gravity, gravity:-z, gravity:N, gravity-cone:-z:30deg, ball:N, ball:N:10N, FILE.csv,
+    /// joined by commas.
+    #[arg(long)]
+    loads: Option<String>,
+    /// A stored request (TOML, or JSON where the name ends in .json); flags beside it override it.
+    #[arg(long, value_name = "FILE")]
+    request: Option<PathBuf>,
+    /// Prints the request that these flags make, as TOML, and ends.
+    #[arg(long)]
+    pub(super) print_request: bool,
 
-pub(super) fn finite(flag: &str, value: f64) -> Result<f64> {
-    if value.is_finite() {
-        Ok(value)
-    } else {
-        Err(Error::input(flag, format!("is {value}"), "give a finite number"))
-    }
+    #[command(flatten, next_help_heading = "Candidates")]
+    candidates: CandidateArgs,
+    #[command(flatten, next_help_heading = "Scoring")]
+    scoring: ScoringArgs,
+    #[command(flatten, next_help_heading = "Output")]
+    output: OutputArgs,
+    #[command(flatten, next_help_heading = "Long runs")]
+    long: LongArgs,
+    #[command(flatten, next_help_heading = "More about each grip")]
+    more: MoreArgs,
 }
 
-pub(super) fn not_negative(flag: &str, value: f64) -> Result<f64> {
-    if value.is_finite() && value >= 0.0 {
-        Ok(value)
-    } else {
-        Err(Error::input(flag, format!("is {value}"), "give a number, zero or more"))
-    }
+#[derive(Debug, ClapArgs)]
+struct CandidateArgs {
+    /// Step of the position grid [default: a fifth of the pad's shorter side].
+    #[arg(long, value_name = "LENGTH")]
+    spacing: Option<Length>,
+    /// Step of the approach angle.
+    #[arg(long, value_name = "ANGLE")]
+    angle_step: Option<Angle>,
+    /// Approach along and across the edges of the gripped faces as well.
+    #[arg(long, value_name = "true|false", hide_possible_values = true)]
+    edge_angles: Option<bool>,
+    /// Smallest contact area on either face, as a share of the most that the face pair allows (pad
+    /// or overlap).
+    #[arg(long, value_name = "SHARE")]
+    min_contact: Option<f64>,
+    /// Smallest contact area on either face, as a share of the pad's area.
+    #[arg(long, value_name = "SHARE")]
+    min_pad_share: Option<f64>,
+    /// Largest distance of the grip from the centre of mass.
+    #[arg(long, value_name = "LENGTH")]
+    max_offset: Option<Length>,
+    /// Only approaches within a cone, e.g. -z:45deg or 0/0/-1:45deg (part frame).
+    #[arg(long, value_name = "DIR:ANGLE", allow_hyphen_values = true)]
+    approach: Option<Cone>,
+    /// The gripper must stay above this plane, e.g. +z:0mm (normal and height, part frame).
+    #[arg(long, value_name = "DIR:HEIGHT", allow_hyphen_values = true)]
+    ground: Option<Ground>,
+    /// Box that the gripper must not enter: x,y,z:x,y,z with units, e.g. 0mm,0mm,0mm:10mm,20mm,5mm;
+    /// may be repeated.
+    #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
+    keep_out: Vec<Region>,
+    /// Only these planar faces, e.g. 0,1,4 (see `gripfast part`).
+    #[arg(long, value_delimiter = ',', value_name = "FACES")]
+    faces: Option<Vec<u32>>,
+    /// Only planar faces that lie wholly in this box, and those of --faces: x,y,z:x,y,z with units;
+    /// may be repeated.
+    #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
+    faces_in: Vec<Region>,
+    /// Grips that close on the part from outside, that open in a slot or bore (needs a gripper with
+    /// outer pads), or both.
+    #[arg(long, value_parser = words!(Side), value_name = "SIDE")]
+    grips: Option<Side>,
+    /// List each grip with exchanged jaws as well.
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
+    flips: Option<bool>,
+    /// Way by which each jaw opens beyond contact for the approach.
+    #[arg(long, value_name = "LENGTH")]
+    opening: Option<Length>,
+    /// Way by which each jaw must at least be able to open; else a face pair is outside the stroke.
+    #[arg(long, value_name = "LENGTH")]
+    min_opening: Option<Length>,
+    /// Distance kept between gripper and part, but for the pads.
+    #[arg(long, value_name = "LENGTH")]
+    clearance: Option<Length>,
+    /// Length of the straight approach that must be clear of ground and keep-out boxes; of the part
+    /// it is clear all the way.
+    #[arg(long, value_name = "LENGTH")]
+    approach_distance: Option<Length>,
 }
 
-pub(super) fn check_force(force: f64, gripper: &Gripper) -> Result<()> {
-    let [least, most] = gripper.force;
-    if force <= 0.0 {
-        return Err(Error::input("--force", format!("is {force} N"), "give a force above zero"));
-    }
-    if force < least * (1.0 - 1e-9) || force > most * (1.0 + 1e-9) {
-        return Err(Error::input(
-            "--force",
-            format!("{force} N is outside what {} can do", gripper.name),
-            format!("give {least} N to {most} N"),
-        ));
-    }
-    Ok(())
+#[derive(Debug, ClapArgs)]
+struct ScoringArgs {
+    /// Where slip twists are searched: auto, cpu or gpu. gpu without a graphics processor is an
+    /// error; the answers are the same.
+    #[arg(long, value_parser = words!(Choice), value_name = "auto|cpu|gpu", hide_possible_values = true)]
+    backend: Option<Choice>,
+    /// Graphics adapter, by its number or part of its name as `gripfast devices` lists them
+    /// [default: GRIPFAST_ADAPTER].
+    #[arg(long, value_name = "NAME|INDEX")]
+    adapter: Option<String>,
+    /// Slip twists tried for each load before the exact solver, at least.
+    #[arg(long, value_name = "N")]
+    seeds: Option<usize>,
+    /// Weight of 1/mu_s in the score.
+    #[arg(long)]
+    k1: Option<f64>,
+    /// Weight of alpha [1/rad] in the score.
+    #[arg(long)]
+    k2: Option<f64>,
+    /// Friction coefficient of the pads [default: the gripper's], for the safety, the force needed
+    /// and the multiple of the worst load, all of it with its moments, that is held. Another load
+    /// may end at a smaller multiple, where it twists the contact out.
+    #[arg(long, value_name = "MU")]
+    pad_friction: Option<f64>,
+    /// Uncertainty of the part's position along the pads, for alpha.
+    #[arg(long, value_name = "LENGTH")]
+    position_error: Option<Length>,
+    /// Pad friction while closing, for alpha.
+    #[arg(long, value_name = "MU")]
+    closing_friction: Option<f64>,
+    /// Pads that separate under a load: solve with the contact that remains, or discard the grip as
+    /// the paper does.
+    #[arg(long, value_parser = words!(Separation))]
+    separation: Option<Separation>,
+    /// What gets the final f64 solution: the loads that can be a grip's worst; the same, and only
+    /// for grips that can be among the best ones kept; or all loads (kept in the result).
+    #[arg(long, value_parser = words!(Polish))]
+    polish: Option<Polish>,
+    /// Minimiser that polishes the final answers.
+    #[arg(long, value_parser = words!(Refiner))]
+    refiner: Option<Refiner>,
+    /// Threads [default: all cores].
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
 }
 
-/// Mass properties at the mass or density asked for.
-pub(super) fn mass(args: &Args, part: &Part) -> Result<MassProperties> {
-    match (&args.mass, &args.density) {
-        (Some(text), _) => {
-            let mass = Quantity::Mass.parse("--mass", text)?;
-            let unit = part.mass_properties(1.0);
-            if mass <= 0.0 {
-                return Err(Error::input(
-                    "--mass",
-                    format!("is {mass} kg"),
-                    "give a mass above zero",
-                ));
-            }
-            if unit.volume.is_nan() || unit.volume <= 0.0 {
-                return Err(Error::input(
-                    part.file.display().to_string(),
-                    "the surface encloses no volume",
-                    "repair the mesh: without a volume there is no centre of mass",
-                ));
-            }
-            Ok(part.mass_properties(mass / unit.volume))
+#[derive(Debug, ClapArgs)]
+struct OutputArgs {
+    /// Grips to print.
+    #[arg(long, value_name = "N")]
+    top: Option<usize>,
+    /// Print grips that differ in place, face pair and approach.
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
+    diverse: Option<bool>,
+    /// Lists one of the grips that a symmetry of the part maps to each other, for all of them.
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
+    merge_symmetric: Option<bool>,
+    /// Best grips to keep in the result file [default: 10000; with --polish top as many as --top
+    /// prints].
+    #[arg(long, value_name = "N")]
+    keep: Option<usize>,
+    /// Result file; its ending says the format: .json (read by the other subcommands), .jsonl,
+    /// .csv, .parquet, .npz, ... as `export`.
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Self-contained page to look at; for its picture of the friction over all loads these are
+    /// solved for the best 20 grips and the first 20 printed (and kept in the result file).
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// The result as JSON on standard output instead of the table.
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
+    json: Option<bool>,
+    /// Explains one pose instead of planning: position and approach angle in the plane of a face
+    /// pair, and its number.
+    #[arg(long, value_name = "X,Y,ANGLE,SITE", allow_hyphen_values = true)]
+    why: Option<String>,
+    /// No progress bar and no notes; warnings are printed all the same.
+    #[arg(long, short, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
+    quiet: Option<bool>,
+}
+
+#[derive(Debug, ClapArgs)]
+struct LongArgs {
+    /// Resumes the unfinished run whose state lies beside the result file; starts at the first
+    /// candidate when there is none.
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
+    resume: Option<bool>,
+    /// Time between two states written to FILE.partial; 0s: after every chunk.
+    #[arg(long, value_name = "TIME")]
+    checkpoint: Option<Time>,
+}
+
+#[derive(Debug, ClapArgs)]
+struct MoreArgs {
+    /// Tries each printed grip at poses off by up to this along both axes of the pad plane and
+    /// about the closing axis, e.g. 1mm,2deg: mu_s that 95 % of them hold with, the worst, and how
+    /// many are lost (no contact, twisted out). Interference is not tested again.
+    #[arg(long, value_name = "LENGTH,ANGLE")]
+    pose_noise: Option<PoseError>,
+    /// Displaced poses per grip for --pose-noise, spread evenly.
+    #[arg(long, value_name = "N")]
+    noise_samples: Option<u32>,
+    /// Beside the score the evaluation function of the earlier method, (K1 Delta_d + K2 tau_s/(mu_s
+    /// N))/(D + EPSILON) + K3 alpha [1,1,1,1mm without a value], for all grips kept; rank
+    /// correlation, and the grips whose place differs most.
+    #[arg(long, value_name = "K1,K2,K3,EPSILON", num_args = 0..=1, require_equals = true, default_missing_value = "")]
+    compare: Option<EarlierWeights>,
+}
+
+/// Sets the fields of a group for which a flag was given.
+macro_rules! give {
+    ($flags:expr => $group:expr; $($field:ident),+ $(,)?) => {
+        $(if let Some(value) = $flags.$field {
+            $group.$field = value.into();
+        })+
+    };
+}
+
+impl Args {
+    /// The pose of `--why`.
+    pub(super) fn why(&self) -> Option<String> {
+        self.output.why.clone()
+    }
+
+    /// The request that the flags make, over the stored one where there is one.
+    pub(super) fn request(self) -> gripfast::error::Result<Request> {
+        let mut request = match &self.request {
+            Some(path) => Request::read(path)?,
+            None => Request::default(),
+        };
+        // One takes the place of the other.
+        if self.mass.is_some() || self.density.is_some() {
+            (request.mass, request.density) = (None, None);
         }
-        (None, Some(text)) => Ok(part.mass_properties(Quantity::Density.parse("--density", text)?)),
-        (None, None) if args.loads.split(',').all(|source| source.trim().starts_with("ball")) => {
-            Ok(part.mass_properties(1000.0))
+        if let Some(loads) = &self.loads {
+            request.loads = loads.split(',').map(|source| source.trim().to_owned()).collect();
         }
-        (None, None) => Err(Error::input(
-            "--mass",
-            "the part's mass is not known",
-            "give --mass 350g, or --density 2700kg/m3 (aluminium), 7850kg/m3 (steel), 1200kg/m3 (plastic)",
-        )),
+        give!(self => request; part, gripper, mass, density, force, unit, accel);
+        let (flags, group) = (self.candidates, &mut request.candidates);
+        give!(flags => group;
+            spacing, angle_step, edge_angles, min_contact, min_pad_share, max_offset, approach,
+            ground, faces, grips, flips, opening, min_opening, clearance, approach_distance);
+        for (given, regions) in
+            [(flags.keep_out, &mut group.keep_out), (flags.faces_in, &mut group.faces_in)]
+        {
+            if !given.is_empty() {
+                *regions = given;
+            }
+        }
+        let (flags, group) = (self.scoring, &mut request.scoring);
+        give!(flags => group;
+            backend, adapter, seeds, k1, k2, pad_friction, position_error, closing_friction,
+            separation, polish, refiner, threads);
+        let (flags, more, group) = (self.output, self.more, &mut request.selection);
+        give!(flags => group; top, diverse, merge_symmetric, keep);
+        give!(more => group; pose_noise, noise_samples, compare);
+        if more.noise_samples.is_some() && group.pose_noise.is_none() {
+            return Err(Error::input("--noise-samples", "needs --pose-noise", "add that flag"));
+        }
+        let (long, group) = (self.long, &mut request.output);
+        give!(flags => group; output, report, json, quiet);
+        give!(long => group; resume, checkpoint);
+        if group.resume && group.output.is_none() {
+            return Err(Error::input(
+                "--resume",
+                "needs the result file whose run it resumes",
+                "add -o FILE",
+            ));
+        }
+        Ok(request)
     }
 }
 
-/// Most displaced poses per grip.
-const MOST_SAMPLES: u32 = 1_000_000;
-
-/// `--pose-noise LENGTH,ANGLE` and `--noise-samples N`.
-pub(super) fn noise(args: &Args) -> Result<Option<Noise>> {
-    let flag = "--pose-noise";
-    let Some(text) = &args.pose_noise else { return Ok(None) };
-    let Some((shift, turn)) = text.split_once(',') else {
-        return Err(Error::input(
-            flag,
-            format!("'{text}' is not a length and an angle"),
-            "give both, e.g. 1mm,2deg",
-        ));
-    };
-    let noise = Noise {
-        shift: Quantity::Length.parse(flag, shift)?,
-        turn: Quantity::Angle.parse(flag, turn)?,
-        samples: args.noise_samples,
-    };
-    if noise.shift < 0.0 || noise.turn < 0.0 {
-        return Err(Error::input(
-            flag,
-            format!("'{text}' is negative"),
-            "give how far the pose may be off either way, zero or more",
-        ));
+/// The fields of a request in one list, less those that are absent.
+fn fields(request: &Request) -> Map<String, Value> {
+    let mut fields = Map::new();
+    if let Ok(Value::Object(groups)) = serde_json::to_value(request) {
+        for (name, value) in groups {
+            match value {
+                Value::Object(group) => fields.extend(group),
+                value => drop(fields.insert(name, value)),
+            }
+        }
     }
-    if !(1..=MOST_SAMPLES).contains(&noise.samples) {
-        return Err(Error::input(
-            "--noise-samples",
-            format!("is {}", noise.samples),
-            format!("give 1 to {MOST_SAMPLES}"),
-        ));
-    }
-    Ok(Some(noise))
+    fields
 }
 
-/// The weights of `--compare=K1,K2,K3,EPSILON`; an empty text stands for the usual ones.
-pub(super) fn earlier_weights(text: &str) -> Result<EarlierWeights> {
-    let flag = "--compare";
-    if text.is_empty() {
-        return Ok(EarlierWeights::default());
-    }
-    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
-    let [k1, k2, k3, epsilon] = parts[..] else {
-        return Err(Error::input(
-            flag,
-            format!("'{text}' is not four values"),
-            "give K1,K2,K3,EPSILON, e.g. 1,1,1,1mm, or nothing",
-        ));
-    };
-    let weight = |text: &str| match text.parse() {
-        Ok(value) => not_negative(flag, value),
-        Err(_) => Err(Error::input(
-            flag,
-            format!("'{text}' is not a number"),
-            "give K1,K2,K3,EPSILON, e.g. 1,1,1,1mm",
-        )),
-    };
-    let epsilon = Quantity::Length.parse(flag, epsilon)?;
-    if epsilon <= 0.0 {
-        return Err(Error::input(
-            flag,
-            format!("EPSILON is {epsilon} m"),
-            "give a length above zero: a grip at the centre of mass is divided by it",
-        ));
-    }
-    Ok(EarlierWeights { k1: weight(k1)?, k2: weight(k2)?, k3: weight(k3)?, epsilon })
-}
-
-/// The format of `-o FILE` by its ending, refused now rather than after the search.
-pub(super) fn output_format(path: &Path) -> Result<Format> {
-    if path.as_os_str() == "-" {
-        return Err(Error::input(
-            "-o -",
-            "the table goes to standard output",
-            "use --json for the result there, without -o",
-        ));
-    }
-    if let Some(folder) =
-        path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir())
-    {
-        return Err(Error::input(
-            format!("-o {}", path.display()),
-            format!("the folder '{}' is not there", folder.display()),
-            "make it first",
-        ));
-    }
-    if path.extension().is_none() {
-        return Ok(Format::Json);
-    }
-    let format = Format::from_path(path).map_err(|_| {
-        let endings: Vec<&str> = Format::ALL.iter().flat_map(|known| known.2).copied().collect();
-        Error::input(
-            format!("-o {}", path.display()),
-            "the file's ending names no format",
-            format!("use one of {}", endings.join(", ")),
-        )
-    })?;
-    export::check(format)?;
-    Ok(format)
-}
-
-/// `--checkpoint TIME`.
-pub(super) fn interval(text: &str) -> Result<std::time::Duration> {
-    let seconds = Quantity::Time.parse("--checkpoint", text)?;
-    std::time::Duration::try_from_secs_f64(seconds).map_err(|_| {
-        Error::input(
-            "--checkpoint",
-            format!("'{text}' is no time to wait"),
-            "give zero (after every chunk) or more, e.g. 30s",
-        )
+/// Help that states the defaults, which stand in the request.
+pub(crate) fn with_defaults(command: Command) -> Command {
+    let defaults = fields(&Request::default());
+    command.mut_subcommand("plan", |plan| {
+        plan.mut_args(|argument| {
+            let text = match defaults.get(argument.get_id().as_str()) {
+                Some(Value::String(text)) => text.clone(),
+                Some(Value::Number(number)) => number.to_string(),
+                Some(Value::Bool(true)) => "true".to_owned(),
+                Some(Value::Array(list)) => {
+                    list.iter().filter_map(Value::as_str).collect::<Vec<_>>().join(",")
+                }
+                _ => String::new(),
+            };
+            match argument.get_help().map(ToString::to_string) {
+                Some(help) if !text.is_empty() => {
+                    argument.help(format!("{help} [default: {text}]"))
+                }
+                _ => argument,
+            }
+        })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::{CommandFactory, FromArgMatches};
+
+    /// Every flag that is a field, with a value that is not its default.
+    const LINE: &str = "gripfast plan part.stl --gripper my.toml --mass 350g --force 40N --unit in \
+        --accel 2g --loads gravity,ball:3 --spacing 2mm --angle-step 7deg --edge-angles false \
+        --min-contact 0.3 --min-pad-share 0.1 --max-offset 9mm --approach -z:45deg --ground +z:1mm \
+        --keep-out 0mm,0mm,0mm:1mm,1mm,1mm --faces 0,2 --faces-in 0mm,0mm,0mm:1mm,1mm,1mm \
+        --grips both --flips --opening 4mm --min-opening 1mm --clearance 1mm \
+        --approach-distance 80mm --backend cpu --adapter 0 --seeds 200 --k1 2 --k2 3 \
+        --pad-friction 0.7 --position-error 1mm --closing-friction 0.1 --separation discard \
+        --polish all --refiner shanno --threads 2 --top 3 --diverse --merge-symmetric --keep 77 \
+        -o out.json --report out.html --json -q --resume --checkpoint 9s --pose-noise 1mm,2deg \
+        --noise-samples 9 --compare=1,2,3,4mm";
+
+    fn args(line: &str) -> Args {
+        let command = crate::Cli::command();
+        let matches = command.try_get_matches_from(line.split_whitespace()).unwrap();
+        Args::from_arg_matches(matches.subcommand_matches("plan").unwrap()).unwrap()
+    }
+
+    #[test]
+    fn every_flag_is_a_field_of_the_request_and_every_field_a_flag() {
+        let request = args(LINE).request().unwrap();
+        let mut set = fields(&request);
+        // Given instead of the mass.
+        set.insert("density".to_owned(), Value::Null);
+        let command = crate::Cli::command();
+        let plan = command.find_subcommand("plan").unwrap();
+        let only_here = ["help", "version", "why", "request", "print_request"];
+        let mut flags: Vec<&str> = plan
+            .get_arguments()
+            .map(|argument| argument.get_id().as_str())
+            .filter(|flag| !only_here.contains(flag))
+            .collect();
+        flags.sort_unstable();
+        let mut names: Vec<&str> = set.keys().map(String::as_str).collect();
+        names.sort_unstable();
+        assert_eq!(flags, names);
+        let defaults = fields(&Request::default());
+        for (name, value) in &set {
+            assert_ne!(defaults.get(name), Some(value), "{name} is set by its flag");
+        }
+    }
+
+    #[test]
+    fn flags_beside_a_stored_request_override_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("request.toml");
+        let stored = args(LINE).request().unwrap();
+        std::fs::write(&file, stored.to_toml()).unwrap();
+        let over = |flags: &str| {
+            args(&format!("gripfast plan --request {} {flags}", file.display())).request().unwrap()
+        };
+        assert_eq!(over(""), stored);
+        let changed = over("--density 7850kg/m3 --diverse=false --spacing 3mm --loads gravity");
+        assert_eq!((changed.mass, changed.density), (None, Some(Density(7850.0))));
+        assert!(!changed.selection.diverse);
+        assert_eq!(changed.candidates.spacing, Some(Length(0.003)));
+        assert_eq!(changed.loads, ["gravity"]);
+        assert_eq!(changed.scoring, stored.scoring);
+    }
+
+    #[test]
+    fn help_states_the_defaults_of_the_request() {
+        let mut command = with_defaults(crate::Cli::command());
+        let plan = command.find_subcommand_mut("plan").unwrap();
+        let help = plan.render_long_help().to_string();
+        for default in ["15deg", "0.25", "5mm", "0.1m", "81", "solve", "30s", "64", "gravity"] {
+            assert!(help.contains(&format!("[default: {default}]")), "{default}: {help}");
+        }
+    }
 }

@@ -18,9 +18,8 @@ pub(super) fn print(
     set: &GripSet,
     shown: &[&RankedGrip],
     gripper: &Gripper,
-    force: f64,
 ) -> anyhow::Result<()> {
-    summary(out, set, gripper, force)?;
+    summary(out, set, gripper)?;
     if set.grips.is_empty() {
         writeln!(out, "\nno grip holds this part: see the reasons above")?;
         if set.summary.pairs == 0 {
@@ -34,12 +33,11 @@ pub(super) fn print(
         return Ok(());
     }
     writeln!(out, "\n{}", grid(&columns(set, shown), shown))?;
-    let friction = set.provenance.settings.get("pad_friction").and_then(serde_json::Value::as_f64);
     writeln!(
         out,
         "\nmu_s: smallest friction coefficient that holds the worst load. Slip centre from the grip's middle in the pad plane."
     )?;
-    if let Some(friction) = friction {
+    if let Some(friction) = set.provenance.resolved.pad_friction {
         writeln!(
             out,
             "Pads with a friction of {friction}: gripping force needed for the worst load, and how far all of that load may grow (multiple)."
@@ -52,11 +50,10 @@ pub(super) fn print(
             "Rank (+n): stands for n more grips that a symmetry of the part maps to it (`merged` in the result file)."
         )?;
     }
-    let number = |name: &str| set.provenance.settings.get(name).and_then(serde_json::Value::as_f64);
-    if let (Some(shift), Some(turn), Some(samples)) =
-        (number("pose_noise_m"), number("pose_noise_rad"), number("noise_samples"))
-    {
-        let (shift, turn) = (shift * 1e3, turn.to_degrees());
+    let selection = &set.provenance.request.selection;
+    if let Some(noise) = selection.pose_noise {
+        let (shift, turn, samples) =
+            (noise.shift.0 * 1e3, noise.turn.0.to_degrees(), selection.noise_samples);
         writeln!(
             out,
             "Noise: mu_s at {samples} poses off by up to {shift} mm along both pad axes and {turn:.3} deg about the closing axis; 95 % of them hold\nwith the first, all with the second; lost: no contact or no equilibrium. Interference is not tested again."
@@ -68,12 +65,7 @@ pub(super) fn print(
     Ok(())
 }
 
-fn summary(
-    out: &mut impl Write,
-    set: &GripSet,
-    gripper: &Gripper,
-    force: f64,
-) -> std::io::Result<()> {
+fn summary(out: &mut impl Write, set: &GripSet, gripper: &Gripper) -> std::io::Result<()> {
     let mass = &set.part.mass;
     let size = (set.part.bbox_max - set.part.bbox_min) * 1e3;
     writeln!(
@@ -91,8 +83,9 @@ fn summary(
     )?;
     writeln!(
         out,
-        "{} at {force} N, {} loads, {} face pairs, {} candidates, {} grips hold",
+        "{} at {} N, {} loads, {} face pairs, {} candidates, {} grips hold",
         gripper.name,
+        set.provenance.resolved.force.0,
         set.loads.len(),
         set.summary.pairs,
         set.summary.candidates,

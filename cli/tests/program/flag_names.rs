@@ -4,10 +4,6 @@ use std::path::{Path, PathBuf};
 
 use crate::support::root;
 
-/// Files whose messages still name flags; the list only shrinks.
-const NOT_YET: [&str; 4] =
-    ["src/load/mod.rs", "src/plan/checkpoint.rs", "src/export/mod.rs", "src/export/tool.rs"];
-
 #[test]
 fn no_message_of_the_library_names_a_flag() {
     for path in sources(&root().join("src")) {
@@ -15,11 +11,7 @@ fn no_message_of_the_library_names_a_flag() {
         let text = std::fs::read_to_string(&path).unwrap();
         let found: Vec<String> =
             literals(&text).into_iter().filter(|literal| names_a_flag(literal)).collect();
-        if NOT_YET.contains(&name.as_str()) {
-            assert!(!found.is_empty(), "{name} is clean: take it off the list");
-        } else {
-            assert!(found.is_empty(), "{name}: {found:?}");
-        }
+        assert!(found.is_empty(), "{name}: {found:?}");
     }
 }
 

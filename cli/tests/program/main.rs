@@ -18,5 +18,6 @@ mod plan_more;
 #[cfg(unix)]
 mod plan_resume;
 mod report_page;
+mod request;
 #[path = "../../../tests/support/mod.rs"]
 mod support;

@@ -60,7 +60,7 @@ fn bracket(more: &[&str]) -> (GripSet, String) {
 fn the_load_multiple_is_where_the_pads_friction_or_the_contact_ends() {
     let (set, out) = bracket(&["--accel", "2g", "--force", "20N", "--pad-friction", "2"]);
     assert!(out.contains("multiple"), "{out}");
-    let friction = set.provenance.settings["pad_friction"].as_f64().unwrap();
+    let friction = set.provenance.resolved.pad_friction.unwrap();
     assert_eq!(friction, 2.0);
     let (mut slipping, mut twisted) = (0, 0);
     for ranked in set.grips.iter().step_by(3) {

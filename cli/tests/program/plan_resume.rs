@@ -77,7 +77,7 @@ fn answer(file: &Path) -> String {
 fn candidates_before(stderr: &str) -> u64 {
     let line = stderr
         .lines()
-        .find(|line| line.starts_with("going on from"))
+        .find(|line| line.starts_with("resuming from"))
         .unwrap_or_else(|| panic!("{stderr}"));
     line.split(": ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap()
 }
@@ -150,14 +150,14 @@ fn an_interrupted_run_ranks_what_it_has_and_goes_on_later() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let some = GripSet::read(&file).unwrap();
-    assert_eq!(some.provenance.settings["complete"], false);
+    assert!(!some.provenance.complete);
     assert!(partial(&file).exists());
     let output = run(&file, &["--resume"]);
     let err = text(&output.stderr);
     assert_eq!(output.status.code(), Some(0), "{err}");
     assert_eq!(candidates_before(&err), some.summary.candidates);
     let all = GripSet::read(&file).unwrap();
-    assert_eq!(all.provenance.settings["complete"], true);
+    assert!(all.provenance.complete);
     assert!(
         all.summary.candidates > some.summary.candidates
             && all.summary.ranked >= some.summary.ranked
@@ -183,14 +183,14 @@ fn what_is_no_state_is_refused_and_none_is_no_fault() {
         assert!(
             output.status.code() == Some(2)
                 && err.contains("grips.json.partial")
-                && err.contains("without --resume"),
+                && err.contains("set by: --resume"),
             "{bad}: {err}"
         );
     }
     std::fs::remove_file(partial(&file)).unwrap();
     let output = run(&file, &quick);
     assert!(
-        output.status.code() == Some(0) && text(&output.stderr).contains("nothing to go on from"),
+        output.status.code() == Some(0) && text(&output.stderr).contains("nothing to resume from"),
         "{}",
         text(&output.stderr)
     );

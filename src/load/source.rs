@@ -1,4 +1,4 @@
-//! The value of `--loads`, source by source.
+//! The text of one source of loads.
 
 use std::path::PathBuf;
 

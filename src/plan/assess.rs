@@ -1,0 +1,283 @@
+//! Grips of one part under one set of loads, from pose to numbers.
+
+use rayon::prelude::*;
+
+use crate::backend::{Backend, Batch, Best, Problem, ScoreOptions, Scored, SeedSet};
+use crate::error::{Error, Result};
+use crate::geometry::patch_area;
+use crate::gripper::Gripper;
+use crate::load::wrench_in_grip;
+use crate::mechanics::twist_out::{self, TwistOut};
+use crate::mechanics::{Options, Pads, Search, inverse, refused};
+use crate::model::{Grip, Patch, Status, Wrench};
+use crate::part::MassProperties;
+use crate::rank::Weights;
+use crate::request::{Polish, Request};
+use crate::results::{LoadCase, LoadScore, RankedGrip};
+
+/// What decides the answer, beside part, gripper and loads.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Gripping force [N].
+    pub force: f64,
+    /// Weights of the score.
+    pub weights: Weights,
+    /// Position uncertainty of the part along the pads while closing [m], for alpha.
+    pub delta: f64,
+    /// Pad friction while closing, for alpha.
+    pub mu_c: f64,
+    /// Pad friction, for safety and the force needed.
+    pub pad_friction: Option<f64>,
+    /// How loads are solved.
+    pub score: ScoreOptions,
+}
+
+impl Settings {
+    /// Those of a request with this gripper. Only the worst loads are solved: the others of grips
+    /// that are kept come after the ranking.
+    ///
+    /// # Errors
+    /// When the gripper does not have the force asked for.
+    pub fn new(request: &Request, gripper: &Gripper) -> Result<Self> {
+        let scoring = &request.scoring;
+        Ok(Self {
+            force: force(request, gripper)?,
+            weights: Weights { k1: scoring.k1, k2: scoring.k2 },
+            delta: scoring.position_error.0,
+            mu_c: scoring.closing_friction,
+            pad_friction: scoring.pad_friction.or(gripper.pad_friction),
+            score: ScoreOptions {
+                polish: Polish::Worst,
+                separation: scoring.separation,
+                refiner: scoring.refiner,
+            },
+        })
+    }
+}
+
+/// The gripping force [N]: the one asked for, or the gripper's largest.
+fn force(request: &Request, gripper: &Gripper) -> Result<f64> {
+    let [least, most] = gripper.force;
+    let Some(force) = request.force.map(|force| force.0) else { return Ok(most) };
+    let wrong = |problem: String, remedy: String| {
+        Err(Error::input("force", problem, remedy).with_options(&["force"]))
+    };
+    if force.is_nan() || force <= 0.0 {
+        return wrong(format!("is {force} N"), "give a force above zero".to_owned());
+    }
+    if force < least * (1.0 - 1e-9) || force > most * (1.0 + 1e-9) {
+        return wrong(
+            format!("{force} N is outside what {} can do", gripper.name),
+            format!("give {least} N to {most} N"),
+        );
+    }
+    Ok(force)
+}
+
+/// Scores grips of one part under one set of loads.
+#[derive(Debug)]
+pub struct Assessor<'a> {
+    /// The loads, part frame, about the centre of mass.
+    pub loads: &'a [LoadCase],
+    /// The part's mass properties.
+    pub mass: MassProperties,
+    /// Settings.
+    pub settings: &'a Settings,
+    /// Where the seeds are computed.
+    pub backend: &'a Backend,
+    /// The twists tried.
+    pub seeds: &'a SeedSet,
+}
+
+/// Loads of one call of the backend: bounds the memory whatever the number of grips and loads.
+const LOADS_AT_ONCE: usize = 1 << 20;
+/// The same where the answer of every load is kept for a while, some 250 bytes each.
+const ANSWERS_AT_ONCE: usize = 1 << 17;
+
+impl Assessor<'_> {
+    /// Scores every grip under its worst load, in order. The answers depend neither on the number
+    /// of threads nor on the backend.
+    ///
+    /// # Errors
+    /// As [`Backend::score`].
+    pub fn assess(&self, grips: Vec<Grip>) -> Result<Vec<RankedGrip>> {
+        self.assess_blocks(grips, None)
+    }
+
+    /// As [`Assessor::assess`], but without the grips whose bounds show that they cannot be among
+    /// the `best`, the merits so far. The weight `k1` must not be negative.
+    ///
+    /// # Errors
+    /// As [`Backend::score_best`].
+    pub fn assess_best(&self, grips: Vec<Grip>, best: &mut Best) -> Result<Vec<RankedGrip>> {
+        self.assess_blocks(grips, Some(best))
+    }
+
+    fn assess_blocks(
+        &self,
+        grips: Vec<Grip>,
+        mut best: Option<&mut Best>,
+    ) -> Result<Vec<RankedGrip>> {
+        let mut ranked = Vec::with_capacity(grips.len());
+        let mut grips = grips.into_iter().peekable();
+        while grips.peek().is_some() {
+            let block: Vec<Grip> =
+                grips.by_ref().take((LOADS_AT_ONCE / self.loads.len().max(1)).max(1)).collect();
+            ranked.extend(self.assess_block(block, best.as_deref_mut())?);
+        }
+        Ok(ranked)
+    }
+
+    fn assess_block(&self, grips: Vec<Grip>, best: Option<&mut Best>) -> Result<Vec<RankedGrip>> {
+        let wrenches: Vec<Vec<Wrench>> = grips.par_iter().map(|grip| self.wrenches(grip)).collect();
+        let batch = Batch {
+            problems: grips
+                .iter()
+                .zip(&wrenches)
+                .map(|(grip, wrenches)| self.problem(grip, wrenches))
+                .collect(),
+        };
+        let scored = match best {
+            None => self.backend.score(&batch, self.seeds, &self.settings.score)?,
+            Some(best) => {
+                let alphas: Vec<f64> = grips
+                    .par_iter()
+                    .map(|grip| self.alpha(grip, &TwistOut::new(&grip.contact)).0)
+                    .collect();
+                let merit = |index: usize, mu: f64| self.settings.weights.score(mu, alphas[index]);
+                self.backend.score_best(&batch, self.seeds, &self.settings.score, best, &merit)?
+            }
+        };
+        let jobs = grips
+            .into_par_iter()
+            .zip(wrenches.par_iter())
+            .zip(scored)
+            .filter(|(_, scored)| !scored.outranked);
+        Ok(jobs.map(|((grip, wrenches), scored)| self.measure(grip, wrenches, &scored)).collect())
+    }
+
+    /// The loads as a grip sees them.
+    fn wrenches(&self, grip: &Grip) -> Vec<Wrench> {
+        self.loads
+            .iter()
+            .map(|load| {
+                wrench_in_grip(&load.wrench, self.mass.centre_of_mass, &grip.part_from_grip)
+            })
+            .collect()
+    }
+
+    fn problem<'a>(&self, grip: &'a Grip, wrenches: &'a [Wrench]) -> Problem<'a> {
+        Problem {
+            contact: &grip.contact,
+            distance: grip.distance(),
+            force: self.settings.force,
+            wrenches,
+        }
+    }
+
+    /// Alpha [rad] and the least lever [m].
+    ///
+    /// The width counts for grips from inside too: jaws that push outwards right a part up to `asin
+    /// w/d`, which is more than `atan w/d`.
+    fn alpha(&self, grip: &Grip, lever: &TwistOut) -> (f64, f64) {
+        let least = lever.least_lever().map_or(0.0, |lever| lever.width);
+        (twist_out::alpha(grip.width, least, self.settings.delta, self.settings.mu_c), least)
+    }
+
+    /// A grip's numbers from its worst load; what takes more solving is left to
+    /// [`Assessor::finish`].
+    fn measure(&self, grip: Grip, wrenches: &[Wrench], scored: &Scored) -> RankedGrip {
+        let (load, score) = scored.worst.unwrap_or((0, refused(Status::NoContact, 0)));
+        let wrench = wrenches.get(load).copied().unwrap_or_default();
+        let lever = TwistOut::new(&grip.contact);
+        let (alpha, least) = self.alpha(&grip, &lever);
+        let share = |left: f64, patch: &Patch| left / patch_area(patch);
+        let contact_share = share(score.contact_area_i, &grip.contact.face_i)
+            .min(share(score.contact_area_ii, &grip.contact.face_ii));
+        RankedGrip {
+            rank: 0,
+            score: None,
+            alpha,
+            delta_d: twist_out::delta_d(grip.width, least),
+            contact_share,
+            twist_margin: lever.margin(self.settings.force, &wrench),
+            safety: self
+                .settings
+                .pad_friction
+                .zip(score.mu_s)
+                .filter(|(_, mu)| *mu > 0.0)
+                .map(|(friction, mu)| friction / mu),
+            force_needed: None,
+            load_multiple: None,
+            earlier: None,
+            pose_noise: None,
+            worst: LoadScore {
+                load: load as u32,
+                wrench,
+                status: score.status,
+                mu_s: score.mu_s,
+                slip: score.slip,
+                pressure: score.pressure,
+                bounds: score.bounds,
+                residual: score.residual,
+            },
+            merged: Vec::new(),
+            mu_by_load: scored.all.iter().map(|score| score.mu_s).collect(),
+            grip,
+        }
+    }
+
+    /// Solves every load exactly for the grips that do not have all of them yet, and keeps each
+    /// load's `mu_s`. Nothing else changes.
+    ///
+    /// # Errors
+    /// As [`Backend::score`].
+    pub fn solve_every_load(&self, grips: &mut [&mut RankedGrip]) -> Result<()> {
+        let options = ScoreOptions { polish: Polish::All, ..self.settings.score };
+        let mut open: Vec<&mut &mut RankedGrip> =
+            grips.iter_mut().filter(|ranked| ranked.mu_by_load.len() != self.loads.len()).collect();
+        for block in open.chunks_mut((ANSWERS_AT_ONCE / self.loads.len().max(1)).max(1)) {
+            let wrenches: Vec<Vec<Wrench>> =
+                block.par_iter().map(|ranked| self.wrenches(&ranked.grip)).collect();
+            let problems = block
+                .iter()
+                .zip(&wrenches)
+                .map(|(ranked, wrenches)| self.problem(&ranked.grip, wrenches));
+            let scored = self.backend.score(
+                &Batch { problems: problems.collect() },
+                self.seeds,
+                &options,
+            )?;
+            for (ranked, scored) in block.iter_mut().zip(scored) {
+                ranked.mu_by_load = scored.all.iter().map(|score| score.mu_s).collect();
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds what only the grips of the final list need: the gripping force needed and the largest
+    /// multiple under the worst load.
+    pub fn finish(&self, grips: &mut [RankedGrip]) {
+        let Some(friction) = self.settings.pad_friction else { return };
+        // For thousands of grips only limit states on the branch from d = 0 count, which errs
+        // towards more force.
+        let options = Options {
+            separation: self.settings.score.separation,
+            search: Search::Off,
+            ..Options::default()
+        };
+        grips.par_iter_mut().for_each(|ranked| {
+            let grip = &ranked.grip;
+            let Some(pads) = Pads::new(&grip.contact) else { return };
+            ranked.force_needed = inverse::force_needed(
+                &pads,
+                grip.distance(),
+                &ranked.worst.wrench,
+                friction,
+                &options,
+            );
+            let multiple = ranked.force_needed.map_or(0.0, |needed| self.settings.force / needed);
+            ranked.load_multiple = multiple.is_finite().then_some(multiple);
+        });
+    }
+}

@@ -1,0 +1,122 @@
+//! Where the answer goes: result file, page, and the loads that a page shows.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::{Assessor, Plan, Settings};
+use crate::backend::{Backend, ScoreOptions, SeedSet};
+use crate::error::{Error, ErrorKind, Result};
+use crate::export::{self, Format};
+use crate::gripper::Gripper;
+use crate::rank::Weights;
+use crate::report;
+use crate::request::Polish;
+use crate::results::{GripSet, RankedGrip};
+
+/// The best grips of a list, for which a page shows the friction over all loads.
+pub const WHOLE: usize = 20;
+
+/// Grippers drawn into a GLB file where nobody says how many: more hide the part.
+pub const GLB_TOP: usize = 10;
+
+impl Plan {
+    /// Writes result file and page where the request names them.
+    pub(super) fn write(&self, set: &GripSet) -> Result<()> {
+        let mesh = Some(&self.part.mesh);
+        if let (Some(path), Some(format)) = (&self.request.output.output, self.format) {
+            match format {
+                Format::Json => set.write(path)?,
+                Format::JsonLines => set.write_lines(path)?,
+                _ => {
+                    let options = export::Options {
+                        top: (format == Format::Glb).then_some(GLB_TOP),
+                        pad_friction: self.settings.pad_friction,
+                        ..export::Options::default()
+                    };
+                    export::write(set, format, path, &options, mesh)?;
+                }
+            }
+        }
+        match &self.request.output.report {
+            Some(path) => report::write(set, mesh, path),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The format of a result file by its ending, refused now rather than after the search.
+pub(super) fn format(path: &Path) -> Result<Format> {
+    let place = || format!("result file {}", path.display());
+    if path.as_os_str() == "-" {
+        return Err(Error::input(
+            "result file -",
+            "the table goes to standard output",
+            "ask for JSON to have the result there, without a file",
+        )
+        .with_options(&["json"]));
+    }
+    if let Some(folder) =
+        path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir())
+    {
+        return Err(Error::new(
+            ErrorKind::NotFound,
+            place(),
+            format!("the folder '{}' is not there", folder.display()),
+            "make it first",
+        )
+        .with_options(&["output"]));
+    }
+    if path.extension().is_none() {
+        return Ok(Format::Json);
+    }
+    let format = Format::from_path(path).map_err(|_| {
+        let endings: Vec<&str> = Format::ALL.iter().flat_map(|known| known.2).copied().collect();
+        Error::input(
+            place(),
+            "the file's ending names no format",
+            format!("use one of {}", endings.join(", ")),
+        )
+        .with_options(&["output"])
+    })?;
+    export::check(format)?;
+    Ok(format)
+}
+
+/// The gripper as the result file carries it.
+pub(super) fn gripper_json(gripper: &Gripper) -> Result<Value> {
+    serde_json::to_value(gripper).map_err(|error| {
+        Error::input(&gripper.name, format!("cannot be written: {error}"), "correct the gripper")
+    })
+}
+
+/// Solves all loads of the best `count` grips of a set for a page, as they were solved for the
+/// result.
+///
+/// # Errors
+/// As [`Backend::score`].
+pub fn solve_every_load(set: &mut GripSet, count: usize) -> Result<()> {
+    let scoring = &set.provenance.request.scoring;
+    let settings = Settings {
+        force: set.provenance.resolved.force.0,
+        weights: Weights::default(),
+        delta: 0.0,
+        mu_c: 0.0,
+        pad_friction: None,
+        score: ScoreOptions {
+            polish: Polish::All,
+            separation: scoring.separation,
+            refiner: scoring.refiner,
+        },
+    };
+    let seeds = SeedSet::default();
+    let assessor = Assessor {
+        loads: &set.loads,
+        mass: set.part.mass,
+        settings: &settings,
+        backend: &Backend::Cpu,
+        seeds: &seeds,
+    };
+    assessor
+        .solve_every_load(&mut set.grips.iter_mut().take(count).collect::<Vec<&mut RankedGrip>>())
+}

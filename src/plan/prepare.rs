@@ -1,0 +1,211 @@
+//! From a request to a plan that is ready to run.
+
+use std::path::Path;
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use super::{Plan, Settings, output};
+use crate::backend::SeedSet;
+use crate::error::{Error, ErrorKind, Result};
+use crate::gripper::{self, Gripper};
+use crate::load::LoadSet;
+use crate::part::{MassProperties, Part, ReadOptions};
+use crate::propose::ProposeOptions;
+use crate::request::Request;
+use crate::results::LoadCase;
+
+/// Density at which a part is taken where no load depends on its mass [kg/m^3].
+const ANY_DENSITY: f64 = 1000.0;
+
+/// A plan in the making; see [`Plan::builder`].
+///
+/// ```
+/// use gripfast::part::{Part, ReadOptions};
+/// use gripfast::plan::Plan;
+/// use gripfast::request::Request;
+/// use gripfast::units::Density;
+///
+/// let part = Part::read("data/parts/hex_nut.stl".as_ref(), &ReadOptions::default())?;
+/// let mut request = Request::new("", "generic");
+/// request.density = Some(Density(7850.0));
+/// let plan = Plan::builder(request).part(part).build()?;
+/// assert_eq!(plan.loads().len(), 6); // gravity along the six axes
+/// # Ok::<(), gripfast::error::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct PlanBuilder {
+    request: Request,
+    part: Option<Part>,
+    gripper: Option<Gripper>,
+    loads: Option<Vec<LoadCase>>,
+    command: Vec<String>,
+}
+
+impl PlanBuilder {
+    pub(super) fn new(request: Request) -> Self {
+        Self { request, part: None, gripper: None, loads: None, command: Vec::new() }
+    }
+
+    /// This part, instead of the file that the request names.
+    #[must_use]
+    pub fn part(mut self, part: Part) -> Self {
+        self.part = Some(part);
+        self
+    }
+
+    /// This gripper, instead of the one that the request names.
+    #[must_use]
+    pub fn gripper(mut self, gripper: Gripper) -> Self {
+        self.gripper = Some(gripper);
+        self
+    }
+
+    /// These loads, instead of those that the request describes: wrenches on the part in its frame,
+    /// about its centre of mass.
+    #[must_use]
+    pub fn loads(mut self, loads: Vec<LoadCase>) -> Self {
+        self.loads = Some(loads);
+        self
+    }
+
+    /// The command line that led here, for the provenance of the result.
+    #[must_use]
+    pub fn command(mut self, command: Vec<String>) -> Self {
+        self.command = command;
+        self
+    }
+
+    /// Reads what is not in memory, and checks that everything fits together.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn build(self) -> Result<Plan> {
+        let Self { request, part, gripper, loads, command } = self;
+        request.check()?;
+        let gripper = gripper.map_or_else(|| gripper::find(&request.gripper), Ok)?;
+        let settings = Settings::new(&request, &gripper)?;
+        let sources = if loads.is_none() { Some(load_set(&request)?) } else { None };
+        let seeds = SeedSet::with_at_least(request.scoring.seeds)?;
+        let format = request.output.output.as_deref().map(output::format).transpose()?;
+        let threads = threads(request.scoring.threads)?;
+        let part = match part {
+            Some(part) => part,
+            None => read_part(&request, &threads)?,
+        };
+        let mass = mass(&request, &part, loads.is_some())?;
+        let loads = match (loads, sources) {
+            (Some(loads), _) => checked(loads)?,
+            (None, Some(sources)) => sources.cases(&mass)?,
+            (None, None) => Vec::new(),
+        };
+        let mut warnings = part.health.warnings.clone();
+        if !part.health.watertight {
+            warnings.push(
+                "the surface is not watertight: volume, centre of mass and inertia are estimates \
+                 (see `gripfast part`)"
+                    .to_owned(),
+            );
+        }
+        let propose = ProposeOptions::from(&request.candidates);
+        Ok(Plan {
+            request,
+            part,
+            gripper,
+            mass,
+            loads,
+            propose,
+            settings,
+            seeds,
+            format,
+            command,
+            warnings,
+            threads,
+        })
+    }
+}
+
+/// Threads of the plan's own.
+fn threads(number: Option<usize>) -> Result<ThreadPool> {
+    let named = ThreadPoolBuilder::new().thread_name(|index| format!("gripfast {index}"));
+    named.num_threads(number.unwrap_or(0)).build().map_err(|error| {
+        Error::new(
+            ErrorKind::Limit,
+            "threads",
+            format!("cannot be started: {error}"),
+            "ask for fewer",
+        )
+        .with_options(&["threads"])
+    })
+}
+
+fn read_part(request: &Request, threads: &ThreadPool) -> Result<Part> {
+    if request.part.as_os_str().is_empty() {
+        return Err(Error::input("part", "none is named", "give a part file"));
+    }
+    let options = ReadOptions { unit: request.unit, ..ReadOptions::default() };
+    threads.install(|| Part::read(Path::new(&request.part), &options))
+}
+
+fn load_set(request: &Request) -> Result<LoadSet> {
+    let sources = request.loads.iter().map(String::as_str);
+    let loads =
+        LoadSet::from_sources("loads", sources).map_err(|error| error.with_options(&["loads"]))?;
+    Ok(match request.accel {
+        Some(accel) => loads.with_acceleration(accel.0),
+        None => loads,
+    })
+}
+
+/// Loads of the caller's own.
+fn checked(loads: Vec<LoadCase>) -> Result<Vec<LoadCase>> {
+    let finite = |load: &&LoadCase| load.wrench.force.is_finite() && load.wrench.moment.is_finite();
+    if let Some(load) = loads.iter().find(|load| !finite(load)) {
+        return Err(Error::input(
+            "loads",
+            format!("'{}' is not finite", load.name),
+            "give finite forces and moments",
+        ));
+    }
+    if loads.is_empty() {
+        return Err(Error::input("loads", "no load case", "give at least one"));
+    }
+    Ok(loads)
+}
+
+/// Mass properties at the mass or density asked for.
+fn mass(request: &Request, part: &Part, own_loads: bool) -> Result<MassProperties> {
+    let ball = |source: &String| source.trim().starts_with("ball");
+    match (request.mass, request.density) {
+        (Some(mass), _) => {
+            if mass.0.is_nan() || mass.0 <= 0.0 {
+                return Err(Error::input(
+                    "mass",
+                    format!("is {} kg", mass.0),
+                    "give a mass above zero",
+                )
+                .with_options(&["mass"]));
+            }
+            let unit = part.mass_properties(1.0);
+            if unit.volume.is_nan() || unit.volume <= 0.0 {
+                return Err(Error::new(
+                    ErrorKind::Geometry,
+                    part.file.display().to_string(),
+                    "the surface encloses no volume",
+                    "repair the mesh: without a volume there is no centre of mass",
+                ));
+            }
+            Ok(part.mass_properties(mass.0 / unit.volume))
+        }
+        (None, Some(density)) => Ok(part.mass_properties(density.0)),
+        (None, None) if own_loads || request.loads.iter().all(ball) => {
+            Ok(part.mass_properties(ANY_DENSITY))
+        }
+        (None, None) => Err(Error::input(
+            "mass",
+            "the part's mass is not known",
+            "give its mass, e.g. 350g, or its density: 2700kg/m3 (aluminium), 7850kg/m3 (steel), \
+             1200kg/m3 (plastic)",
+        )
+        .with_options(&["mass", "density"])),
+    }
+}
