@@ -2,6 +2,7 @@
 
 use clap::Args as ClapArgs;
 use gripfast::backend::{Choice, SeedSet, Selection, select};
+use gripfast::request::Scoring;
 
 #[derive(Debug, ClapArgs)]
 pub(crate) struct BackendArgs {
@@ -14,7 +15,7 @@ pub(crate) struct BackendArgs {
     #[arg(long, value_name = "NAME|INDEX")]
     pub(crate) adapter: Option<String>,
     /// Slip twists tried for each load before the exact solver, at least.
-    #[arg(long, value_name = "N", default_value_t = 81)]
+    #[arg(long, value_name = "N", default_value_t = Scoring::default().seeds)]
     pub(crate) seeds: usize,
 }
 
@@ -24,6 +25,11 @@ pub(crate) fn use_threads(threads: Option<usize>) -> anyhow::Result<()> {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
     }
     Ok(())
+}
+
+/// So many threads of its own; one for each core without a number.
+pub(crate) fn pool(threads: Option<usize>) -> anyhow::Result<rayon::ThreadPool> {
+    Ok(rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build()?)
 }
 
 impl BackendArgs {

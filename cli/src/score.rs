@@ -103,7 +103,7 @@ struct Line<'a> {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    backend::use_threads(args.threads)?;
+    let threads = backend::pool(args.threads)?;
     let selection = args.backend.select()?;
     let seeds = args.backend.seed_set()?;
     let force =
@@ -144,6 +144,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let options =
         ScoreOptions { polish: args.polish, separation: args.separation, refiner: args.refiner };
     let job = Job {
+        threads: &threads,
         backend: &selection.backend,
         seeds: &seeds,
         options,
@@ -257,6 +258,7 @@ impl<'a> Source<'a> {
 }
 
 struct Job<'a> {
+    threads: &'a rayon::ThreadPool,
     backend: &'a Backend,
     seeds: &'a SeedSet,
     options: ScoreOptions,
@@ -407,9 +409,10 @@ impl Job<'_> {
                 },
             })
             .collect();
+        let batch = Batch { problems };
         let scored = self
-            .backend
-            .score(&Batch { problems }, self.seeds, &self.options)
+            .threads
+            .install(|| self.backend.score(&batch, self.seeds, &self.options))
             .with_context(|| format!("{}: grips from {}", self.name, counts.grips))?;
         for (entry, Scored { worst, all, solved, compared, .. }) in entries.iter().zip(scored) {
             let index = counts.grips;

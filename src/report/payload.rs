@@ -21,6 +21,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::gripper::{Body, Gripper, Shape};
 use crate::model::{Contact, Frame, Slip};
 use crate::part::Mesh;
+use crate::request::Side;
 use crate::results::{GripSet, Provenance, RankedGrip};
 
 /// Grips that the page lists; a longer ranking is cut there and the page says so.
@@ -335,19 +336,31 @@ fn surface(columns: &mut Columns, display: Display) -> Value {
     })
 }
 
-/// What the run was asked for, under the page's own names, so that the page does not depend on how
-/// the result file keeps it; null where the file does not say.
+/// What the run was asked for, in SI under the page's own names, so that the page does not depend on
+/// how the result file keeps it.
 fn asked(set: &GripSet) -> Value {
-    let setting = |name: &str| set.provenance.settings.get(name).cloned().unwrap_or(Value::Null);
+    let Provenance { request, resolved, complete, .. } = &set.provenance;
+    let (candidates, scoring) = (&request.candidates, &request.scoring);
     json!({
-        "force": setting("force_n"), "pad_friction": setting("pad_friction"),
-        "k1": setting("k1"), "k2": setting("k2"),
-        "spacing": setting("spacing_m"), "angle_step": setting("angle_step_rad"),
-        "min_contact": setting("min_contact_share"), "max_offset": setting("max_offset_m"),
-        "opening": setting("opening_m"), "clearance": setting("clearance_m"),
-        "inside": setting("inside"), "approach_cone": setting("approach_cone"),
-        "ground": setting("ground"), "keep_out": setting("keep_out_m"),
-        "complete": setting("complete"),
+        "force": resolved.force.0, "pad_friction": resolved.pad_friction,
+        "k1": scoring.k1, "k2": scoring.k2,
+        "spacing": resolved.spacing.0, "angle_step": candidates.angle_step.0,
+        "min_contact": candidates.min_contact,
+        "max_offset": candidates.max_offset.map(|offset| offset.0),
+        "opening": candidates.opening.0, "clearance": candidates.clearance.0,
+        "inside": candidates.grips != Side::Outside,
+        "approach_cone": candidates
+            .approach
+            .map(|cone| json!({ "axis": cone.axis, "half_angle_rad": cone.half_angle })),
+        "ground": candidates
+            .ground
+            .map(|ground| json!({ "normal": ground.normal, "height_m": ground.offset })),
+        "keep_out": candidates
+            .keep_out
+            .iter()
+            .map(|region| [region.low, region.high])
+            .collect::<Vec<_>>(),
+        "complete": complete,
     })
 }
 
