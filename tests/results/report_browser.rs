@@ -51,7 +51,7 @@ fn the_page_works_in_a_browser() {
     ]);
     report::write(&none, Some(&part.mesh), &page("none.html")).unwrap();
     let mut slipping = set;
-    slipping.provenance.settings.insert("pad_friction".into(), 1e-4.into());
+    slipping.provenance.resolved.pad_friction = Some(1e-4);
     for grip in &mut slipping.grips {
         grip.safety = grip.worst.mu_s.map(|mu| 1e-4 / mu);
     }
