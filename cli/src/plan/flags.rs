@@ -296,7 +296,7 @@ impl Args {
             return Err(Error::input(
                 "--resume",
                 "needs the result file whose run it resumes",
-                "add -o FILE",
+                "add --output FILE",
             ));
         }
         Ok(request)

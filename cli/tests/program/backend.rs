@@ -349,5 +349,9 @@ fn polish_top_gives_the_same_best_grips() {
         run(&with(&["--diverse"]), "", 0).0
     );
     assert!(run(&with(&["--polish", "top"]), "", 0).0.contains("more were not solved"));
-    assert!(run(&with(&["--polish", "top", "--k1=-1"]), "", 2).1.contains("--polish worst"));
+    assert!(
+        run(&with(&["--polish", "top", "--k1=-1"]), "", 2)
+            .1
+            .contains("use 'worst'\n  set by: --polish, --k1")
+    );
 }

@@ -117,7 +117,10 @@ fn a_killed_run_goes_on_to_the_same_bytes() {
         .stdout(Stdio::null())
         .spawn()
         .unwrap();
-    std::thread::sleep(Duration::from_millis(300));
+    let (before, since) = (std::fs::read(partial(&file)).unwrap(), Instant::now());
+    while std::fs::read(partial(&file)).is_ok_and(|now| now == before) {
+        assert!(since.elapsed() < Duration::from_secs(60), "no state was written");
+    }
     child.kill().unwrap();
     child.wait().unwrap();
     let output = run(&file, &["--resume", "--threads", "2"]);
