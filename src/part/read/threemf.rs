@@ -11,7 +11,6 @@ use zip::ZipArchive;
 use super::Source;
 use crate::error::{ErrorKind, Result};
 use crate::part::weld::{Soup, Welder};
-use crate::units::Unit;
 
 mod model;
 
