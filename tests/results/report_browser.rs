@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::Command;
 
 use crate::support::report::{data, large, part, plan, refined};
-use gripfast::report;
+use gripfast::{export, report};
 
 #[test]
 fn the_page_works_in_a_browser() {
@@ -41,6 +41,9 @@ fn the_page_works_in_a_browser() {
     report::write(&many, Some(&fine), &page("large.html")).unwrap();
     set.part.file = "</script><img src=x onerror=alert(1)>.stl".into();
     report::write(&set, Some(&part.mesh), &page("small.html")).unwrap();
+    // What the page writes is compared with what the program writes.
+    let options = export::Options::default();
+    export::write(&set, export::Format::Csv, &page("small.csv"), &options, None).unwrap();
     let mut none = set.clone();
     none.grips.clear();
     none.summary.ranked = 0;

@@ -35,7 +35,7 @@ function vectorText(values, factor, unit) {
 }
 
 /** Quaternion (x, y, z, w) of orthonormal columns. */
-function quaternion({ x1, x2, x3 }) {
+export function quaternion({ x1, x2, x3 }) {
   const m = [[x1[0], x2[0], x3[0]], [x1[1], x2[1], x3[1]], [x1[2], x2[2], x3[2]]];
   const trace = m[0][0] + m[1][1] + m[2][2];
   if (trace > 0) {

@@ -19,7 +19,10 @@ function bodyGeometry(shape) {
 function body(description, surface, materials) {
   const geometry = bodyGeometry(description.shape);
   const group = new Group();
-  group.add(new Mesh(geometry, surface), new LineSegments(new EdgesGeometry(geometry, 30), materials.jawEdge));
+  // First the depth alone: of several surfaces behind each other only the nearest is then shaded.
+  const layers = [new Mesh(geometry, materials.jawDepth), new Mesh(geometry, surface), new LineSegments(new EdgesGeometry(geometry, 30), materials.jawEdge)];
+  layers.forEach((layer, k) => (layer.renderOrder = 2 + k));
+  group.add(...layers);
   group.applyMatrix4(new Matrix4().fromArray(description.matrix));
   return group;
 }

@@ -9,8 +9,10 @@ import { APPROACHES, EMPTY, pairName, pairs, select, sortKeys } from './filter.j
 import { count, fixed, number } from './format.js';
 import { Histogram } from './histogram.js';
 import { VirtualList } from './list.js';
+import { drawLegend } from './legend.js';
 import { drawRun, limits } from './run.js';
 import { View } from './scene.js';
+import { Take } from './take.js';
 import { theme } from './theme.js';
 import { triad } from './triad.js';
 import { whatIf } from './whatif.js';
@@ -51,11 +53,12 @@ async function start() {
   });
   theme($('#theme'), (dark) => {
     view?.setTheme(dark);
+    if (view) drawLegend($('#key ul'), report, scale, view.colours);
     ball.draw();
   });
 
   const asked = address(report);
-  const state = { filter: { ...EMPTY }, key: 'rank', direction: 1, order: [], chosen: -1, pinned: -1 };
+  const state = { filter: { ...EMPTY }, key: 'rank', direction: 1, order: [], chosen: -1, pinned: -1, marked: new Set() };
   const keys = sortKeys(report);
   const squeeze = report.column.force_needed.some(Number.isFinite);
   if (!squeeze) delete keys.squeeze;
@@ -80,7 +83,7 @@ async function start() {
         row.append(span);
         return span;
       };
-      cell('rank', count(c.rank[i]));
+      cell('rank', `${state.marked.has(i) ? '\u2605 ' : ''}${count(c.rank[i])}`);
       const needed = cell('mu', Number.isFinite(mu) ? fixed(mu, decimals) : '\u2013');
       needed.style.setProperty('--swatch', Number.isFinite(mu) ? css(friction(scale.at(mu))) : 'transparent');
       const value = squeeze ? report.squeeze(i) : (c.alpha[i] * 180) / Math.PI;
@@ -88,7 +91,7 @@ async function start() {
       cell('number', fixed(c.width[i] * 1e3, 1));
       cell('faces', pairName(report, i));
       cell(`dot ${kind}`, '').title = status;
-      row.setAttribute('aria-label', `Rank ${c.rank[i]}, friction needed ${number(mu)}, ${squeeze ? `squeeze ${number(value)} newtons` : `tilt ${number(value)} degrees`}, width ${number(c.width[i] * 1e3)} millimetres, faces ${c.face_i[i]} and ${c.face_ii[i]}, ${status}`);
+      row.setAttribute('aria-label', `Rank ${c.rank[i]}, friction needed ${number(mu)}, ${squeeze ? `squeeze ${number(value)} newtons` : `tilt ${number(value)} degrees`}, width ${number(c.width[i] * 1e3)} millimetres, faces ${c.face_i[i]} and ${c.face_ii[i]}, ${status}${state.marked.has(i) ? ', marked' : ''}`);
     },
     choose: (position) => choose(state.order[position]),
   });
@@ -99,6 +102,7 @@ async function start() {
     view?.setGrip(i, glide);
     detail.show(i);
     showPinned();
+    showMark();
     const c = report.column;
     $('#said').textContent = `Grip ${c.rank[i]}: friction needed ${number(report.mu(i))}, ${verdict(report, i)[0]}`;
     history.replaceState(null, '', `#grip=${c.id[i]}`);
@@ -114,6 +118,21 @@ async function start() {
     state.pinned = state.pinned >= 0 ? -1 : state.chosen;
     showPinned();
   });
+  const take = new Take($('#take'), report, view, state);
+  take.onPrinted = () => detail.pick(detail.load);
+  function showMark() {
+    $('#mark').setAttribute('aria-pressed', String(state.marked.has(state.chosen)));
+    $('#mark').textContent = state.marked.has(state.chosen) ? 'Marked' : 'Mark';
+    take.show();
+  }
+  function mark() {
+    if (state.chosen < 0) return;
+    if (!state.marked.delete(state.chosen)) state.marked.add(state.chosen);
+    $('#said').textContent = `Grip ${report.column.rank[state.chosen]} ${state.marked.has(state.chosen) ? 'marked' : 'no longer marked'}`;
+    showMark();
+    list.reset(state.order.length, state.order.indexOf(state.chosen));
+  }
+  $('#mark').addEventListener('click', mark);
   detail.onLoad = (load) => view?.setLoad(load);
 
   const histogram = new Histogram($('#histogram'), report, scale, (low, high) => {
@@ -134,6 +153,7 @@ async function start() {
     $('#list').hidden = state.order.length === 0;
     const filtered = JSON.stringify(state.filter) !== JSON.stringify(EMPTY) || state.filter.low !== -Infinity || state.filter.high !== Infinity;
     $('#clear').disabled = !filtered;
+    if (state.chosen >= 0) take.show();
     histogram.draw(all ? null : state.order);
     view?.setListed(state.order);
     for (const button of document.querySelectorAll('#columns button')) {
@@ -212,7 +232,9 @@ async function start() {
       if (!button) return;
       const { act, toggle } = button.dataset;
       if (act === 'fit') view.fit();
+      if (act === 'all') view.fit(state.chosen, true);
       if (act === 'grip') view.lookAtGrip();
+      if (act === 'play') view.play();
       if (toggle) {
         const on = button.getAttribute('aria-pressed') !== 'true';
         button.setAttribute('aria-pressed', String(on));
@@ -271,6 +293,7 @@ async function start() {
   $('#missing button').addEventListener('click', () => ($('#missing').hidden = true));
 
   document.addEventListener('keydown', (event) => {
+    if ((event.key === 'm' || event.key === 'M') && !event.target.matches('input, select') && !event.ctrlKey && !event.metaKey && !event.altKey) mark();
     if (event.key === '/' && !event.target.matches('input, select')) {
       event.preventDefault();
       $('#text').focus();
@@ -292,7 +315,7 @@ async function start() {
   document.documentElement.dataset.ready = String(Math.round(performance.now()));
   // For tests and for the curious: what is shown, as numbers.
   window.gripfast = {
-    report, state, view, ball, detail,
+    report, state, view, ball, detail, take,
     jaw: (side) => (view ? [...view.jaws.fingers[side].matrixWorld.elements] : null),
   };
 }

@@ -93,7 +93,7 @@ export function drawRun(root, report) {
   root.append(section('Settings', node('p', 'In SI units.', { class: 'quiet' }), facts(Object.entries(provenance.settings).map(([name, value]) => [name, plain(value)]), 'facts settings')));
   root.append(section('Provenance', facts([['gripfast', provenance.gripfast], ['Backend', provenance.backend], ['Loads', count(header.loads.length)]]), node('pre', provenance.command.join(' '), { tabindex: '0', 'aria-label': 'Command line' })));
   const notes = limits(report);
-  notes.push('Keys: arrows, Page Up and Page Down, Home and End choose in the list; / goes to the search; in the view arrows turn, shift with arrows moves, plus and minus zoom, F shows the whole part. A click on a dot chooses its grip.');
+  notes.push('Keys: arrows, Page Up and Page Down, Home and End choose in the list; / goes to the search; M marks the chosen grip; in the view arrows turn, shift with arrows moves, plus and minus zoom, F shows the whole part, A the gripper too, G the grip, P plays its approach; on the load ball arrows go from load to load. A click on a dot chooses its grip.');
   root.append(section('About this page', ...notes.map((text) => node('p', text, { class: 'quiet' }))));
   root.append(node('p', 'Three-dimensional view: three.js, MIT licence, \u00a9 three.js authors. This page loads nothing from the network.', { class: 'quiet' }));
 }

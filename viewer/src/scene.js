@@ -2,23 +2,25 @@
 
 import {
   AmbientLight, Box3, BoxGeometry, Box3Helper, BufferAttribute, BufferGeometry, CanvasTexture, Color, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide,
-  GridHelper, Group, HemisphereLight, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, PlaneGeometry, Points,
-  PointsMaterial, Quaternion, Raycaster, Scene, SphereGeometry, Spherical, Vector2, Vector3, WebGLRenderer,
+  FrontSide, GridHelper, Group, HemisphereLight, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, PlaneGeometry, Points,
+  PointsMaterial, Quaternion, Raycaster, Scene, SphereGeometry, Spherical, Sprite, SpriteMaterial, Vector2, Vector3, WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { friction } from './colour.js';
 import { verdict } from './detail.js';
 import { Jaws } from './jaws.js';
+import { gaps } from './take.js';
 
 const MM = 1000;
 const MOVE_MS = 260;
-/** Share of the view's width that what is framed fills, and the height [px] that it leaves free above and below. */
-const [FILL, MARGIN] = [0.86, 52];
+const PLAY_MS = 1800;
+/** Share of the view's width that what is framed fills, and the height [px] that it leaves free below the buttons. */
+const [FILL, MARGIN] = [0.86, 16];
 const UP = new Vector3(0, 0, 1);
 
 const PALETTE = {
-  light: { part: '#b4bdc8', edge: '#4b5663', jaw: '#4a6785', jawEdge: '#2f4a66', pad: '#d9762b', load: '#a3158f', fixture: '#8a6d00', ghost: '#0a7d6c', sky: '#ffffff', ground: '#9aa3ad' },
-  dark: { part: '#76828f', edge: '#11161b', jaw: '#9db4cc', jawEdge: '#c9d8e6', pad: '#f0964d', load: '#ef6bd8', fixture: '#d9b84a', ghost: '#4fd1bd', sky: '#f2f6fa', ground: '#4a535d' },
+  light: { part: '#b4bdc8', edge: '#4b5663', jaw: '#4a6785', jawEdge: '#2f4a66', pad: '#d9762b', load: '#a3158f', fixture: '#8a6d00', ghost: '#0a7d6c', approach: '#0a5fb4', sky: '#ffffff', ground: '#9aa3ad' },
+  dark: { part: '#76828f', edge: '#11161b', jaw: '#9db4cc', jawEdge: '#c9d8e6', pad: '#f0964d', load: '#ef6bd8', fixture: '#d9b84a', ghost: '#4fd1bd', approach: '#6db3f8', sky: '#f2f6fa', ground: '#4a535d' },
 };
 
 const vector = (list) => new Vector3(...list);
@@ -54,6 +56,21 @@ function dotTexture(cross) {
   return new CanvasTexture(canvas);
 }
 
+function letterTexture(letter, colour) {
+  const canvas = document.createElement('canvas');
+  canvas.width = canvas.height = 64;
+  const context = canvas.getContext('2d');
+  context.font = '700 50px system-ui, sans-serif';
+  context.textAlign = 'center';
+  context.textBaseline = 'middle';
+  context.lineWidth = 8;
+  context.strokeStyle = '#fff';
+  context.strokeText(letter, 32, 34);
+  context.fillStyle = colour;
+  context.fillText(letter, 32, 34);
+  return new CanvasTexture(canvas);
+}
+
 export class View {
   /** Throws when the browser has no WebGL. */
   constructor(host, report, scale) {
@@ -83,6 +100,7 @@ export class View {
     this.buildLoad();
     this.jaws = new Jaws(report.header.gripper, this.materials);
     this.world.add(this.jaws.root);
+    this.buildSigns();
     this.buildFixtures();
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.enableDamping = false;
@@ -112,10 +130,12 @@ export class View {
     this.materials = {
       part: new MeshStandardMaterial({ roughness: 0.72, metalness: 0.08, side: DoubleSide, ...lift }),
       edge: new LineBasicMaterial({ transparent: true, opacity: 0.75 }),
-      // Nearly clear: the part and its contact areas lie behind up to four of these surfaces.
-      jaw: new MeshStandardMaterial({ roughness: 0.6, metalness: 0.1, opacity: 0.1, ...glass }),
+      // The part and its contact areas stay visible through the one surface that is nearest.
+      jawDepth: new MeshBasicMaterial({ colorWrite: false, transparent: true, ...lift }),
+      jaw: new MeshStandardMaterial({ roughness: 0.55, metalness: 0.15, opacity: 0.42, ...glass, side: FrontSide }),
       jawEdge: new LineBasicMaterial({ transparent: true, opacity: 0.55 }),
-      palm: new MeshStandardMaterial({ roughness: 0.6, metalness: 0.1, opacity: 0.06, ...glass }),
+      palm: new MeshStandardMaterial({ roughness: 0.55, metalness: 0.15, opacity: 0.34, ...glass, side: FrontSide }),
+      approach: new MeshBasicMaterial({ depthTest: false, transparent: true }),
       pad: new MeshStandardMaterial({ roughness: 0.9, metalness: 0, opacity: 0.3, ...glass }),
       padEdge: new LineBasicMaterial(),
       contact: new MeshBasicMaterial({ transparent: true, opacity: 0.85, depthWrite: false, side: DoubleSide }),
@@ -224,10 +244,11 @@ export class View {
 
   setTheme(dark) {
     const colours = PALETTE[dark ? 'dark' : 'light'];
-    for (const name of ['part', 'edge', 'jaw', 'jawEdge', 'pad', 'load', 'fixture', 'ghost']) this.materials[name].color.set(colours[name]);
+    for (const name of ['part', 'edge', 'jaw', 'jawEdge', 'pad', 'load', 'fixture', 'ghost', 'approach']) this.materials[name].color.set(colours[name]);
     this.materials.palm.color.set(colours.jaw);
     this.materials.fixtureEdge.color.set(colours.fixture);
     for (const name of ['padEdge', 'contact', 'contactEdge']) this.materials[name].color.set(colours.pad);
+    this.colours = colours;
     this.sky.color.set(colours.sky);
     this.sky.groundColor.set(colours.ground);
     this.render();
@@ -261,6 +282,7 @@ export class View {
     const { x1, x2, x3, origin } = this.report.pose(i);
     const to = { q: new Quaternion().setFromRotationMatrix(new Matrix4().makeBasis(vector(x1), vector(x2), vector(x3))), p: vector(origin) };
     this.jaws.setContact(this.report.contact(i));
+    this.jaws.contacts.forEach((contact) => (contact.visible = true));
     this.width = this.report.column.width[i];
     this.inside = this.report.column.inside[i] === 1;
     this.glide(to, known && glide);
@@ -301,7 +323,7 @@ export class View {
   ghostMaterials() {
     const unseen = new MeshBasicMaterial({ visible: false });
     const { ghost } = this.materials;
-    return { jaw: unseen, palm: unseen, pad: unseen, contact: unseen, jawEdge: ghost, padEdge: ghost, contactEdge: ghost };
+    return { jawDepth: unseen, jaw: unseen, palm: unseen, pad: unseen, contact: unseen, jawEdge: ghost, padEdge: ghost, contactEdge: ghost };
   }
 
   setOpen(open) {
@@ -313,11 +335,9 @@ export class View {
     cancelAnimationFrame(this.motion);
     const root = this.jaws.root;
     const from = { q: root.quaternion.clone(), p: root.position.clone(), opening: this.opening ?? this.width };
-    const { stroke, outer_pad: outer } = this.report.header.gripper ?? {};
     // From inside, the fingers' outer faces touch, and the jaws let go by closing.
-    const holding = this.inside ? this.width - 2 * (outer ?? 0) : this.width;
-    const free = stroke && (this.inside ? Math.min(stroke[0], holding) : Math.max(stroke[1], holding));
-    const opening = this.open && stroke ? free : holding;
+    const [holding, free] = gaps(this.report, this.grip);
+    const opening = this.open ? free : holding;
     const step = (t) => {
       root.quaternion.slerpQuaternions(from.q, to.q, t);
       root.position.lerpVectors(from.p, to.p, t);
@@ -338,8 +358,51 @@ export class View {
     this.motion = requestAnimationFrame(frame);
   }
 
+  /** The way in and the closing of the jaws, as planned; ends in the grip. */
+  play() {
+    if (this.grip < 0) return;
+    cancelAnimationFrame(this.motion);
+    const { root } = this.jaws;
+    const { x1, origin } = this.report.pose(this.grip);
+    const [holding, free] = gaps(this.report, this.grip);
+    const away = Math.max((1.1 * this.radius) / MM, 0.04);
+    const ease = (t) => t * t * (3 - 2 * t);
+    const step = (t) => {
+      const way = ease(Math.min(t / 0.6, 1)) - 1;
+      root.position.set(...origin).addScaledVector(vector(x1), way * away);
+      this.opening = free + ease(Math.max((t - 0.65) / 0.35, 0)) * (holding - free);
+      this.jaws.place(this.opening, this.inside ? -this.width : this.width);
+      this.jaws.contacts.forEach((contact) => (contact.visible = t >= 1));
+      this.draw();
+    };
+    this.moving = true;
+    const start = performance.now();
+    // Asked for by hand, so it is shown even to those who want little motion, but in four still pictures.
+    const still = window.matchMedia('(prefers-reduced-motion: reduce)').matches;
+    const frame = (now) => {
+      const t = Math.min(1, Math.max(0, (now - start) / PLAY_MS));
+      step(still ? Math.floor(t * 4) / 4 : t);
+      this.moving = t < 1;
+      if (this.moving) this.motion = requestAnimationFrame(frame);
+      else this.setOpen(this.open);
+    };
+    this.motion = requestAnimationFrame(frame);
+  }
+
+  /** Draws at another size [px] and hands the canvas to `take` before all is as it was. */
+  paint(width, height, take) {
+    const ratio = this.renderer.getPixelRatio();
+    this.renderer.setPixelRatio(1);
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.draw();
+    take(this.canvas);
+    this.renderer.setPixelRatio(ratio);
+    this.resize();
+  }
+
   show(what, visible) {
-    if (what === 'gripper') this.jaws.solid.visible = visible;
+    if (what === 'gripper') this.jaws.solid.visible = this.approach.visible = visible;
     if (what === 'dots') this.dots.visible = visible;
     if (what === 'load') this.load.parent[visible ? 'add' : 'remove'](this.load);
     if (what === 'glass' && this.partMesh) {
@@ -372,6 +435,37 @@ export class View {
     this.render();
   }
 
+  /** An arrow along the approach, and the flange frame where the gripper states one. */
+  buildSigns() {
+    const { gripper } = this.report.header;
+    const pad = gripper ? Math.max(...gripper.pad.map((point) => point[0])) : 0;
+    const length = Math.max((0.5 * this.radius) / MM, 2 * pad);
+    this.approach = new Group().add(
+      new Mesh(new CylinderGeometry(0.018, 0.018, 0.7, 12).translate(0, 0.35, 0), this.materials.approach),
+      new Mesh(new ConeGeometry(0.06, 0.3, 20).translate(0, 0.85, 0), this.materials.approach),
+    );
+    this.approach.traverse((object) => (object.renderOrder = 9));
+    this.approach.scale.setScalar(length);
+    this.approach.rotation.z = -Math.PI / 2;
+    this.approach.position.x = -length - 1.2 * pad;
+    this.jaws.root.add(this.approach);
+    if (!gripper?.flange) return;
+    this.flange = new Group();
+    const reach = 0.03;
+    for (const [k, [name, colour]] of [['x', '#d0453b'], ['y', '#3f9b46'], ['z', '#3b7fd9']].entries()) {
+      const material = new MeshBasicMaterial({ color: colour, depthTest: false, transparent: true });
+      const axis = new Mesh(new CylinderGeometry(0.0007, 0.0007, reach, 8).translate(0, reach / 2, 0), material);
+      axis.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), new Vector3().setComponent(k, 1));
+      const letter = new Sprite(new SpriteMaterial({ map: letterTexture(name, colour), sizeAttenuation: false, depthTest: false }));
+      letter.scale.setScalar(0.022 / MM);
+      letter.position.setComponent(k, 1.2 * reach);
+      this.flange.add(axis, letter);
+    }
+    this.flange.traverse((object) => (object.renderOrder = 9));
+    this.flange.applyMatrix4(new Matrix4().fromArray(gripper.flange));
+    this.jaws.solid.add(this.flange);
+  }
+
   /** The ground and the boxes to keep out of, where the run had some. */
   buildFixtures() {
     const { ground, keep_out: boxes } = this.report.header.asked;
@@ -401,7 +495,7 @@ export class View {
   }
 
   /** The whole part from a side on which grip `i`'s jaws are seen: across the closing axis, a little from its palm. */
-  fit(i = this.grip) {
+  fit(i = this.grip, withGripper = i < 0) {
     let towards = new Vector3(1, -1.35, 0.85);
     if (i >= 0 && i < this.report.n) {
       const { x1, x2, x3 } = this.report.pose(i);
@@ -411,7 +505,7 @@ export class View {
     }
     const { min, max } = this.box;
     const corners = [min.x, max.x].flatMap((x) => [min.y, max.y].flatMap((y) => [min.z, max.z].map((z) => new Vector3(x, y, z))));
-    if (i < 0 && this.jaws.root.visible) corners.push(...this.jaws.corners().map((point) => point.multiplyScalar(MM)));
+    if (withGripper && this.jaws.root.visible) corners.push(...this.jaws.corners().map((point) => point.multiplyScalar(MM)));
     this.frame(corners, towards);
   }
 
@@ -434,7 +528,8 @@ export class View {
     const up = out.clone().cross(right);
     const tall = Math.tan((this.camera.fov * Math.PI) / 360);
     // Above lie the buttons; below, as much is left for the note.
-    const free = Math.max(0.5, 1 - (2 * MARGIN) / Math.max(this.host.clientHeight, 1));
+    const bar = this.host.querySelector('#toolbar')?.offsetHeight ?? 0;
+    const free = Math.max(0.5, 1 - (2 * (bar + MARGIN)) / Math.max(this.host.clientHeight, 1));
     const half = [FILL * tall * this.camera.aspect, free * tall];
     // The perspective makes the nearer points larger: the middle is looked for by steps.
     const centre = new Box3().setFromPoints(points).getCenter(new Vector3());
@@ -496,6 +591,8 @@ export class View {
       else if (event.key === '+' || event.key === '=') this.zoom(1 / 1.15);
       else if (event.key === '-') this.zoom(1.15);
       else if (event.key === 'f' || event.key === 'F') this.fit();
+      else if (event.key === 'a' || event.key === 'A') this.fit(this.grip, true);
+      else if (event.key === 'p' || event.key === 'P') this.play();
       else if (event.key === 'g' || event.key === 'G') this.lookAtGrip();
       else return;
       event.preventDefault();

@@ -3,11 +3,12 @@
 // simplified; none.html, no grip; slipping.html, grips that all slip.
 // Exits with 1 and says what failed. CHROMIUM names the browser (default /usr/bin/chromium).
 
-import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { chromium } from 'playwright-core';
+import { friction, pressure } from '../src/colour.js';
 
 const [folder, shots] = process.argv.slice(2).map((path) => resolve(path));
 const [small, large, none, slipping] = ['small', 'large', 'none', 'slipping'].map((name) => join(folder, `${name}.html`));
@@ -439,8 +440,184 @@ async function asking() {
   await what(page, all);
   await comparing(page);
   await loads(page);
+  await gripper(page);
+  await taking(page);
   check('no trouble when asking', page.trouble.length === 0, page.trouble.join('; '));
   await page.close();
+}
+
+/** Extent in the view, -1 to 1 along both axes, of points [mm] that `choose` picks in the page. */
+const extent = (page, choose) => page.evaluate((choose) => {
+  const { view, report } = window.gripfast;
+  const points = new Function('view', 'report', `return ${choose}`)(view, report).map((point) => view.middle.clone().set(...point).project(view.camera));
+  const along = (axis) => [Math.min(...points.map((p) => p[axis])), Math.max(...points.map((p) => p[axis]))];
+  return [...along('x'), ...along('y')];
+}, choose);
+const PART = '[0, 1].flatMap((x) => [0, 1].flatMap((y) => [0, 1].map((z) => [x, y, z].map((k, axis) => (k ? report.header.part.bbox_max : report.header.part.bbox_min)[axis] * 1e3))))';
+const PADS = '(() => { const g = view.grip; const { x1, x2, x3, origin } = report.pose(g); return report.header.gripper.pad.flatMap(([a, b]) => [0.5, -0.5].map((s) => origin.map((o, k) => 1e3 * (o + a * x1[k] + b * x2[k] + s * report.column.width[g] * x3[k])))); })()';
+const GRIPPER = 'view.jaws.corners().map((p) => p.toArray().map((v) => v * 1e3))';
+
+async function gripper(page) {
+  for (const [act, what, points] of [['all', 'part and gripper', `[...${PART}, ...${GRIPPER}]`], ['fit', 'the whole part', PART], ['grip', 'the grip', PADS]]) {
+    await page.click(`[data-act="${act}"]`);
+    await rest(page);
+    const [left, right, low, high] = await extent(page, points);
+    const inside = left > -1 && right < 1 && low > -1 && high < 0.95;
+    check(`${what} fills the view and lies within it`, inside && Math.max((right - left) / 2, (high - low) / 2) > 0.6, [left, right, low, high].map((v) => v.toFixed(2)).join());
+  }
+  await page.click('[data-act="fit"]');
+  const before = await page.evaluate(() => ({ place: window.gripfast.view.jaws.root.position.toArray(), opening: window.gripfast.view.opening }));
+  const seen = await page.evaluate(() => new Promise((done) => {
+    const { view } = window.gripfast;
+    const seen = [];
+    const look = () => seen.push({ place: view.jaws.root.position.toArray(), opening: view.opening });
+    view.listeners.push(look);
+    document.querySelector('[data-act="play"]').click();
+    const wait = () => (view.moving ? requestAnimationFrame(wait) : (view.listeners.splice(view.listeners.indexOf(look), 1), done(seen)));
+    requestAnimationFrame(wait);
+  }));
+  await rest(page);
+  const way = Math.max(...seen.map(({ place }) => Math.hypot(...place.map((v, k) => v - before.place[k]))));
+  const after = await page.evaluate(() => ({ place: window.gripfast.view.jaws.root.position.toArray(), opening: window.gripfast.view.opening }));
+  const asked = await page.evaluate(() => window.gripfast.report.header.asked.opening);
+  check('the approach is played', seen.length > 2 && way > 0.02, `${seen.length} pictures, ${(way * 1e3).toFixed(0)} mm`);
+  const widest = Math.max(...seen.map(({ opening }) => opening));
+  check('with the jaws opened as planned', asked === null ? widest > before.opening : Math.abs(widest - before.opening - 2 * asked) < 1e-6, `${widest - before.opening}, asked for ${asked} per jaw`);
+  check('and ends in the grip', JSON.stringify(after) === JSON.stringify(before), `${JSON.stringify(before)} ${JSON.stringify(after)}`);
+  await page.click('#key summary');
+  const legend = await page.innerText('#key');
+  check('a legend explains the colours', ['disc holds', 'Part', 'Gripper', 'Pads', 'Approach', 'Load', 'Flange'].every((word) => legend.includes(word)), legend);
+  const hexes = await page.evaluate(() => [...document.querySelectorAll('#key .sign.box, #key .sign.line')].map((sign) => getComputedStyle(sign).backgroundColor));
+  check('its colours are those of the view, all different', new Set(hexes).size === hexes.length, hexes.join());
+  check('the flange frame is drawn', await page.evaluate(() => window.gripfast.view.flange.parent !== null && window.gripfast.view.flange.children.length === 6));
+  await legible(page, 'with the legend');
+  await shot(page, 'legend');
+  await page.click('#key summary');
+  // What is drawn per turn is the page's own work: the software renderer's comes on top.
+  const session = await page.context().newCDPSession(page);
+  await session.send('Performance.enable', { timeDomain: 'threadTicks' });
+  const work = async () => (await session.send('Performance.getMetrics')).metrics.find(({ name }) => name === 'TaskDuration').value;
+  const start = await work();
+  await page.evaluate(async () => {
+    for (let i = 0; i < 60; i++) {
+      window.gripfast.view.orbit(0.1, 0);
+      await new Promise((done) => requestAnimationFrame(done));
+    }
+  });
+  const spent = (await work()) - start;
+  check('60 turned pictures take less than 2 s of processor time', spent < 2, `${spent.toFixed(2)} s`);
+}
+
+async function taking(page) {
+  await page.evaluate(() => (document.querySelector('#take').open = true));
+  const take = (name) => page.locator(`[data-take="${name}"]`);
+  const numbers = (text) => text.match(/-?\d+\.?\d*(e-?\d+)?/g).map(Number);
+  const rotated = ([x, y, z, w], v) => {
+    const t = [y * v[2] - z * v[1], z * v[0] - x * v[2], x * v[1] - y * v[0]].map((a) => 2 * a);
+    return [v[0] + w * t[0] + y * t[2] - z * t[1], v[1] + w * t[1] + z * t[0] - x * t[2], v[2] + w * t[2] + x * t[1] - y * t[0]];
+  };
+  const close = (a, b, within) => a.every((v, k) => Math.abs(v - b[k]) < within);
+  const pose = await page.evaluate(() => window.gripfast.report.pose(window.gripfast.state.chosen));
+  for (const [frame, approach, closing] of [['standard', [0, 0, 1], [0, 1, 0]], ['graspgen', [0, 0, 1], [1, 0, 0]], ['graspnet', [1, 0, 0], [0, 1, 0]], ['grip', [1, 0, 0], [0, 0, 1]]]) {
+    await take('frame').selectOption(frame);
+    const [place, turn] = (await take('text').textContent()).split('\n').map((line) => numbers(line.split(': ')[1]));
+    check(`the pose in ${frame} axes is right`, close(place, pose.origin.map((v) => v * 1e3), 1e-3) && close(rotated(turn, approach), pose.x1, 1e-5) && close(rotated(turn, closing), pose.x3, 1e-5), `${place} ${turn}`);
+  }
+  await take('frame').selectOption('flange');
+  await take('origin').selectOption('flange');
+  await take('form').selectOption('matrix');
+  const rows = (await take('text').textContent()).split('\n').map(numbers);
+  const flange = await page.evaluate(() => window.gripfast.report.header.gripper.flange);
+  const expected = pose.origin.map((v, k) => 1e3 * (v + flange[12] * pose.x1[k] + flange[13] * pose.x2[k] + flange[14] * pose.x3[k]));
+  check('the flange pose is right', rows.length === 4 && close(rows.slice(0, 3).map((row) => row[3]), expected, 1e-2), `${rows.map((row) => row[3])} ${expected}`);
+  await take('digits').fill('3');
+  check('digits are those chosen', (await take('text').textContent()).split(/\s+/).every((word) => word.replace(/^-?0?\.?0*|[-.]|e.*$/g, '').length <= 3), await take('text').textContent());
+  await take('form').selectOption('json');
+  check('the JSON pose is JSON', JSON.parse(await take('text').textContent()).position_mm.length === 3);
+  for (const [name, value] of [['frame', 'standard'], ['origin', 'pads'], ['form', 'quaternion']]) await take(name).selectOption(value);
+  await page.focus('#list');
+  await page.keyboard.press('m');
+  await page.click('.row[data-position="3"]');
+  await page.click('#mark');
+  check('marked grips have a star', (await page.locator('.row .rank').allTextContents()).filter((text) => text.includes('\u2605')).length === 2);
+  await take('which').selectOption('marked');
+  const text = (kind) => page.evaluate((kind) => window.gripfast.take.text(kind), kind);
+  const ids = await page.evaluate(() => window.gripfast.take.indices().map((i) => window.gripfast.report.column.id[i]));
+  check('the JSON file has the marked grips', JSON.parse(await text('json')).grips.map((grip) => grip.id).join() === ids.join() && ids.length === 2);
+  const yaml = await text('isaac');
+  check('the isaac_grasp file has them too', /^format: isaac_grasp\nformat_version: 1.0\n/.test(yaml) && ids.every((id) => yaml.includes(`  "grasp_${id}":`)) && yaml.split('    orientation: {').length === 3);
+  await take('which').selectOption('listed');
+  if (existsSync(join(folder, 'small.csv'))) {
+    // The page's table is that of `gripfast export`, to the digits that a page carries.
+    const cells = (line) => line.match(/("([^"]|"")*"|[^,]*)(,|$)/g).map((cell) => cell.replace(/,$/, ''));
+    const [mine, theirs] = [await text('csv'), readFileSync(join(folder, 'small.csv'), 'utf8')].map((file) => file.trim().split(/\r?\n/).map(cells));
+    check('the CSV file has the columns of the program', mine[0].join() === theirs[0].join() && mine.length === theirs.length, mine[0].join());
+    const residual = theirs[0].indexOf('residual');
+    const far = theirs.slice(1).flatMap((row, r) => row.flatMap((cell, k) => {
+      const own = mine[r + 1][k];
+      const same = cell === own || k === residual || (cell !== '' && own !== '' && Math.abs(Number(cell) - Number(own)) <= 1e-6 * Math.max(Math.abs(Number(cell)), 1e-2));
+      return same ? [] : [`${theirs[0][k]} ${cell} ${own}`];
+    }));
+    check('and its values', far.length === 0, far.slice(0, 4).join('; '));
+  }
+  const fetched = async (kind) => {
+    const [download] = await Promise.all([page.waitForEvent('download'), page.click(`[data-file="${kind}"]`)]);
+    return [download.suggestedFilename(), readFileSync(await download.path())];
+  };
+  const [name, png] = await fetched('png');
+  check('a picture is saved', name.endsWith('.png') && png.readUInt32BE(16) === 1920 && png.readUInt32BE(20) === 1080 && png.length > 20_000, `${name}, ${png.length} bytes`);
+  const [, svg] = await fetched('svg');
+  const drawn = await page.evaluate((text) => {
+    const tree = new DOMParser().parseFromString(text, 'image/svg+xml');
+    return [tree.querySelectorAll('parsererror').length, tree.querySelectorAll('path').length, tree.querySelectorAll('linearGradient').length];
+  }, svg.toString('utf8'));
+  check('the pads are saved as a drawing', drawn[0] === 0 && drawn[1] > 6, drawn.join());
+  await legible(page, 'when taking along');
+  await shot(page, 'take');
+  const { chosen, camera } = await state(page);
+  await page.emulateMedia({ media: 'print' });
+  await page.evaluate(() => window.dispatchEvent(new Event('beforeprint')));
+  const pages = await page.evaluate(() => [...document.querySelectorAll('#print article')].map((article) => {
+    const style = getComputedStyle(article);
+    return { after: style.breakAfter, tall: article.getBoundingClientRect().height, image: article.querySelector('img').naturalWidth, text: article.innerText.slice(0, 40) };
+  }));
+  check('a print has one page per marked grip', pages.length === 2 && pages[0].after === 'page' && pages.every(({ tall, image }) => tall > 300 && image === 1200), JSON.stringify(pages));
+  check('and nothing else', !(await page.isVisible('main')) && !(await page.isVisible('header')));
+  await page.evaluate(() => [...document.querySelectorAll('#print img')].at(-1).decode());
+  if (shots) await page.screenshot({ path: join(shots, 'print.png'), fullPage: true });
+  await page.emulateMedia({ media: 'screen' });
+  await rest(page);
+  const after = await state(page);
+  check('the chosen grip and the view stay', after.chosen === chosen && !moved(camera, after.camera) && (await page.evaluate(() => window.gripfast.view.load.visible)));
+}
+
+/** Colours as they look without the red, green or blue cones (Machado, Oliveira and Fernandes 2009, severity 1). */
+const BLINDNESS = {
+  protanopia: [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+  deuteranopia: [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.01182, 0.04294, 0.968881]],
+  tritanopia: [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.3039]],
+};
+
+function scales() {
+  const linear = (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+  const lab = (rgb) => {
+    const [r, g, b] = rgb;
+    const f = (t) => (t > 216 / 24389 ? Math.cbrt(t) : (t * 24389 / 27 + 16) / 116);
+    const [x, y, z] = [(0.4124 * r + 0.3576 * g + 0.1805 * b) / 0.9505, 0.2126 * r + 0.7152 * g + 0.0722 * b, (0.0193 * r + 0.1192 * g + 0.9505 * b) / 1.089].map(f);
+    return [116 * y - 16, 500 * (x - y), 200 * (y - z)];
+  };
+  for (const [name, scale] of [['friction', friction], ['pressure', pressure]]) {
+    for (const [kind, matrix] of Object.entries(BLINDNESS)) {
+      const seen = Array.from({ length: 13 }, (_, k) => scale(k / 12).map((v) => linear(v / 255))).map((rgb) => lab(matrix.map((row) => Math.min(1, Math.max(0, row.reduce((sum, m, k) => sum + m * rgb[k], 0))))));
+      let least = [Infinity];
+      // Values a quarter of the scale apart must not look alike.
+      seen.forEach((a, i) => seen.slice(i + 3).forEach((b, j) => {
+        const distance = Math.hypot(...a.map((v, k) => v - b[k]));
+        if (distance < least[0]) least = [distance, i / 12, (i + 3 + j) / 12];
+      }));
+      check(`the ${name} scale is read with ${kind}`, least[0] > 10, `${least[0].toFixed(1)} between ${least[1].toFixed(2)} and ${least[2].toFixed(2)}`);
+    }
+  }
 }
 
 async function linkAndTheme() {
@@ -532,6 +709,7 @@ async function tenThousand() {
 }
 
 try {
+  scales();
   await wholePage();
   await asking();
   await linkAndTheme();
