@@ -1,7 +1,7 @@
 // What was proposed and why the others fell, the part, the gripper, settings and provenance.
 
 import { chosen, count, mass, mm, number, percent } from './format.js';
-import { reasons } from './why.js';
+import { reasonBars, reasons } from './why.js';
 
 export const node = (name, text, attributes = {}) => {
   const made = document.createElement(name);
@@ -52,8 +52,8 @@ const size = (low, high) => high.map((v, k) => number((v - low[k]) * 1e3)).join(
 
 /** Sentences about what the page does not show in full. */
 export function limits(report) {
-  const { display, grips, gripper, gripper_problem: problem, by_load: byLoad, loads } = report.header;
-  const notes = [];
+  const { display, grips, gripper, gripper_problem: problem, by_load: byLoad, loads, provenance } = report.header;
+  const notes = (provenance.warnings ?? []).map((text) => `Warning: ${text}`);
   if (!display) notes.push('The part\u2019s mesh was not given: its bounding box is drawn.');
   else if (display.shown < display.triangles) {
     notes.push(`Part simplified for display: ${count(display.shown)} of ${count(display.triangles)} triangles, ${display.deviation < 1e-6 ? 'less than 0.001\u00a0mm' : `at most about ${mm(display.deviation, 2)}`} off. Scores come from the full part.`);
@@ -68,10 +68,11 @@ export function drawRun(root, report) {
   const { header } = report;
   const { summary, part, gripper, provenance, display } = header;
   const rejections = reasons(report);
-  const fallen = rejections.reduce((sum, entry) => sum + entry.n, 0);
+  const fallen = rejections.reduce((sum, entry) => sum + (entry.pairs ? 0 : entry.n), 0);
   const funnel = bars([['Candidates', summary.candidates], ['Rejected', fallen, 'bad'], ['Ranked', summary.ranked, 'good']], summary.candidates, 'From candidates to ranked grips');
   root.append(section('From candidates to grips', node('p', `${count(summary.pairs)} pair${summary.pairs === 1 ? '' : 's'} of opposite faces within the stroke.`, { class: 'quiet' }), funnel));
-  root.append(section('Why candidates were rejected', rejections.length ? bars(rejections.map(({ title, n }) => [title, n, 'bad']), fallen, 'Rejections by reason') : node('p', 'None was rejected.', { class: 'quiet' })));
+  root.append(section('Why candidates were rejected', ...(rejections.length ? reasonBars(rejections) : [node('p', 'None was rejected.', { class: 'quiet' })])));
+  if (provenance.warnings?.length) root.append(section('Warnings', ...provenance.warnings.map((text) => node('p', text))));
   const com = part.mass.centre_of_mass.map((v) => number(v * 1e3)).join(', ');
   root.append(
     section('Part', facts([
@@ -90,7 +91,7 @@ export function drawRun(root, report) {
       ])),
     );
   }
-  root.append(section('Settings', node('p', 'In SI units.', { class: 'quiet' }), facts(Object.entries(provenance.settings).map(([name, value]) => [name, plain(value)]), 'facts settings')));
+  root.append(section('Settings', node('p', 'As asked for, and what was used where nothing was.', { class: 'quiet' }), facts(Object.entries(provenance.settings).map(([name, value]) => [name, plain(value)]), 'facts settings')));
   root.append(section('Provenance', facts([['gripfast', provenance.gripfast], ['Backend', provenance.backend], ['Loads', count(header.loads.length)]]), node('pre', provenance.command.join(' '), { tabindex: '0', 'aria-label': 'Command line' })));
   const notes = limits(report);
   notes.push('Keys: arrows, Page Up and Page Down, Home and End choose in the list; / goes to the search; M marks the chosen grip; in the view arrows turn, shift with arrows moves, plus and minus zoom, F shows the whole part, A the gripper too, G the grip, P plays its approach; on the load ball arrows go from load to load. A click on a dot chooses its grip.');

@@ -42,6 +42,8 @@ export function reason(name, report) {
     approach_outside_cone: () => ['Approach outside the cone', 'The approach is not among the directions asked for.',
       asked.approach_cone ? `A wider cone: --approach allows ${degrees(asked.approach_cone.half_angle_rad)} about (${asked.approach_cone.axis.map((v) => number(v)).join(', ')}).` : 'A wider cone (--approach).'],
     too_far_from_centre_of_mass: () => ['Too far from the centre of mass', '', `A larger --max-offset${asked.max_offset ? ` than ${mm(asked.max_offset)}` : ''}.`],
+    face_pair_opening_too_small: () => ['No room to open', 'At these widths the stroke does not leave the jaws the least opening asked for.', 'A smaller --min-opening, or a gripper that opens wider.'],
+    pad_share_too_small: () => ['Too little of the pad touches', '', 'A smaller --min-pad-share, or smaller pads.'],
     contact_too_small: () => ['Contact too small', 'A pad would touch too little of its face.',
       `A smaller share (--min-contact${asked.min_contact ? `, now ${percent(asked.min_contact)}` : ''}), or a finer grid (--spacing${asked.spacing ? `, now ${mm(asked.spacing)}` : ''}).`],
     ground: () => [`${body} below the ground`, 'Drawn in the view: the ground that the gripper must stay above.',
@@ -62,7 +64,19 @@ export function reason(name, report) {
 }
 
 /** Reasons with their counts, most first. */
-export const reasons = (report) => Object.entries(report.header.summary.rejections).sort((a, b) => b[1] - a[1]).map(([name, n]) => ({ name, n, ...reason(name, report) }));
+export const reasons = (report) => Object.entries(report.header.summary.rejections).sort((a, b) => b[1] - a[1]).map(([name, n]) => ({ name, n, pairs: name.startsWith('face_pair'), ...reason(name, report) }));
+
+/** The reasons as bars: those that count candidates, and those that count pairs of faces, which no candidate came of. */
+export function reasonBars(list) {
+  const tables = [[false, 'Candidates by the reason for which they fell'], [true, 'Pairs of faces by the reason for which they were left out']].map(([pairs, label]) => {
+    const own = list.filter((entry) => entry.pairs === pairs);
+    const total = own.reduce((sum, entry) => sum + entry.n, 0);
+    if (own.length === 0) return [];
+    const table = bars(own.map((entry) => [entry.title, entry.n, 'bad']), total, label);
+    return pairs ? [node('p', 'Pairs of faces that were left out:', { class: 'quiet' }), table] : [table];
+  });
+  return tables.flat();
+}
 
 /** Whether there is something to explain: no grip at all, or none that holds. */
 export function nothingHolds(report) {
@@ -94,7 +108,7 @@ export function drawWhy(root, report) {
   if (!nothingHolds(report)) return null;
   const { summary, gripper } = report.header;
   const list = reasons(report);
-  const fallen = list.reduce((sum, entry) => sum + entry.n, 0);
+  const fallen = list.reduce((sum, entry) => sum + (entry.pairs ? 0 : entry.n), 0);
   const advice = new Set(list.map((entry) => entry.help).filter(Boolean));
   let [title, lead] = ['No grip holds this part', ''];
   if (report.n > 0) {
@@ -112,7 +126,7 @@ export function drawWhy(root, report) {
   }
   root.replaceChildren(node('h2', title, { class: 'why-title' }), told('p', lead));
   if (list.length) {
-    root.append(bars(list.map((entry) => [entry.title, entry.n, 'bad']), fallen, 'Candidates by the reason for which they fell'));
+    root.append(...reasonBars(list));
     const meanings = node('dl', undefined, { class: 'meanings' });
     for (const entry of list.filter((entry) => entry.meaning)) meanings.append(node('dt', entry.title), told('dd', entry.meaning));
     if (meanings.children.length) root.append(meanings);
