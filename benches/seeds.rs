@@ -53,7 +53,7 @@ fn places() -> Vec<Place> {
         most: usize::MAX,
     }];
     match select(Choice::Gpu, None) {
-        Ok(Selection { backend, reason }) => {
+        Ok(Selection { backend, reason, .. }) => {
             eprintln!("{reason}");
             // Criterion makes folders of names.
             let name = backend.name().replace('/', " ");

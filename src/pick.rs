@@ -49,6 +49,7 @@ pub enum Reason {
 
 /// The outcome of a pick.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Pick {
     /// Index into the list of the first free grip.
     pub chosen: Option<usize>,

@@ -66,6 +66,7 @@ pub struct Options {
 
 /// The ordered grips and what became of the others.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Ranking {
     /// Best first. `rank` is the place among all grips that were ranked, so a choice by `top` and
     /// `diverse` has gaps.

@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::error::{Error, Result};
-use crate::units::{Acceleration, Angle, Density, Force, Length, Mass, Time, Unit};
+use crate::units::{Acceleration, Angle, Density, Force, Length, Mass, Memory, Time, Unit};
 
 pub use text::{Cone, EarlierWeights, Ground, PoseError, Region};
 pub use words::{Choice, Polish, Refiner, Separation, Side};
@@ -42,6 +42,12 @@ pub struct Request {
     /// Unit of the part file's numbers; absent: the file's own, else millimetres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Unit>,
+    /// Most memory that reading the part may take; absent: see
+    /// [`crate::memory::default_limit`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_memory: Option<Memory>,
+    /// Whether a glTF file may name buffers outside of its own folder.
+    pub outside_buffers: bool,
     /// Gripper of the catalogue, or a gripper file.
     pub gripper: String,
     /// Mass of the part.
@@ -209,6 +215,8 @@ impl Default for Request {
         Self {
             part: PathBuf::new(),
             unit: None,
+            max_memory: None,
+            outside_buffers: false,
             gripper: String::new(),
             mass: None,
             density: None,
@@ -376,6 +384,16 @@ impl Request {
         if self.mass.is_some() && self.density.is_some() {
             return Err(Error::input("mass", "is given beside a density", "give one of them")
                 .with_options(&["mass", "density"]));
+        }
+        if let Some(memory) = self.max_memory
+            && (memory.0.is_nan() || memory.0 <= 0.0)
+        {
+            return Err(Error::input(
+                "max_memory",
+                format!("is {memory}"),
+                "give a size above zero",
+            )
+            .with_options(&["max_memory"]));
         }
         if self.scoring.threads == Some(0) {
             return Err(Error::input("threads", "is 0", "give one or more, or none for all cores")

@@ -163,7 +163,8 @@ impl Quantity {
 
     /// The shortest text in SI or in `handy` units that [`Self::parse`] reads back bit for bit.
     fn write(self, si: f64, handy: &str) -> String {
-        let plain = format!("{si}{}", self.units()[0].0);
+        let unit = self.units().iter().find(|known| known.1 == 1.0).map_or("", |known| known.0);
+        let plain = format!("{si}{unit}");
         let Some((unit, factor)) = self.units().iter().find(|known| known.0 == handy) else {
             return plain;
         };
@@ -246,6 +247,8 @@ quantities! {
     Density, "kg/m3";
     /// A time [s]; `30s` as a text.
     Time, "s";
+    /// A size in memory [bytes]; `2GB` as a text.
+    Memory, "GB";
 }
 
 /// Unit of the numbers in a mesh file.
@@ -422,6 +425,7 @@ mod tests {
         kept::<Acceleration>(&["2g", "1m/s2"]);
         kept::<Density>(&["2700kg/m3"]);
         kept::<Time>(&["30s"]);
+        kept::<Memory>(&["2GB", "500B", "0.5GB"]);
         let mut state = 1_u64;
         for _ in 0..20_000 {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);

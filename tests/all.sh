@@ -62,3 +62,6 @@ else
     echo "SKIPPED: STEP files: install libocct-data-exchange-dev, libocct-modeling-algorithms-dev and g++ (cargo test --workspace --features step)"
 fi
 cargo test --workspace --features "$features" --no-fail-fast
+for example in plan_a_part own_contacts own_loads own_gripper; do
+    cargo run --quiet -p gripfast --features "$features" --example "$example" >/dev/null
+done

@@ -6,6 +6,7 @@ use crate::request::Choice;
 
 /// A backend and the reason for it, for people.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Selection {
     /// Ready to use.
     pub backend: Backend,

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 /// Findings and repairs, in the order in which they are made.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Health {
     /// Triangles in the file.
     pub triangles_read: usize,

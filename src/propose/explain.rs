@@ -16,6 +16,7 @@ use crate::part::PairKind;
 
 /// A stretch of two facing planes as users see it.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct SiteInfo {
     /// Number of the site: its place in [`Proposer::sites`].
     pub site: usize,
@@ -43,6 +44,7 @@ pub struct SiteInfo {
 
 /// One test of a pose.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Check {
     /// What was tested.
     pub name: String,
@@ -54,6 +56,7 @@ pub struct Check {
 
 /// The full verdict on a pose.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Explanation {
     /// The site it belongs to.
     pub site: usize,

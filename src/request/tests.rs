@@ -8,6 +8,8 @@ fn full() -> Request {
     let text = r#"
 part = "a/b c.stl"
 unit = "in"
+max_memory = "2GB"
+outside_buffers = true
 gripper = "my.toml"
 density = "2.7 g/cm3"
 force = "18lbf"
@@ -129,6 +131,7 @@ fn values_out_of_their_range_are_refused_by_field() {
         ("position_error", &|r| r.scoring.position_error = Length(-1e-3)),
         ("closing_friction", &|r| r.scoring.closing_friction = -0.1),
         ("pad_friction", &|r| r.scoring.pad_friction = Some(f64::NAN)),
+        ("max_memory", &|r| r.max_memory = Some(Memory(0.0))),
         ("threads", &|r| r.scoring.threads = Some(0)),
         ("polish", &|r| (r.scoring.polish, r.scoring.k1) = (Polish::Top, -1.0)),
         ("mass", &|r| (r.mass, r.density) = (Some(Mass(1.0)), Some(Density(1.0)))),

@@ -8,6 +8,7 @@ mod load_cases;
 mod load_files;
 mod pick_rank;
 mod pick_scene;
+mod plan_library;
 mod report_browser;
 #[path = "../support/mod.rs"]
 mod support;
