@@ -19,7 +19,7 @@ if sys.argv[1].endswith(".jsonl"):
 else:
     head = json.loads(text, parse_constant=refuse)
     rows = head["grips"]
-assert (head["format"], head["version"]) == ("gripfast-grips", 1)
+assert (head["format"], head["version"]) == ("gripfast-grips", 2)
 grips = []
 for row in rows:
     # The nine numbers are the columns one after the other.

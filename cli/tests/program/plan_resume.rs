@@ -71,7 +71,7 @@ fn started(file: &Path) -> Child {
 /// The bytes of a result from its part on: all but the provenance.
 fn answer(file: &Path) -> String {
     let text = std::fs::read_to_string(file).unwrap();
-    text[text.find("\"part\":").unwrap()..].to_owned()
+    text[text.find("\n\"part\":").unwrap()..].to_owned()
 }
 
 fn candidates_before(stderr: &str) -> u64 {

@@ -85,7 +85,7 @@ fn why_explains_the_options_that_ran() {
     strict.provenance.request.candidates.min_pad_share = 1.0;
     strict.write(&at.join("strict.json")).unwrap();
     let told = text(&gripfast(at, "why strict.json", &[&id]).stdout);
-    assert!(told.contains("contact too small") && told.contains("FAIL"), "{told}");
+    assert!(told.contains("pad share too small") && told.contains("FAIL"), "{told}");
 }
 
 #[test]
