@@ -74,9 +74,11 @@ pub use glam;
 pub mod backend;
 pub mod case;
 pub(crate) mod clash;
+#[doc(hidden)] // the integrals: tests and benches look at them
 pub mod contact;
 pub mod error;
 pub mod export;
+#[doc(hidden)] // for the program
 pub mod file;
 pub mod geometry;
 pub mod gripper;
@@ -94,5 +96,6 @@ pub mod report;
 pub mod request;
 pub mod results;
 pub(crate) mod svg;
+#[doc(hidden)] // for the program
 pub mod text;
 pub mod units;

@@ -17,6 +17,7 @@ mod cpu;
 mod fan;
 #[cfg(feature = "gpu")]
 mod gpu;
+#[doc(hidden)]
 pub mod layout;
 mod prepare;
 mod score;

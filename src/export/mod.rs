@@ -272,10 +272,10 @@ pub fn write(
     crate::file::write(path, |writer| write_view(&view, format, writer, part))
 }
 
-/// Writes `set` to a writer; see [`write`].
+/// Writes `set` to a writer; see [`write()`].
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_to(
     set: &GripSet,
     format: Format,

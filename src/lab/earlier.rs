@@ -66,14 +66,14 @@ impl Centroid {
 }
 
 /// The earlier method's answer to one case in the form of all others; arguments as
-/// [`super::solve`].
+/// [`crate::mechanics::solve`].
 ///
 /// The residual is that of all seven equations, of which the method looks at the moment about the
 /// slip centre and the gripping force only: how far it is from zero tells how little the answer may
 /// be worth. There are no bounds.
 ///
 /// # Errors
-/// As [`super::solve`].
+/// As [`crate::mechanics::solve`].
 pub fn solve(contact: &Contact, distance: f64, force: f64, load: &Wrench) -> Result<Score> {
     crate::mechanics::check(contact, distance, force, load)?;
     let (Some(grip), Some(pads)) = (centroid(contact), Pads::new(contact)) else {

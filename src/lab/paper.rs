@@ -118,10 +118,10 @@ pub struct Report {
     pub score: Score,
 }
 
-/// The paper's method on one case; arguments as [`super::solve`].
+/// The paper's method on one case; arguments as [`crate::mechanics::solve`].
 ///
 /// # Errors
-/// As [`super::solve`]: numbers that are not finite, a force that is not positive.
+/// As [`crate::mechanics::solve`]: numbers that are not finite, a force that is not positive.
 pub fn solve(
     contact: &Contact,
     distance: f64,

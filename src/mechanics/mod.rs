@@ -2,12 +2,17 @@
 //!
 //! [`solve`] answers one case; [`Pads`] keeps what a contact determines for many loads.
 
+#[doc(hidden)]
 pub mod equilibrium;
 pub mod inverse;
 pub mod pads;
+#[doc(hidden)]
 pub mod pressure;
+#[doc(hidden)]
 pub mod shanno;
+#[doc(hidden)]
 pub mod slip;
+#[doc(hidden)]
 pub mod states;
 pub mod twist_out;
 

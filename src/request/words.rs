@@ -104,7 +104,7 @@ words! {
         /// Damped Newton with the analytic Hessian or Jacobian.
         #[default]
         Newton = "newton",
-        /// Shanno's conjugate-direction method (the paper's reference [17]), in variables scaled by
+        /// Shanno's conjugate-direction method (the paper's reference 17), in variables scaled by
         /// the Hessian or Jacobian at the start.
         Shanno = "shanno",
     }
