@@ -10,9 +10,9 @@ use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DVec2, DVec3};
-use gripfast::contact::Loops;
+use gripfast::contact::{Field, Loops};
 use gripfast::lab::{earlier, paper};
-use gripfast::mechanics::slip::{self, Field};
+use gripfast::mechanics::slip;
 use gripfast::mechanics::{Options, Pads, Refiner, solve, solve_pads};
 use gripfast::model::{Contact, Patch, Polygon, Score, Status, Wrench};
 use nalgebra::Vector3;
@@ -71,7 +71,7 @@ fn slip_problems(count: usize) -> Vec<(Loops, [f64; 3], Vector3<f64>)> {
 fn slips(criterion: &mut Criterion) {
     let problems = slip_problems(256);
     let solve = |(area, p, w): &(Loops, [f64; 3], Vector3<f64>), refiner| {
-        slip::solve(&[Field { area, p: *p }], *w, None, refiner)
+        slip::solve(&[Field { area, p: *p }], (*w).into(), None, refiner)
     };
     let mut group = criterion.benchmark_group("slip, 8 edges");
     group

@@ -121,15 +121,6 @@ fn coupled_share(header: ContactHeader, load: LoadRecord, p: Planes, upper: f32)
     if load.distance >= OUT_OF_RANGE || header.resolved == 0u || !p.full || mu * mu * load.distance * load.distance > 0.5 * (header.area_i + header.area_ii) {
         return -1.0;
     }
-    let q = header.variation_first;
-    let r = header.variation_second;
-    let z1 = p.at_i;
-    let z2 = p.at_ii;
-    let z3 = p.slope.x;
-    let z4 = p.slope.y;
-    let square = q.x * z1 * z1 + q.y * z2 * z2 + q.w * z3 * z3 + header.variation_slope.y * z4 * z4;
-    let mixed = z1 * (q.z * z2 + r.x * z3 + r.y * z4) + z2 * (r.z * z3 + r.w * z4) + header.variation_slope.x * z3 * z4;
-    let variation = sqrt(max(square + 2.0 * mixed, 0.0)) + LEAST_VARIATION;
     var far = 0.0;
     var pressure = 1.0;
     for (var i = header.edges_i; i < header.edges_end; i++) {
@@ -147,6 +138,15 @@ fn coupled_share(header: ContactHeader, load: LoadRecord, p: Planes, upper: f32)
             pressure = here * here;
         }
     }
+    let q = header.variation_first;
+    let r = header.variation_second;
+    let z1 = p.at_i;
+    let z2 = p.at_ii;
+    let z3 = p.slope.x;
+    let z4 = p.slope.y;
+    let square = q.x * z1 * z1 + q.y * z2 * z2 + q.w * z3 * z3 + header.variation_slope.y * z4 * z4;
+    let mixed = z1 * (q.z * z2 + r.x * z3 + r.y * z4) + z2 * (r.z * z3 + r.w * z4) + header.variation_slope.x * z3 * z4;
+    let variation = sqrt(max(square + 2.0 * mixed, 0.0)) + LEAST_VARIATION;
     let reach = 0.5 * header.softness * abs(load.distance) * mu;
     let c = 1.0 - reach * header.spread;
     let b = reach * variation * sqrt(far / pressure);
@@ -157,9 +157,17 @@ fn coupled_share(header: ContactHeader, load: LoadRecord, p: Planes, upper: f32)
     return select(-1.0, share, share <= COUPLED_SHARE);
 }
 
+// What the ring round the best twist says of one load.
+struct Corner {
+    twist: vec3<f32>,
+    upper: f32,
+    // Integrals over face I of v/|v|, x1 v/|v|, x2 v/|v| at that twist.
+    g: array<vec2<f32>, 3>,
+}
+
 // Bound and interpolated twist from the triangles round the best twist. In each triangle w = a ga + b gb + c gc by
 // Cramer's rule; two of its numerators are products with ga x w.
-fn finish(header: ContactHeader, load: LoadRecord, p: Planes, best: u32, value: f32) -> SeedRecord {
+fn corner(header: ContactHeader, load: LoadRecord, p: Planes, best: u32) -> Corner {
     let own = twists[best].xyz;
     let sense = select(1.0, -1.0, dot(load.wrench, own) < 0.0);
     let w = sense * load.wrench;
@@ -198,19 +206,25 @@ fn finish(header: ContactHeader, load: LoadRecord, p: Planes, best: u32, value: 
     } else {
         twist = sense * own;
     }
+    var g: array<vec2<f32>, 3>;
+    for (var weight = 0u; weight < 3u && header.faces == 1u; weight++) {
+        g[weight] = share.x * gradient(header, 0u, weight, triangle.x).xy
+            + share.y * gradient(header, 0u, weight, triangle.y).xy
+            + share.z * gradient(header, 0u, weight, triangle.z).xy;
+    }
+    return Corner(twist, upper, g);
+}
+
+fn finish(header: ContactHeader, load: LoadRecord, p: Planes, best: u32, value: f32) -> SeedRecord {
+    let found = corner(header, load, p, best);
+    var upper = found.upper;
+    var lower = value;
     var status = UNBOUNDED;
     if header.faces == 1u && upper < LARGEST {
-        var g: array<vec2<f32>, 3>;
-        for (var weight = 0u; weight < 3u; weight++) {
-            g[weight] = share.x * gradient(header, 0u, weight, triangle.x).xy
-                + share.y * gradient(header, 0u, weight, triangle.y).xy
-                + share.z * gradient(header, 0u, weight, triangle.z).xy;
-        }
-        if full_contact(header, load, load.scale * upper, g[0], g[1], g[2]) {
+        if full_contact(header, load, load.scale * upper, found.g[0], found.g[1], found.g[2]) {
             status = BOUNDED;
         }
     }
-    var lower = value;
     if header.faces == 2u && upper < LARGEST {
         let coupled = coupled_share(header, load, p, upper);
         if coupled >= 0.0 {
@@ -219,7 +233,7 @@ fn finish(header: ContactHeader, load: LoadRecord, p: Planes, best: u32, value: 
             upper = upper / (1.0 - coupled);
         }
     }
-    return SeedRecord(twist, lower, upper, status, best, 0u);
+    return SeedRecord(found.twist, lower, upper, status, best, 0u);
 }
 
 @compute @workgroup_size(GROUP)

@@ -3,9 +3,10 @@
 
 use rayon::prelude::*;
 
+use super::lanes::LANES;
 use super::layout::{GroupRecord, LoadRecord, SeedRecord};
 use super::prepare::Chunk;
-use super::search::{Field, LANES};
+use super::search::Field;
 use super::seeds::SeedSet;
 use super::table::Table;
 
@@ -108,7 +109,7 @@ mod tests {
             });
             let problem =
                 Problem { contact: &contact, distance: 0.02, force: 40.0, wrenches: &wrenches };
-            let prepared = Prepared::new(&contact, "test").unwrap().unwrap();
+            let prepared = Prepared::new(&contact).records.unwrap();
             let loads: Vec<LoadRecord> =
                 wrenches.iter().map(|wrench| prepared.load(&problem, wrench).unwrap().0).collect();
             let (i, ii) = prepared.edges.split_at(prepared.header.edges_ii as usize);

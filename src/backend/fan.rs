@@ -6,7 +6,7 @@
 //! the gradient of the dissipation; pressure times these times the twist is the dissipation itself
 //! (it is homogeneous of degree one).
 
-use super::layout::{EdgeRecord, GAUSS, NEAR_LIMIT, ON_LINE, SERIES_LIMIT};
+use super::layout::{BASIS, ContactHeader, EdgeRecord, GAUSS, NEAR_LIMIT, ON_LINE, SERIES_LIMIT};
 
 /// Integrals of weights `1, x1, x2` by components `g1, g2, torque`.
 pub(crate) type Basis = [f32; 9];
@@ -129,9 +129,58 @@ pub(crate) fn basis_far<const LANES: usize>(
     total
 }
 
-/// Whether the closed forms serve a face whose vertices lie within `radius` of the origin.
-pub(crate) fn is_near(radius: f32, v: [f32; 3]) -> bool {
-    v[0] * v[0] + v[1] * v[1] <= NEAR_LIMIT * NEAR_LIMIT * radius * radius * v[2] * v[2]
+/// The basis at some twists side by side, each by the form that serves it.
+#[inline(always)]
+pub(crate) fn basis<const LANES: usize>(
+    edges: &[EdgeRecord],
+    radius: f32,
+    v: &[[f32; LANES]; 3],
+) -> [[f32; LANES]; 9] {
+    let near: [bool; LANES] = std::array::from_fn(|lane| {
+        let across = v[0][lane] * v[0][lane] + v[1][lane] * v[1][lane];
+        across <= NEAR_LIMIT * NEAR_LIMIT * radius * radius * v[2][lane] * v[2][lane]
+    });
+    let mut all = [[0.0; LANES]; 9];
+    if near != [true; LANES] {
+        all = basis_far(edges, v);
+    }
+    for lane in 0..LANES {
+        if near[lane] {
+            let found = basis_near(edges, [v[0][lane], v[1][lane], v[2][lane]]);
+            for m in 0..9 {
+                all[m][lane] = found[m];
+            }
+        }
+    }
+    all
+}
+
+/// Twists whose basis is computed side by side.
+const LANES: usize = 8;
+
+/// The gradient basis of one contact at every twist: `[face][twist][weight]`, and in each the
+/// components `g1, g2, torque` and their product with the twist.
+#[inline(always)]
+pub(crate) fn fill_basis(
+    header: &ContactHeader,
+    edges: [&[EdgeRecord]; 2],
+    twists: &[[f32; 4]],
+) -> Vec<[f32; 4]> {
+    let mut out = Vec::with_capacity(header.faces as usize * twists.len() * BASIS);
+    for edges in &edges[..header.faces as usize] {
+        for some in twists.chunks(LANES) {
+            let v =
+                [0, 1, 2].map(|m| std::array::from_fn(|lane| some[lane.min(some.len() - 1)][m]));
+            let g = basis::<LANES>(edges, header.radius, &v);
+            for (lane, v) in some.iter().enumerate() {
+                for weight in 0..BASIS {
+                    let [g1, g2, torque] = [0, 1, 2].map(|m| g[3 * weight + m][lane]);
+                    out.push([g1, g2, torque, v[0] * g1 + v[1] * g2 + v[2] * torque]);
+                }
+            }
+        }
+    }
+    out
 }
 
 #[cfg(test)]
@@ -139,7 +188,7 @@ mod tests {
     use super::*;
     use crate::backend::SeedSet;
     use crate::backend::prepare::Prepared;
-    use crate::contact::{Loops, friction};
+    use crate::contact::{Field, Loops, friction};
     use crate::model::{Contact, Patch, Polygon};
     use glam::DVec2;
 
@@ -151,8 +200,8 @@ mod tests {
         basis_far(edges, &v.map(|x| [x])).map(|[x]| x)
     }
 
-    fn basis(edges: &[EdgeRecord], radius: f32, v: [f32; 3]) -> Basis {
-        if is_near(radius, v) { basis_near(edges, v) } else { far(edges, v) }
+    fn either(edges: &[EdgeRecord], radius: f32, v: [f32; 3]) -> Basis {
+        basis(edges, radius, &v.map(|x| [x])).map(|[x]| x)
     }
 
     /// A scaled contact face in both precisions.
@@ -188,7 +237,7 @@ mod tests {
             .map(|(name, outer, holes)| {
                 let patch: Patch = vec![Polygon { outer, holes }];
                 let contact = Contact { face_i: patch.clone(), face_ii: patch.clone() };
-                let prepared = Prepared::new(&contact, name).unwrap().unwrap();
+                let prepared = Prepared::new(&contact).records.unwrap();
                 assert_eq!(prepared.header.faces, 1, "{name}");
                 let exact =
                     Loops::mapped(&patch, |point| (point - prepared.origin) / prepared.unit);
@@ -206,7 +255,7 @@ mod tests {
     /// Errors over the area: of the dissipation (relative), of the weight 1, of the weights x.
     fn errors(face: &Face, found: &Basis, v: [f32; 3]) -> [f64; 3] {
         let v = v.map(f64::from);
-        let exact = friction(&face.exact, v, [1.0, 0.0, 0.0]).g.concat();
+        let exact = friction(Field { area: &face.exact, p: [1.0, 0.0, 0.0] }, v.into()).g.concat();
         let difference: Vec<f64> =
             found.iter().zip(&exact).map(|(a, b)| f64::from(*a) - b).collect();
         let largest =
@@ -246,7 +295,7 @@ mod tests {
         for face in faces() {
             let set = SeedSet::new(16).unwrap();
             let twists = set.twists().iter().map(|v| [v[0], v[1], v[2]]);
-            assert_small(face.name, worst(&face, |v| basis(&face.edges, face.radius, v), twists));
+            assert_small(face.name, worst(&face, |v| either(&face.edges, face.radius, v), twists));
         }
     }
 
@@ -266,7 +315,7 @@ mod tests {
                 let (a, b) = (glam::Vec2::new(edge[0], edge[1]), glam::Vec2::new(edge[2], edge[3]));
                 offsets.map(|(along, off)| about(a + along * (b - a) + off * (b - a).perp()))
             });
-            assert_small(face.name, worst(&face, |v| basis(&face.edges, face.radius, v), twists));
+            assert_small(face.name, worst(&face, |v| either(&face.edges, face.radius, v), twists));
         }
     }
 

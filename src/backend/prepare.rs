@@ -2,23 +2,24 @@
 //! Everything that decides whether a load can be searched at all happens here in f64, once for
 //! every backend.
 
+use std::collections::HashMap;
+use std::sync::Arc;
+
 use glam::{DMat2, DVec2};
+use rayon::prelude::*;
 
 use super::layout::{
     BOUNDED, COUPLED, ContactHeader, EdgeRecord, GROUP, GroupRecord, LoadRecord, OUT_OF_RANGE,
     SeedRecord, UNBOUNDED,
 };
-use super::{F32_TOLERANCE, Problem, Seed, SeedStatus};
-use crate::contact::Loops;
+use super::problem::{F32_TOLERANCE, Problem, Seed, SeedStatus};
+use crate::contact::{Loops, Twist};
 use crate::error::{Error, Result};
 use crate::geometry::overlay;
 use crate::geometry::polygon::{Moments, rings_moments};
+use crate::mechanics::Pads;
+use crate::mechanics::pads::{SINGLE_PRECISION, congruent};
 use crate::model::{Contact, Wrench};
-
-/// Faces count as congruent when their vertices agree to this over `perimeter / area`, in radii of
-/// gyration: the answer then changes by less than a tenth of the tolerance of the bounds. Parts
-/// come with single-precision coordinates.
-const CONGRUENT: f64 = 2e-6;
 
 /// Bounds need `radius * perimeter / area` below this (a square has 3): f32 rounds vertices by 6e-8
 /// of the radius, so the integrals of a sliver are uncertain by that times this number.
@@ -34,45 +35,81 @@ const NO_LOAD: f64 = 1e-150;
 /// Area over the square of the perimeter below which a face counts as no contact: a line.
 const NO_AREA: f64 = 1e-14;
 
-/// A contact, oriented and scaled.
+/// The distinct contacts of some problems, each made ready once, for the seeds and for the solver.
+pub(crate) struct Contacts {
+    /// In the order of first use.
+    pub(crate) ready: Vec<Prepared>,
+    /// Which of them each problem has.
+    pub(crate) slots: Vec<usize>,
+}
+
+impl Contacts {
+    /// Problems that share the `Arc` share the contact.
+    ///
+    /// # Errors
+    /// Bad geometry when a coordinate is not finite or beyond 1e9 m.
+    pub(crate) fn new(problems: &[Problem<'_>]) -> Result<Self> {
+        let mut slot_of: HashMap<*const Contact, usize> = HashMap::new();
+        let mut first_user: Vec<usize> = Vec::new();
+        let mut slots = Vec::with_capacity(problems.len());
+        for (index, problem) in problems.iter().enumerate() {
+            slots.push(*slot_of.entry(Arc::as_ptr(problem.contact)).or_insert_with(|| {
+                first_user.push(index);
+                first_user.len() - 1
+            }));
+        }
+        let ready = first_user
+            .into_par_iter()
+            .map(|user| {
+                let contact = problems[user].contact;
+                contact.check(&format!("contact of grip {user}, "))?;
+                Ok(Prepared::new(contact))
+            })
+            .collect::<Result<_>>()?;
+        Ok(Self { ready, slots })
+    }
+}
+
+/// A contact made ready: for the solver, and from that for the kernels.
 #[derive(Debug, Clone)]
 pub(crate) struct Prepared {
+    /// `None` when a face has no area.
+    pub(crate) pads: Option<Pads>,
+    /// `None` when f32 cannot tell a face from a line; there are no seeds then.
+    pub(crate) records: Option<Records>,
+}
+
+impl Prepared {
+    pub(crate) fn new(contact: &Contact) -> Self {
+        let pads = Pads::new(contact);
+        let records = pads.as_ref().and_then(|pads| Records::new(pads, contact));
+        Self { pads, records }
+    }
+}
+
+/// A contact as the kernels read it, in units of its radius of gyration.
+#[derive(Debug, Clone)]
+pub(crate) struct Records {
     /// Header whose edge and basis indices are relative to this contact.
     pub(crate) header: ContactHeader,
     pub(crate) edges: Vec<EdgeRecord>,
-    /// Centroid of both faces together [m], origin of the scaled frame.
+    /// The pads' middle [m], origin of the scaled frame.
     pub(crate) origin: DVec2,
     /// Radius of gyration about it [m], unit of length.
     pub(crate) unit: f64,
 }
 
-/// Whether two faces have the same rings, each perhaps begun at another vertex, to within
-/// `tolerance` [m].
-fn congruent(a: &[(DVec2, DVec2)], b: &[(DVec2, DVec2)], tolerance: f64) -> bool {
-    let same = |a: &(DVec2, DVec2), b: &(DVec2, DVec2)| {
-        a.0.distance(b.0) <= tolerance && a.1.distance(b.1) <= tolerance
-    };
-    // Mostly the faces list their vertices in the same order: look there first.
-    a.len() == b.len()
-        && a.iter()
-            .zip(b)
-            .all(|(edge, other)| same(edge, other) || b.iter().any(|any| same(edge, any)))
-}
-
 /// The quadratic form of [`ContactHeader::variation_first`]: by Schwarz's inequality the integral
 /// of the magnitude of `p_I` on face I less `p_II` on face II is at most the root of the joint area
-/// times the integral of the square.
+/// times the integral of the square. `faces` are the moments of both in the frame that `scaled`
+/// leads to.
 fn variation(
     contact: &Contact,
-    loops: [&Loops; 2],
-    scaled: &impl Fn(DVec2) -> DVec2,
+    faces: &[Moments; 2],
+    scaled: impl Fn(DVec2) -> DVec2,
 ) -> ([f32; 4], [f32; 4], [f32; 2]) {
     let overlap = Loops::mapped(&overlay::intersect(&contact.face_i, &contact.face_ii), scaled);
-    let [i, ii] = loops.map(|loops| {
-        let rings: Vec<Vec<DVec2>> =
-            loops.rings().map(|ring| ring.iter().map(|&point| scaled(point)).collect()).collect();
-        about_origin(&rings_moments(&rings.iter().map(Vec::as_slice).collect::<Vec<_>>()))
-    });
+    let [i, ii] = faces.each_ref().map(about_origin);
     let both = about_origin(&rings_moments(&overlap.rings().collect::<Vec<_>>()));
     // Nothing is lost by a joint area that is too large.
     let joint = i.0 + ii.0 - both.0;
@@ -95,78 +132,59 @@ fn about_origin(moments: &Moments) -> (f64, DVec2, DMat2) {
     )
 }
 
-impl Prepared {
-    /// `None` when a face has no area.
-    ///
-    /// # Errors
-    /// Bad geometry when a coordinate is not finite or beyond 1e9 m.
-    pub(crate) fn new(contact: &Contact, place: &str) -> Result<Option<Self>> {
-        contact.check(&format!("{place}, "))?;
-        let [loops_i, loops_ii] =
-            [&contact.face_i, &contact.face_ii].map(|patch| Loops::new(patch));
-        let [edges_i, edges_ii] = [&loops_i, &loops_ii]
-            .map(|loops| loops.edges().filter(|(a, b)| a != b).collect::<Vec<_>>());
-        let [on_i, on_ii] =
-            [&loops_i, &loops_ii].map(|loops| rings_moments(&loops.rings().collect::<Vec<_>>()));
-        let perimeter =
-            |edges: &[(DVec2, DVec2)]| edges.iter().map(|(a, b)| a.distance(*b)).sum::<f64>();
-        let (length_i, length_ii) = (perimeter(&edges_i), perimeter(&edges_ii));
-        let has_area = |face: &Moments, length: f64| {
-            face.area > NO_AREA * length * length && face.area.is_normal()
+impl Records {
+    /// `None` when a face is a line but for rounding.
+    fn new(pads: &Pads, contact: &Contact) -> Option<Self> {
+        let perimeter = |area: &Loops| area.edges().map(|(a, b)| a.distance(b)).sum::<f64>();
+        let lengths = pads.areas.each_ref().map(perimeter);
+        let in_pads =
+            pads.areas.each_ref().map(|area| rings_moments(&area.rings().collect::<Vec<_>>()));
+        let areas = in_pads.each_ref().map(|face| face.area);
+        let has_area = |k: usize| {
+            areas[k] > NO_AREA * lengths[k] * lengths[k]
+                && (areas[k] * pads.length * pads.length).is_normal()
         };
-        if !(has_area(&on_i, length_i) && has_area(&on_ii, length_ii)) {
-            return Ok(None);
+        if !(has_area(0) && has_area(1)) {
+            return None;
         }
-        let area = on_i.area + on_ii.area;
-        let origin = on_i.centroid + (on_ii.area / area) * (on_ii.centroid - on_i.centroid);
+        // Lengths in units of the radius of gyration from here on.
         let polar = |face: &Moments| {
-            face.second.x_axis.x
-                + face.second.y_axis.y
-                + face.area * face.centroid.distance_squared(origin)
+            face.second.x_axis.x + face.second.y_axis.y + face.area * face.centroid.length_squared()
         };
-        let unit = ((polar(&on_i) + polar(&on_ii)) / area).sqrt();
-        if !unit.is_normal() {
-            return Ok(None);
+        let gyration = (in_pads.iter().map(polar).sum::<f64>() / (areas[0] + areas[1])).sqrt();
+        let unit = pads.length * gyration;
+        if !(gyration.is_normal() && unit.is_normal()) {
+            return None;
         }
-        let same = congruent(&edges_i, &edges_ii, CONGRUENT * on_i.area / length_i);
-        let scaled = |p: DVec2| (p - origin) / unit;
-        let records = |edges: &[(DVec2, DVec2)]| -> Vec<EdgeRecord> {
-            let record = |&(a, b): &(DVec2, DVec2)| {
-                [scaled(a).as_vec2().to_array(), scaled(b).as_vec2().to_array()]
-            };
-            edges
-                .iter()
-                .map(record)
-                .filter(|[a, b]| a != b)
-                .map(|[a, b]| [a[0], a[1], b[0], b[1]])
-                .collect()
+        let scaled = |p: DVec2| p / gyration;
+        let faces = in_pads.map(|face| Moments {
+            area: face.area / (gyration * gyration),
+            centroid: scaled(face.centroid),
+            second: face.second * gyration.powi(-4),
+        });
+        let same = congruent(&pads.areas, SINGLE_PRECISION);
+        let record = |(a, b): (DVec2, DVec2)| {
+            let [a, b] = [a, b].map(|p| scaled(p).as_vec2().to_array());
+            (a != b).then_some([a[0], a[1], b[0], b[1]])
         };
-        let mut edges = records(&edges_i);
+        let mut edges: Vec<EdgeRecord> = pads.areas[0].edges().filter_map(record).collect();
         let end_of_i = edges.len() as u32;
         if !same {
-            edges.extend(records(&edges_ii));
+            edges.extend(pads.areas[1].edges().filter_map(record));
         }
-        let radius =
-            edges_i.iter().chain(&edges_ii).map(|edge| scaled(edge.0).length()).fold(0.0, f64::max);
-        let stiffness = (on_i.second + on_ii.second) * unit.powi(-4);
-        let compliance = stiffness.inverse();
+        let reach = |k: usize, centre: DVec2| {
+            let points = pads.areas[k].points().iter();
+            points.map(|&point| scaled(point).distance(centre)).fold(0.0, f64::max)
+        };
+        let radius = reach(0, DVec2::ZERO).max(reach(1, DVec2::ZERO));
+        let compliance = (faces[0].second + faces[1].second).inverse();
         let (variation_first, variation_second, variation_slope) = if same {
             Default::default()
         } else {
-            variation(contact, [&loops_i, &loops_ii], &scaled)
+            variation(contact, &faces, |p| (p - pads.origin) / unit)
         };
-        let (mean, half) = (
-            (compliance.x_axis.x + compliance.y_axis.y) / 2.0,
-            (compliance.x_axis.x - compliance.y_axis.y) / 2.0,
-        );
-        let softness = mean + half.hypot(compliance.y_axis.x);
-        let reach = |edges: &[(DVec2, DVec2)], centre: DVec2| {
-            edges.iter().map(|edge| edge.0.distance(centre) / unit).fold(0.0, f64::max)
-        };
-        let spread = (on_i.area * reach(&edges_i, on_i.centroid)
-            + on_ii.area * reach(&edges_ii, on_ii.centroid))
-            / (unit * unit);
-        let resolved = |face: &Moments, length: f64| radius * unit * length / face.area <= RESOLVED;
+        let resolved = |k: usize| radius * lengths[k] / gyration / faces[k].area <= RESOLVED;
+        let spread: f64 = (0..2).map(|k| faces[k].area * reach(k, faces[k].centroid)).sum();
         let header = ContactHeader {
             edges_i: 0,
             edges_ii: end_of_i,
@@ -174,23 +192,23 @@ impl Prepared {
             basis: 0,
             faces: if same { 1 } else { 2 },
             radius: radius as f32,
-            area_i: (on_i.area / (unit * unit)) as f32,
-            area_ii: (on_ii.area / (unit * unit)) as f32,
-            centroid_i: scaled(on_i.centroid).as_vec2().to_array(),
-            centroid_ii: scaled(on_ii.centroid).as_vec2().to_array(),
+            area_i: faces[0].area as f32,
+            area_ii: faces[1].area as f32,
+            centroid_i: faces[0].centroid.as_vec2().to_array(),
+            centroid_ii: faces[1].centroid.as_vec2().to_array(),
             compliance: [
                 compliance.x_axis.x as f32,
                 compliance.y_axis.x as f32,
                 compliance.y_axis.y as f32,
             ],
-            resolved: u32::from(resolved(&on_i, length_i) && resolved(&on_ii, length_ii)),
+            resolved: u32::from(resolved(0) && resolved(1)),
             variation_first,
             variation_second,
             variation_slope,
-            softness: softness as f32,
+            softness: largest_eigenvalue(compliance) as f32,
             spread: spread as f32,
         };
-        Ok(Some(Self { header, edges, origin, unit }))
+        Some(Self { header, edges, origin: pads.origin, unit })
     }
 
     /// The scaled record of a load, and the length of its in-plane wrench over the gripping force
@@ -247,7 +265,8 @@ impl Prepared {
         };
         let [u1, u2, omega] = record.twist.map(f64::from);
         let omega = omega / self.unit;
-        let twist = [u1 + omega * self.origin.y, u2 - omega * self.origin.x, omega];
+        let (u1, u2) = (u1 + omega * self.origin.y, u2 - omega * self.origin.x);
+        let twist = Twist { u1, u2, omega };
         if status == SeedStatus::Unbounded {
             return Ok(Seed {
                 status,
@@ -261,6 +280,12 @@ impl Prepared {
         let upper = scale * f64::from(record.upper) * (1.0 + F32_TOLERANCE);
         Ok(Seed { status, twist, lower, upper, estimate: lower })
     }
+}
+
+/// Of a symmetric matrix.
+fn largest_eigenvalue(m: DMat2) -> f64 {
+    let (mean, half) = ((m.x_axis.x + m.y_axis.y) / 2.0, (m.x_axis.x - m.y_axis.y) / 2.0);
+    mean + half.hypot(m.y_axis.x)
 }
 
 /// What a kernel works on in one go.
@@ -278,7 +303,7 @@ impl Chunk {
     /// Adds a contact with its loads, in groups. A contact without loads is left out.
     pub(crate) fn push(
         &mut self,
-        prepared: &Prepared,
+        records: &Records,
         loads: impl IntoIterator<Item = Vec<LoadRecord>>,
         twists: usize,
     ) {
@@ -290,7 +315,7 @@ impl Chunk {
             return;
         }
         let first_edge = self.edges.len() as u32;
-        let mut header = prepared.header;
+        let mut header = records.header;
         header.edges_i += first_edge;
         header.edges_ii += first_edge;
         header.edges_end += first_edge;
@@ -304,7 +329,7 @@ impl Chunk {
                 padding: 0,
             });
         }
-        self.edges.extend_from_slice(&prepared.edges);
+        self.edges.extend_from_slice(&records.edges);
         self.basis += basis_length(&header, twists);
         self.contacts.push(header);
     }
@@ -317,5 +342,5 @@ pub(crate) fn basis_length(header: &ContactHeader, twists: usize) -> usize {
 
 /// The answer for a load that is not searched.
 pub(crate) fn not_searched(status: SeedStatus) -> Seed {
-    Seed { status, twist: [0.0; 3], lower: 0.0, upper: f64::INFINITY, estimate: 0.0 }
+    Seed { status, twist: Twist::default(), lower: 0.0, upper: f64::INFINITY, estimate: 0.0 }
 }

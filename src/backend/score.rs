@@ -1,20 +1,21 @@
 //! From seeds to final answers: the bounds decide which loads can be the worst, and only those are
 //! solved in f64.
 
-use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::Arc;
 
 use glam::DVec2;
-use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::{Backend, Batch, F32_TOLERANCE, Problem, Seed, SeedSet, SeedStatus};
+use super::job::Backend;
+use super::prepare::Contacts;
+use super::problem::{Batch, F32_TOLERANCE, Problem, Seed, SeedStatus};
+use super::seeds::SeedSet;
+use crate::contact::{Field, PlaneWrench, Twist};
 use crate::error::Result;
-use crate::mechanics::slip::{self, Field};
+use crate::mechanics::slip;
 use crate::mechanics::twist_out::TwistOut;
 use crate::mechanics::{Options, Pads, Search, Start, refused, solve_next, solve_pads};
-use crate::model::{Contact, Score, Status};
+use crate::model::{Score, Status};
 use crate::request::{Polish, Refiner, Separation};
 
 /// Values of `mu_s` that differ by less than this share count as equal, and the first load is taken
@@ -66,10 +67,8 @@ impl Backend {
         seeds: &SeedSet,
         options: &ScoreOptions,
     ) -> Result<Vec<Scored>> {
-        self.by_blocks(BLOCK, batch, seeds, |block, found| {
-            let problems = &batch.problems[block];
-            let pads = DistinctPads::new(problems);
-            pads.cases(problems, &found, options)
+        self.by_blocks(BLOCK, batch, seeds, |Block { range, contacts, seeds }| {
+            cases(&contacts, &batch.problems[range], &seeds, options)
                 .into_par_iter()
                 .map(|case| case.score(None))
                 .collect()
@@ -83,30 +82,40 @@ impl Backend {
         most: usize,
         batch: &Batch<'_>,
         seeds: &SeedSet,
-        mut solve: impl FnMut(Range<usize>, Vec<Seed>) -> Vec<Scored> + Send,
+        mut solve: impl FnMut(Block) -> Vec<Scored> + Send,
     ) -> Result<Vec<Scored>> {
-        let mut solve = |block: Range<usize>, seeds: Vec<Seed>| {
+        let mut solve = |block: Block| {
             let start = std::time::Instant::now();
-            let scored = solve(block, seeds);
+            let scored = solve(block);
             self.solved_since(start);
             scored
         };
         let mut scored = Vec::with_capacity(batch.problems.len());
-        let mut waiting: Option<(Range<usize>, Vec<Seed>)> = None;
-        for block in blocks(&batch.problems, most) {
-            let part = Batch { problems: batch.problems[block.clone()].to_vec() };
-            let (found, before) = rayon::join(
-                || self.seed(&part, seeds),
-                || waiting.take().map(|(block, seeds)| solve(block, seeds)),
-            );
+        let mut waiting: Option<Block> = None;
+        for range in blocks(&batch.problems, most) {
+            let part = Batch { problems: batch.problems[range.clone()].to_vec() };
+            let seed = || -> Result<Block> {
+                let contacts = Contacts::new(&part.problems)?;
+                let seeds = self.seed_on(&contacts, &part, seeds)?;
+                Ok(Block { range, contacts, seeds })
+            };
+            let (block, before) = rayon::join(seed, || waiting.take().map(&mut solve));
             scored.extend(before.into_iter().flatten());
-            waiting = Some((block, found?));
+            waiting = Some(block?);
         }
-        if let Some((block, seeds)) = waiting {
-            scored.extend(solve(block, seeds));
-        }
+        scored.extend(waiting.into_iter().flat_map(solve));
         Ok(scored)
     }
+}
+
+/// Some consecutive problems of a batch, seeded.
+pub(super) struct Block {
+    /// Their places in the batch.
+    pub(super) range: Range<usize>,
+    /// Their contacts.
+    pub(super) contacts: Contacts,
+    /// The seeds of all their loads, one problem after the other.
+    pub(super) seeds: Vec<Seed>,
 }
 
 /// Cuts the problems so that each block has at most `most` loads (or one problem).
@@ -125,42 +134,20 @@ fn blocks(problems: &[Problem<'_>], most: usize) -> Vec<Range<usize>> {
     blocks
 }
 
-/// The distinct contacts of some problems, ready to be solved.
-pub(super) struct DistinctPads {
-    pads: Vec<Option<Pads>>,
-    /// Which of them each problem has.
-    slots: Vec<usize>,
-}
-
-impl DistinctPads {
-    pub(super) fn new(problems: &[Problem<'_>]) -> Self {
-        let mut index_of: HashMap<*const Contact, usize> = HashMap::new();
-        let mut distinct: Vec<&Contact> = Vec::new();
-        let mut slots = Vec::with_capacity(problems.len());
-        for problem in problems {
-            slots.push(*index_of.entry(Arc::as_ptr(problem.contact)).or_insert_with(|| {
-                distinct.push(problem.contact);
-                distinct.len() - 1
-            }));
-        }
-        Self { pads: distinct.into_par_iter().map(Pads::new).collect(), slots }
-    }
-
-    /// Each problem with its contact and its part of the `seeds`.
-    pub(super) fn cases<'a>(
-        &'a self,
-        problems: &'a [Problem<'a>],
-        seeds: &'a [Seed],
-        options: &'a ScoreOptions,
-    ) -> Vec<Case<'a>> {
-        let mut rest = seeds;
-        let ready = problems.iter().zip(&self.slots).map(|(problem, &slot)| {
-            let (seeds, others) = rest.split_at(problem.wrenches.len());
-            rest = others;
-            Case { problem, pads: self.pads[slot].as_ref(), seeds, options }
-        });
-        ready.collect()
-    }
+/// Each problem with its contact and its part of the `seeds`.
+pub(super) fn cases<'a>(
+    contacts: &'a Contacts,
+    problems: &'a [Problem<'a>],
+    seeds: &'a [Seed],
+    options: &'a ScoreOptions,
+) -> Vec<Case<'a>> {
+    let mut rest = seeds;
+    let ready = problems.iter().zip(&contacts.slots).map(|(problem, &slot)| {
+        let (seeds, others) = rest.split_at(problem.wrenches.len());
+        rest = others;
+        Case { problem, pads: contacts.ready[slot].pads.as_ref(), seeds, options }
+    });
+    ready.collect()
 }
 
 /// One grip with the seeds of its loads.
@@ -187,12 +174,13 @@ impl Case<'_> {
         };
         let load =
             pads.load(self.problem.distance, self.problem.force, &self.problem.wrenches[load]);
-        let bound = |v: Vector3<f64>| {
-            let speed = |x: &DVec2| DVec2::new(v.x - v.z * x.y, v.y + v.z * x.x).length_squared();
+        let bound = |v: Twist| {
+            let speed = |x: &DVec2| v.velocity(*x).length_squared();
             let fastest = |k: usize| pads.hulls[k].iter().map(speed).fold(0.0, f64::max).sqrt();
-            load.direction.dot(&v) / (load.normal[0] * fastest(0) + load.normal[1] * fastest(1))
+            load.direction.power(v) / (load.normal[0] * fastest(0) + load.normal[1] * fastest(1))
         };
-        let slide = bound(Vector3::new(load.direction.x, load.direction.y, 0.0));
+        let PlaneWrench { f1, f2, .. } = load.direction;
+        let slide = bound(Twist { u1: f1, u2: f2, omega: 0.0 });
         let turn = bound(pads.scaled_twist(seed.twist));
         // Less than rounding leaves of either; not a number where nothing moves.
         slide.max(turn).max(0.0) * load.size * (1.0 - F32_TOLERANCE)
@@ -388,9 +376,9 @@ impl Work<'_> {
         let wrench = &problem.wrenches[load];
         let scaled = pads.load(problem.distance, problem.force, wrench);
         let place = [
-            scaled.direction.x,
-            scaled.direction.y,
-            scaled.direction.z,
+            scaled.direction.f1,
+            scaled.direction.f2,
+            scaled.direction.m3,
             scaled.moment[0],
             scaled.moment[1],
             scaled.normal[0],
@@ -452,7 +440,7 @@ impl Work<'_> {
 }
 
 /// `mu_s` of congruent faces in full contact: their summed pressure is constant.
-fn slip_only(pads: &Pads, problem: &Problem<'_>, load: usize, seed: [f64; 3]) -> f64 {
+fn slip_only(pads: &Pads, problem: &Problem<'_>, load: usize, seed: Twist) -> f64 {
     let load = pads.load(problem.distance, problem.force, &problem.wrenches[load]);
     let field = Field { area: &pads.areas[0], p: [2.0 / pads.moments[0][0], 0.0, 0.0] };
     slip::solve(&[field], load.direction, Some(pads.scaled_twist(seed)), Refiner::Newton).mu

@@ -3,19 +3,14 @@
 //! by side through plain loops, which the compiler turns into vector instructions. No product is
 //! fused with a sum, so the instruction set changes no bit.
 
+use super::lanes::{LANES, Lanes, Loads, cross, dot, larger, pick, pick_number, smaller};
 use super::layout::{
-    BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader, DEGENERATE,
-    EdgeRecord, LEAST_DISSIPATION, LEAST_VARIATION, LoadRecord, OUT_OF_RANGE, SeedRecord,
-    TILT_LIMIT, UNBOUNDED,
+    BASIS, BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader,
+    DEGENERATE, EdgeRecord, LEAST_DISSIPATION, LEAST_VARIATION, LoadRecord, OUT_OF_RANGE,
+    SeedRecord, TILT_LIMIT, UNBOUNDED,
 };
 use super::seeds::{NEGATED, RING};
 use super::table::{CORNER, SLOTS, Table};
-
-/// Loads searched side by side.
-pub(crate) const LANES: usize = 16;
-
-/// A number of each load.
-pub(crate) type Lanes = [f32; LANES];
 
 /// One contact as the search sees it.
 #[derive(Debug, Clone, Copy)]
@@ -25,37 +20,6 @@ pub(crate) struct Field<'a> {
     pub(crate) edges: [&'a [EdgeRecord]; 2],
     pub(crate) table: &'a Table,
     pub(crate) rings: &'a [[u32; RING]],
-}
-
-/// [`LoadRecord`]s side by side; the places beyond the last hold no load.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Loads {
-    wrench: [Lanes; 3],
-    scale: Lanes,
-    f3: Lanes,
-    m1: Lanes,
-    m2: Lanes,
-    distance: Lanes,
-}
-
-impl Loads {
-    #[inline(always)]
-    pub(crate) fn new(loads: &[LoadRecord]) -> Self {
-        let zero = [0.0; LANES];
-        let mut all =
-            Self { wrench: [zero; 3], scale: zero, f3: zero, m1: zero, m2: zero, distance: zero };
-        for (lane, load) in loads.iter().enumerate().take(LANES) {
-            for m in 0..3 {
-                all.wrench[m][lane] = load.wrench[m];
-            }
-            all.scale[lane] = load.scale;
-            all.f3[lane] = load.f3;
-            all.m1[lane] = load.m1;
-            all.m2[lane] = load.m2;
-            all.distance[lane] = load.distance;
-        }
-        all
-    }
 }
 
 /// Pressures at the origin and their common slope: `p_I = at_i + slope.x`, `p_II = at_ii -
@@ -79,27 +43,17 @@ struct Corner {
     g: [f32; 6],
 }
 
+/// Gradient at a twist on a face for the weight 1, `x1` or `x2`, and its product with the twist, in
+/// the basis of `count` twists.
 #[inline(always)]
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-#[inline(always)]
-fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-/// `a` where `first`, else `b`; by masks, because a choice becomes a store under a condition, which
-/// is slow.
-#[inline(always)]
-fn pick(first: bool, a: u32, b: u32) -> u32 {
-    let mask = 0_u32.wrapping_sub(u32::from(first));
-    (a & mask) | (b & !mask)
-}
-
-#[inline(always)]
-fn pick_number(first: bool, a: f32, b: f32) -> f32 {
-    f32::from_bits(pick(first, a.to_bits(), b.to_bits()))
+pub(crate) fn gradient(
+    basis: &[[f32; 4]],
+    count: usize,
+    face: usize,
+    weight: usize,
+    twist: usize,
+) -> [f32; 4] {
+    basis[(face * count + twist) * BASIS + weight]
 }
 
 impl Field<'_> {
@@ -163,6 +117,33 @@ impl Field<'_> {
             at_ii[lane] = at_ii[lane] + slope[0][lane] * cii[0] + slope[1][lane] * cii[1];
         }
         Planes { at_i, at_ii, slope, full }
+    }
+}
+
+/// Of a ring's entry.
+#[inline(always)]
+pub(crate) fn sign_of(entry: u32) -> f32 {
+    if entry & NEGATED != 0 { -1.0 } else { 1.0 }
+}
+
+impl Field<'_> {
+    /// Gradients of the dissipation at the twists of a ring ([`Table::ring`]), by component.
+    #[inline(always)]
+    fn support<const PRESSURES: usize>(
+        &self,
+        pressures: [f32; PRESSURES],
+        twist: usize,
+    ) -> [[f32; SLOTS]; 3] {
+        let mut g = [[0.0_f32; SLOTS]; 3];
+        let supports = self.table.ring(twist).chunks_exact(3 * SLOTS);
+        for (of_pressure, pressure) in supports.zip(pressures) {
+            for m in 0..3 {
+                for slot in 0..SLOTS {
+                    g[m][slot] += pressure * of_pressure[m * SLOTS + slot];
+                }
+            }
+        }
+        g
     }
 
     /// Whether congruent faces stay in full contact, with a margin, when the body slips with
@@ -281,7 +262,7 @@ impl Field<'_> {
     /// In each triangle `w = a ga + b gb + c gc` by Cramer's rule; two of its numerators are
     /// products with `ga x w`.
     #[inline(always)]
-    fn ring_of<const PRESSURES: usize>(
+    fn corner<const PRESSURES: usize>(
         &self,
         wrench: [f32; 3],
         pressures: [f32; PRESSURES],
@@ -290,15 +271,7 @@ impl Field<'_> {
         let own = self.table.corner(best);
         let sense = if dot(wrench, [own[0], own[1], own[2]]) < 0.0 { -1.0 } else { 1.0 };
         let w = wrench.map(|x| sense * x);
-        let supports = self.table.ring(best);
-        let mut g = [[0.0_f32; SLOTS]; 3];
-        for (of_pressure, pressure) in supports.chunks_exact(3 * SLOTS).zip(pressures) {
-            for m in 0..3 {
-                for slot in 0..SLOTS {
-                    g[m][slot] += pressure * of_pressure[m * SLOTS + slot];
-                }
-            }
-        }
+        let g = self.support(pressures, best);
         let ga = [g[0][SLOTS - 1], g[1][SLOTS - 1], g[2][SLOTS - 1]];
         let u = cross(ga, w);
         let mut next = [[0.0_f32; SLOTS]; 3];
@@ -336,7 +309,7 @@ impl Field<'_> {
                 (ring[(chosen + 1) % RING], c[chosen]),
             ];
             for (entry, share) in corners {
-                let share = if entry & NEGATED != 0 { -sense } else { sense } * share / sum;
+                let share = sense * sign_of(entry) * share / sum;
                 let corner = self.table.corner((entry & !NEGATED) as usize);
                 for m in 0..CORNER {
                     mix[m] += share * corner[m];
@@ -369,9 +342,9 @@ impl Field<'_> {
             let w = [loads.wrench[0][lane], loads.wrench[1][lane], loads.wrench[2][lane]];
             let best = best[lane] as usize;
             corners[lane] = if congruent {
-                self.ring_of(w, [planes.at_i[lane] + planes.at_ii[lane]], best)
+                self.corner(w, [planes.at_i[lane] + planes.at_ii[lane]], best)
             } else {
-                self.ring_of(
+                self.corner(
                     w,
                     [
                         planes.at_i[lane],
@@ -462,14 +435,4 @@ impl Field<'_> {
         }
         self.finish(&loads, &planes, &best, &value, out);
     }
-}
-
-#[inline(always)]
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline(always)]
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

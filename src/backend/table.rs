@@ -1,8 +1,9 @@
 //! What the processor's search reads of one contact for every load, laid out for it: a view of the
 //! gradient basis.
 
-use super::fan::{basis_far, basis_near, is_near};
-use super::layout::{BASIS, ContactHeader, EdgeRecord};
+use super::fan::fill_basis;
+use super::layout::{ContactHeader, EdgeRecord};
+use super::search::{gradient, sign_of};
 use super::seeds::{NEGATED, RING, SeedSet};
 
 /// Places of a ring: its [`RING`] twists, the first again, and the twist in the middle.
@@ -28,11 +29,8 @@ impl Table {
     /// The basis of the contact with these `edges` (face I's, face II's) at every twist.
     pub(crate) fn new(header: &ContactHeader, edges: [&[EdgeRecord]; 2], seeds: &SeedSet) -> Self {
         let count = seeds.len();
-        let basis = contact_basis(header, edges, seeds);
-        let at = |face: usize, k: usize, weight: usize| {
-            let first = ((face * count + k) * 3 + weight) * 4;
-            [basis[first], basis[first + 1], basis[first + 2], basis[first + 3]]
-        };
+        let basis = contact_basis(header, edges, seeds.twists());
+        let at = |face: usize, k: usize, weight: usize| gradient(&basis, count, face, weight, k);
         let congruent = header.faces == 1;
         // Gradients for a unit of each number that the pressure has: those of faces in common, or
         // at_i, at_ii, slope.
@@ -70,7 +68,7 @@ impl Table {
             let around = &seeds.rings()[k];
             for slot in 0..SLOTS {
                 let entry = if slot == SLOTS - 1 { k as u32 } else { around[slot % RING] };
-                let sign = if entry & NEGATED != 0 { -1.0 } else { 1.0 };
+                let sign = sign_of(entry);
                 let g = gradients((entry & !NEGATED) as usize);
                 for pressure in 0..pressures {
                     for m in 0..3 {
@@ -103,46 +101,13 @@ impl Table {
     }
 }
 
-/// The gradient basis of one contact at every twist, as the GPU's kernel writes it:
-/// `[face][twist][weight]`, and in each the components `g1, g2, torque` and their product with the
-/// twist.
+/// [`fill_basis`] with the widest vectors that the processor has; the same operations in the same
+/// order.
 pub(crate) fn contact_basis(
     header: &ContactHeader,
     edges: [&[EdgeRecord]; 2],
-    seeds: &SeedSet,
-) -> Vec<f32> {
-    let mut out = Vec::with_capacity(header.faces as usize * seeds.len() * BASIS * 4);
-    let mut push = |v: &[f32; 4], g: [f32; 9]| {
-        for g in g.as_chunks::<3>().0 {
-            out.extend([g[0], g[1], g[2], v[0] * g[0] + v[1] * g[1] + v[2] * g[2]]);
-        }
-    };
-    // Twists come by falling rotation: the near ones first.
-    let twists = seeds.twists();
-    let (near, far) =
-        twists.split_at(twists.partition_point(|v| is_near(header.radius, [v[0], v[1], v[2]])));
-    for edges in &edges[..header.faces as usize] {
-        for v in near {
-            push(v, basis_near(edges, [v[0], v[1], v[2]]));
-        }
-        for some in far.chunks(FAR_LANES) {
-            let v =
-                [0, 1, 2].map(|m| std::array::from_fn(|lane| some[lane.min(some.len() - 1)][m]));
-            let g = far_widest(edges, &v);
-            for (lane, v) in some.iter().enumerate() {
-                push(v, g.map(|g| g[lane]));
-            }
-        }
-    }
-    out
-}
-
-/// Far twists integrated side by side.
-const FAR_LANES: usize = 8;
-
-/// [`basis_far`] with the widest vectors that the processor has; the same operations in the same
-/// order.
-fn far_widest(edges: &[EdgeRecord], v: &[[f32; FAR_LANES]; 3]) -> [[f32; FAR_LANES]; 9] {
+    twists: &[[f32; 4]],
+) -> Vec<[f32; 4]> {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         #[allow(
@@ -150,13 +115,17 @@ fn far_widest(edges: &[EdgeRecord], v: &[[f32; FAR_LANES]; 3]) -> [[f32; FAR_LAN
             reason = "twice the speed of the baseline's vectors; the feature was just detected"
         )]
         // SAFETY: the function needs AVX2, which this processor has.
-        return unsafe { far_avx2(edges, v) };
+        return unsafe { basis_avx2(header, edges, twists) };
     }
-    basis_far(edges, v)
+    fill_basis(header, edges, twists)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn far_avx2(edges: &[EdgeRecord], v: &[[f32; FAR_LANES]; 3]) -> [[f32; FAR_LANES]; 9] {
-    basis_far(edges, v)
+fn basis_avx2(
+    header: &ContactHeader,
+    edges: [&[EdgeRecord]; 2],
+    twists: &[[f32; 4]],
+) -> Vec<[f32; 4]> {
+    fill_basis(header, edges, twists)
 }

@@ -3,8 +3,10 @@
 
 use rayon::prelude::*;
 
-use super::score::{BLOCK, Case, DistinctPads, usable};
-use super::{Backend, Batch, ScoreOptions, Scored, SeedSet};
+use super::job::Backend;
+use super::problem::Batch;
+use super::score::{BLOCK, Block, Case, ScoreOptions, Scored, cases, usable};
+use super::seeds::SeedSet;
 use crate::error::Result;
 
 /// A merit this share below that of the last of the best still counts as one of them: far above
@@ -62,11 +64,9 @@ impl Backend {
         best: &mut Best,
         merit: &(dyn Fn(usize, f64) -> f64 + Sync),
     ) -> Result<Vec<Scored>> {
-        self.by_blocks(BLOCK, batch, seeds, |block, found| {
-            let problems = &batch.problems[block.clone()];
-            let pads = DistinctPads::new(problems);
-            let cases = pads.cases(problems, &found, options);
-            race(&cases, best, &|index, mu| merit(block.start + index, mu))
+        self.by_blocks(BLOCK, batch, seeds, |Block { range, contacts, seeds }| {
+            let cases = cases(&contacts, &batch.problems[range.clone()], &seeds, options);
+            race(&cases, best, &|index, mu| merit(range.start + index, mu))
         })
     }
 }

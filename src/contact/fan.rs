@@ -16,8 +16,9 @@
 
 use glam::DVec2;
 
+use super::field::Friction;
 use super::lanes::{Block, LANES, total, widest};
-use super::{Friction, Loops};
+use super::loops::Loops;
 
 /// Below this distance of the line from the slip centre (in the pad's length scale) an edge
 /// contributes nothing: every term carries a factor `h`, and `h^2` in the logarithm must not

@@ -14,8 +14,9 @@
 
 use std::sync::LazyLock;
 
+use super::field::Friction;
 use super::lanes::{Block, LANES, total, widest};
-use super::{Friction, Loops};
+use super::loops::Loops;
 
 /// Most points of a rule.
 const MOST: usize = 12;
@@ -56,8 +57,21 @@ pub(super) fn points(ratio: f64) -> usize {
     (17.3 / rho.ln() + 2.0).ceil().clamp(3.0, MOST as f64) as usize
 }
 
+/// Slip centres farther from the area's middle than this many circumradii use quadrature along the
+/// edges in twist form. The fan loses one digit per decade of the distance in `int e`, two in `int
+/// r`, three in the moments; few Gauss points are at rounding level from here on.
+pub const FAR: f64 = 3.0;
+
+/// Whether the slip centre is beyond that.
+pub(super) fn is_far(area: &Loops, twist: [f64; 3]) -> bool {
+    let [u1, u2, omega] = twist;
+    let (middle, reach) = (area.middle(), FAR * omega * area.radius());
+    let (v1, v2) = (u1 - omega * middle.y, u2 + omega * middle.x);
+    v1 * v1 + v2 * v2 > reach * reach
+}
+
 /// See [`super::friction`]: Gauss points on each edge, fewer the farther the slip centre. Error
-/// below 1e-14 for slip centres beyond [`super::FAR`] circumradii.
+/// below 1e-14 for slip centres beyond [`FAR`] circumradii.
 pub(super) fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3]) -> Friction {
     let [u1, u2, omega] = twist;
     let (o, radius) = (area.middle(), area.radius());
@@ -279,7 +293,7 @@ mod tests {
                             .flatten()
                             .zip(want.g.iter().chain(&want.hessian).flatten());
                         worst = pairs
-                            .map(|(a, b)| (a - b).abs() / area.moments()[0])
+                            .map(|(a, b)| (a - b).abs() / crate::contact::moments(&area)[0])
                             .fold(worst, f64::max);
                         assert!(worst < 2e-14, "{kappa} {angle}: {worst:e} {got:?} {want:?}");
                     }

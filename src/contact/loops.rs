@@ -104,11 +104,6 @@ impl Loops {
         &self.blocks
     }
 
-    /// See [`super::moments`].
-    pub(super) fn moments(&self) -> [f64; 6] {
-        self.moments
-    }
-
     /// Everything that follows from the points.
     fn measure(&mut self) {
         let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
@@ -140,7 +135,7 @@ impl Loops {
             }
             start = end;
         }
-        self.moments = moments(&mut self.blocks, self.middle);
+        self.moments = sums(&mut self.blocks, self.middle);
     }
 
     /// Writes into `out` the part of the area where `p0 + p1 x1 + p2 x2 >= 0` (equations (19)(20)):
@@ -194,13 +189,18 @@ impl Loops {
     }
 }
 
+/// `(int 1, int x1, int x2, int x1^2, int x1 x2, int x2^2)` over the area.
+pub fn moments(area: &Loops) -> [f64; 6] {
+    area.moments
+}
+
 widest! {
-    /// Measures the edges; [`super::moments`] of the area within them. `o` is one of its points.
-    fn moments(edges: &mut [Block], o: DVec2) -> [f64; 6] = moments_of
+    /// Measures the edges; [`moments`] of the area within them. `o` is one of its points.
+    fn sums(edges: &mut [Block], o: DVec2) -> [f64; 6] = sums_of
 }
 
 #[inline(always)]
-fn moments_of(edges: &mut [Block], o: DVec2) -> [f64; 6] {
+fn sums_of(edges: &mut [Block], o: DVec2) -> [f64; 6] {
     let mut lanes = [[0.0; LANES]; 6];
     for edge in edges {
         edge.measure();
@@ -243,7 +243,7 @@ fn moved(m: [f64; 6], o: DVec2) -> [f64; 6] {
     ]
 }
 
-/// [`super::moments`] of a quadrangle, from its triangles at the first corner.
+/// [`moments`] of a quadrangle, from its triangles at the first corner.
 fn quadrangle_moments([o, one, two, three]: [DVec2; 4]) -> [f64; 6] {
     let mut m = [0.0; 6];
     for [a, b] in [[one, two], [two, three]] {

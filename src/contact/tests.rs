@@ -168,7 +168,8 @@ fn closed_forms_match_quadrature_at_every_apex() {
     for (x, y) in apexes {
         for omega in [1.0, -0.37] {
             let twist = [y * omega, -x * omega, omega];
-            let (got, want) = (friction(&area, twist, p), oracle(&area, twist, p));
+            let (got, want) =
+                (friction(Field { area: &area, p }, twist.into()), oracle(&area, twist, p));
             let (g, h) = worst_difference(&got, &want);
             assert!(g < 2e-14 && h < 2e-13, "apex ({x}, {y}), omega {omega}: errors {g:e} {h:e}");
         }
@@ -186,8 +187,8 @@ fn far_field_joins_the_fan_and_runs_into_translation() {
             worst_difference(&far::friction(&area, twist, p), &fan::friction(&area, twist, p));
         assert!(g < 5e-14 && h < 5e-14, "seam: {g:e} {h:e}");
     }
-    let pure = friction(&area, [0.6, -0.8, 0.0], p);
-    let nearly = friction(&area, [0.6, -0.8, 1e-12], p);
+    let pure = friction(Field { area: &area, p }, [0.6, -0.8, 0.0].into());
+    let nearly = friction(Field { area: &area, p }, [0.6, -0.8, 1e-12].into());
     let (g, h) = worst_difference(&pure, &nearly);
     assert!(g < 1e-11 && h < 1e-11, "{g:e} {h:e}");
     let m = moments(&area);
@@ -199,13 +200,13 @@ fn hessian_is_the_derivative_of_the_gradient() {
     let area = notched();
     let p = [1.0, 0.3, 0.2];
     for twist in [[0.2, 0.1, 1.0], [-0.4, 0.7, -0.9], [3.0, -2.0, 0.4]] {
-        let got = friction(&area, twist, p).hessian;
+        let got = friction(Field { area: &area, p }, twist.into()).hessian;
         for j in 0..3 {
             let step = 1e-5;
             let at = |sign: f64| {
                 let mut v = twist;
                 v[j] += sign * step;
-                friction(&area, v, p).gradient(p)
+                friction(Field { area: &area, p }, v.into()).gradient(p)
             };
             let (plus, minus) = (at(1.0), at(-1.0));
             for i in 0..3 {
@@ -224,7 +225,7 @@ fn hessian_is_the_derivative_of_the_gradient() {
 fn mean_radius(area: &Loops) -> f64 {
     let m = moments(area);
     let c = DVec2::new(m[1] / m[0], m[2] / m[0]);
-    let f = friction(area, [c.y, -c.x, 1.0], [1.0, 0.0, 0.0]);
+    let f = friction(Field { area, p: [1.0, 0.0, 0.0] }, Twist::about(c));
     (f.g[0][2] - c.x * f.g[0][1] + c.y * f.g[0][0]) / m[0]
 }
 
@@ -292,7 +293,7 @@ fn exact_wrenches_of_the_unit_square() {
         ((-2.0, 0.0), [0.0, 0.989_235_815_005_028_667, 0.042_596_319_748_586_662_7]),
         ((-10.0, 0.0), [0.0, 0.999_582_761_024_177_656, 0.008_340_964_933_787_255_77]),
     ] {
-        let got = friction(&area, [y, -x, 1.0], [1.0, 0.0, 0.0]).g[0];
+        let got = friction(Field { area: &area, p: [1.0, 0.0, 0.0] }, [y, -x, 1.0].into()).g[0];
         for i in 0..3 {
             assert!((got[i] - want[i]).abs() < 2e-14, "({x}, {y}): {got:?} {want:?}");
         }

@@ -13,8 +13,10 @@
 use glam::DVec2;
 
 use super::far::{RULES, points};
+use super::field::Friction;
 use super::lanes::{LANES, total, widest};
-use super::{Friction, Loops};
+use super::loops::Loops;
+use super::{fan, far};
 
 /// Half the length, in widths, of the piece beside the slip centre that is left to the fan, whose
 /// loss on it, 4e-14, is not seen; from there on four points across the strip leave less than
@@ -107,10 +109,10 @@ pub(super) fn friction(area: &Loops, twist: [f64; 3], p: [f64; 3], far: bool) ->
             let origin = along.dot(origin);
             area.clip_into([start - origin, along.x, along.y], &mut kept);
             kept.clip_into([start + origin, -along.x, -along.y], &mut piece);
-            sum = if super::is_far(&piece, twist) {
-                super::far::friction(&piece, twist, p)
+            sum = if far::is_far(&piece, twist) {
+                far::friction(&piece, twist, p)
             } else {
-                super::fan::friction(&piece, twist, p)
+                fan::friction(&piece, twist, p)
             };
         }
     }
@@ -231,7 +233,8 @@ mod tests {
     }
 
     fn gradient(area: &Loops, c: DVec2, p: [f64; 3]) -> [f64; 3] {
-        crate::contact::friction(area, [c.y, -c.x, 1.0], p).gradient(p)
+        let field = crate::contact::Field { area, p };
+        crate::contact::friction(field, crate::contact::Twist::about(c)).gradient(p)
     }
 
     #[test]
@@ -240,8 +243,7 @@ mod tests {
             let (area, p, place) = strip(0.008);
             let c = place(s, h);
             let twist = [c.y, -c.x, 1.0];
-            let (cut, whole) =
-                (friction(&area, twist, p, false), super::super::fan::friction(&area, twist, p));
+            let (cut, whole) = (friction(&area, twist, p, false), fan::friction(&area, twist, p));
             for (a, b) in cut.gradient(p).into_iter().zip(whole.gradient(p)) {
                 assert!((a - b).abs() < 1e-11, "{s} {h}: {a} {b}");
             }

@@ -8,7 +8,7 @@
 
 use glam::DVec2;
 
-use crate::contact::{Loops, friction, moments};
+use crate::contact::{Field, Loops, Twist, friction, moments};
 use crate::error::Result;
 use crate::mechanics::pads::Pads;
 use crate::mechanics::twist_out::{TwistOut, alpha, delta_d};
@@ -47,7 +47,7 @@ pub fn centroid(contact: &Contact) -> Option<Centroid> {
     let centre = weights.iter().map(|m| DVec2::new(m[1], m[2]) / m[0]).sum::<DVec2>() / 2.0;
     // Torque about the centre of a rotation about it, per unit friction and normal force.
     let radius = |area: &Loops, m: &[f64; 6]| {
-        let g = friction(area, [centre.y, -centre.x, 1.0], [1.0, 0.0, 0.0]).g[0];
+        let g = friction(Field { area, p: [1.0, 0.0, 0.0] }, Twist::about(centre)).g[0];
         (g[2] - centre.x * g[1] + centre.y * g[0]) / m[0]
     };
     let mean = (radius(&areas[0], &weights[0]) + radius(&areas[1], &weights[1])) / 2.0;

@@ -13,7 +13,7 @@
 //! `g2 = M2 + int_I p x1 - int_II p x1` with `h2 = -(d/2)(S_I - S_II)`. The gradient of `E` is
 //! analytic.
 
-use crate::contact::{Loops, friction, moments};
+use crate::contact::{Field, Loops, friction, moments};
 use crate::error::Result;
 use crate::model::{Contact, Score, Slip, Status, Wrench};
 
@@ -289,12 +289,12 @@ struct Terms {
 
 impl<'a> Problem<'a> {
     fn new(areas: &'a [Loops; 2], load: &Load, weights: [f64; 6]) -> Self {
-        let in_plane = load.direction * load.size;
+        let in_plane = load.in_plane();
         Self {
             areas,
             moments: areas.each_ref().map(moments),
-            force: [in_plane.x, in_plane.y, load.normal[0] - load.normal[1]],
-            moment: [load.moment[0], load.moment[1], in_plane.z],
+            force: [in_plane.f1, in_plane.f2, load.normal[0] - load.normal[1]],
+            moment: [load.moment[0], load.moment[1], in_plane.m3],
             half_distance: load.half_distance,
             weights,
         }
@@ -313,7 +313,7 @@ impl<'a> Problem<'a> {
             let sign = if k == 0 { 1.0 } else { -1.0 };
             let p = face_pressure(&q, k);
             // Integrals of the unit slip velocity (-sin, cos) and of its moment about the origin.
-            let integrals = friction(&self.areas[k], [c2, -c1, 1.0], p);
+            let integrals = friction(Field { area: &self.areas[k], p }, [c2, -c1, 1.0].into());
             let along = integrals.gradient(p);
             // Values and derivatives of C = int p cos, S = int p sin, R = int p r.
             let (c, s) = (along[1], -along[0]);
@@ -430,12 +430,12 @@ fn score(pads: &Pads, force: f64, load: &Load, run: &Run, evaluations: u32) -> S
         Slip::None
     } else if run.far {
         Slip::Translation {
-            direction: (sense * glam::DVec2::new(load.direction.x, load.direction.y))
+            direction: (sense * glam::DVec2::new(load.direction.f1, load.direction.f2))
                 .normalize_or_zero()
                 .to_array(),
         }
     } else {
-        pads.slip(sense * nalgebra::Vector3::new(run.x[1], -run.x[0], 1.0))
+        pads.slip((sense * nalgebra::Vector3::new(run.x[1], -run.x[0], 1.0)).into())
     };
     let unit = pads.length * pads.length;
     Score {

@@ -9,14 +9,13 @@
 use glam::{DMat2, DVec2};
 use nalgebra::{SMatrix, SVector, Vector3};
 
-use crate::contact::{Loops, friction, moments};
+use crate::contact::{Field, Loops, Twist, friction, moments};
 use crate::request::Refiner;
 
 use super::pads::{Load, Pads};
 use super::pressure::{self, face_pressure, separates};
 use super::shanno;
-use super::slip::{self, Field, Support};
-use super::states::Node;
+use super::slip::{self, Support};
 
 pub(super) type Vector7 = SVector<f64, 7>;
 pub(super) type Matrix7 = SMatrix<f64, 7, 7>;
@@ -44,17 +43,38 @@ impl State {
     }
 
     /// Twist.
-    pub fn twist(&self) -> Vector3<f64> {
-        Vector3::new(self.z[0], self.z[1], self.z[2])
+    pub fn twist(&self) -> Twist {
+        twist_of(&self.z)
     }
+}
+
+/// The seven unknowns from their two parts.
+pub(super) fn unknowns(v: Twist, q: [f64; 4]) -> Vector7 {
+    Vector7::from([v.u1, v.u2, v.omega, q[0], q[1], q[2], q[3]])
+}
+
+fn twist_of(z: &Vector7) -> Twist {
+    [z[0], z[1], z[2]].into()
+}
+
+/// A point of the map of contact moments ([`super::states`]).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Node {
+    /// Contact moment.
+    pub(super) x: DVec2,
+    /// What (6)(7) leave over.
+    pub(super) g: DVec2,
+    /// Derivative of `g`.
+    pub(super) slope: DMat2,
+    pub(super) z: Vector7,
 }
 
 /// Solves one contact pair under one load; keeps its scratch memory and counts its work.
 pub struct Solver<'a> {
     pub(super) pads: &'a Pads,
     pub(super) load: Load,
-    refiner: Refiner,
-    scratch: [Loops; 2],
+    pub(super) refiner: Refiner,
+    pub(super) scratch: [Loops; 2],
     /// Evaluations of the friction integrals so far.
     pub evaluations: u32,
     /// Newton steps so far.
@@ -103,7 +123,7 @@ impl<'a> Solver<'a> {
                 m[k] = self.pads.moments[k];
                 &self.pads.areas[k]
             };
-            let f = friction(area, [v.x, v.y, v.z], p);
+            let f = friction(Field { area, p }, v.into());
             let sign = if k == 0 { 1.0 } else { -1.0 };
             by_pressure[k] =
                 [Vector3::from(f.g[0]), sign * Vector3::from(f.g[1]), sign * Vector3::from(f.g[2])];
@@ -116,7 +136,7 @@ impl<'a> Solver<'a> {
         let k = pressure::stiffness(&m);
         let carried = k * nalgebra::Vector4::new(q[0], q[1], q[2], q[3]);
         let difference = gradients[0] - gradients[1];
-        let slip = self.load.direction - d * g;
+        let slip = Vector3::from(self.load.direction) - d * g;
         let [m1, m2] = self.load.moment;
         let residual = Vector7::from([
             slip.x,
@@ -166,7 +186,8 @@ impl<'a> Solver<'a> {
             pressure::first_moment(&m[1], face_pressure(&q, 1)),
         );
         let normal = carried[0] + carried[1];
-        let friction = Support { gradient: g, normal, centre: (first_i + first_ii) / normal };
+        let friction =
+            Support { gradient: g.into(), normal, centre: (first_i + first_ii) / normal };
         State { z: *z, residual, mu_over_size: d, moments: m, friction }
     }
 
@@ -223,7 +244,7 @@ impl<'a> Solver<'a> {
 
     /// Shanno's method on half the squared residual, in variables scaled by the Jacobian at the
     /// start of each round.
-    fn conjugate(&mut self, z: Vector7) -> Option<State> {
+    pub(super) fn conjugate(&mut self, z: Vector7) -> Option<State> {
         let mut jacobian = Matrix7::zeros();
         let mut at = self.evaluate(&z, 1.0, Some(&mut jacobian));
         for _ in 0..CONJUGATE_ROUNDS {
@@ -256,7 +277,7 @@ impl<'a> Solver<'a> {
 
     /// A state from the contact moment `target` (see [`pressure::reach`]): its pressure, and the
     /// slip under it.
-    pub fn state_at(&mut self, target: DVec2, seed: Option<Vector3<f64>>) -> Option<Vector7> {
+    pub fn state_at(&mut self, target: DVec2, seed: Option<Twist>) -> Option<Vector7> {
         self.state_from(target, seed, None).or_else(|| {
             let q = pressure::solve_near_rim(
                 self.pads,
@@ -270,17 +291,13 @@ impl<'a> Solver<'a> {
 
     /// As [`Solver::state_at`], from the pressure and slip of the state `near`.
     pub fn state_near(&mut self, target: DVec2, near: Option<&Vector7>) -> Option<Vector7> {
-        self.state_from(
-            target,
-            near.map(|z| Vector3::new(z[0], z[1], z[2])),
-            near.map(|z| [z[3], z[4], z[5], z[6]]),
-        )
+        self.state_from(target, near.map(twist_of), near.map(|z| [z[3], z[4], z[5], z[6]]))
     }
 
     fn state_from(
         &mut self,
         target: DVec2,
-        seed: Option<Vector3<f64>>,
+        seed: Option<Twist>,
         start: Option<[f64; 4]>,
     ) -> Option<Vector7> {
         let q = pressure::solve(self.pads, self.load.normal, target, start, &mut self.scratch[0])?;
@@ -289,171 +306,45 @@ impl<'a> Solver<'a> {
         self.evaluations += slip.evaluations;
         self.iterations += slip.iterations;
         let v = slip.twist;
-        Some(Vector7::from([v.x, v.y, v.z, q[0], q[1], q[2], q[3]]))
+        Some(unknowns(v, q))
     }
 
-    /// Newton's method on all seven equations from the pressure `q` without coupling and a rough
-    /// slip under it. Only for a coupling so weak that there is one solution: whichever way it was
-    /// reached, it is the one on the branch from `d = 0`.
-    fn direct(&mut self, q: [f64; 4], seed: Option<Vector3<f64>>) -> Option<State> {
-        let p = [face_pressure(&q, 0), face_pressure(&q, 1)];
-        let parted = [0, 1].map(|k| separates(&self.pads.areas[k], p[k]));
-        let w = self.load.direction;
-        let v = if self.pads.congruent && parted == [false; 2] {
-            // The summed pressure is constant: the slip does not depend on the rest.
-            let level = [p[0][0] + p[1][0], 0.0, 0.0];
-            let slip = slip::solve(
-                &[Field { area: &self.pads.areas[0], p: level }],
-                w,
-                seed,
-                Refiner::Newton,
-            );
-            self.evaluations += slip.evaluations;
-            self.iterations += slip.iterations;
-            slip.twist
-        } else {
-            let fields = slip::pressed_fields(self.pads, &q, &mut self.scratch);
-            self.evaluations += 1;
-            slip::approach(&fields, w, seed)
-        };
-        let state = self.newton(Vector7::from([v.x, v.y, v.z, q[0], q[1], q[2], q[3]]), 1.0, 12)?;
-        (!super::strong(&state, &self.load)).then_some(state)
-    }
-
-    /// The solution on the branch that starts at `d = 0` without coupling; `None` when that branch
-    /// does not exist, or ends before the real `d`.
-    pub fn branch(&mut self, seed: Option<Vector3<f64>>) -> Option<State> {
-        if self.refiner == Refiner::Newton {
-            // None at the rim, where [`Solver::state_at`] knows the way.
-            let q = pressure::solve(
-                self.pads,
-                self.load.normal,
-                self.load.contact_moment(),
-                None,
-                &mut self.scratch[0],
-            );
-            if let Some(state) = q.and_then(|q| self.direct(q, seed)) {
-                return Some(state);
-            }
+    /// The point of the map whose pressure and slip are those of `z`; `None` where they do not fit
+    /// each other.
+    pub(super) fn node(&mut self, z: &Vector7) -> Option<Node> {
+        let mut jacobian = Matrix7::zeros();
+        let state = self.evaluate(z, 1.0, Some(&mut jacobian));
+        if state.residual.fixed_rows::<5>(0).amax() > LOOSE {
+            return None;
         }
-        let start = self.state_at(self.load.contact_moment(), seed)?;
-        if self.refiner == Refiner::Newton {
-            return self.follow(start);
-        }
-        let direct = self.conjugate(start).filter(|state| !super::strong(state, &self.load));
-        direct.or_else(|| {
-            let followed = self.follow(start)?;
-            Some(self.conjugate(followed.z).unwrap_or(followed))
+        let g = DVec2::new(state.residual[6], -state.residual[5]);
+        // Moving along the states of given contact moment: the first five equations stay, X moves.
+        let stiffness = pressure::stiffness(&state.moments);
+        let carried = stiffness * nalgebra::Vector4::from(state.q());
+        let mut along = jacobian;
+        along.fixed_view_mut::<2, 7>(5, 0).fill(0.0);
+        along.fixed_view_mut::<2, 4>(5, 3).copy_from(&stiffness.fixed_view::<2, 4>(2, 0));
+        let mut unit = SMatrix::<f64, 7, 2>::zeros();
+        unit[(5, 0)] = 1.0;
+        unit[(6, 1)] = 1.0;
+        let moved = along.lu().solve(&unit)?;
+        let change = jacobian.fixed_view::<2, 7>(5, 0) * moved;
+        let slope = DMat2::from_cols(
+            DVec2::new(change[(1, 0)], -change[(0, 0)]),
+            DVec2::new(change[(1, 1)], -change[(0, 1)]),
+        );
+        (g.is_finite() && slope.is_finite()).then_some(Node {
+            x: DVec2::new(carried[2], carried[3]),
+            g,
+            slope,
+            z: *z,
         })
-    }
-
-    /// The solution close to `z`, that of another load, by Newton's method from there; where the
-    /// coupling is so strong that there may be others, only a short way off and on the same side of
-    /// any turning point.
-    pub(super) fn next_to(&mut self, z: &Vector7) -> Option<State> {
-        let found = self.newton(*z, 1.0, 6)?;
-        if super::strong(&found, &self.load) {
-            let to = self.node(&found.z)?;
-            let q = [z[3], z[4], z[5], z[6]];
-            let x = pressure::carried(
-                &pressure::pressed_moments(self.pads, &q, &mut self.scratch[0]),
-                &q,
-            );
-            if to.x.distance(x) > FOLLOW_STEP / 2.0 || to.slope.determinant() <= 0.0 {
-                return None;
-            }
-        }
-        Some(found)
-    }
-
-    /// Follows the branch from coupling 0 to 1, in the plane of contact moments where even the last
-    /// of a contact has room: along its tangent, then Newton's method, in steps short enough that
-    /// each ends close to where the tangent led. `None` where the branch turns back or ends.
-    pub fn follow(&mut self, start: Vector7) -> Option<State> {
-        let mut at = self.newton(start, 0.0, 25)?;
-        let (mut reached, mut step) = (if self.load.half_distance == 0.0 { 1.0 } else { 0.0 }, 1.0);
-        for _ in 0..FOLLOW_MOST {
-            if reached == 1.0 {
-                return Some(at);
-            }
-            let here = self.node(&at.z)?;
-            // `g` is linear in the coupling, `x - x_0` without it.
-            let friction = here.g - (here.x - self.load.contact_moment());
-            let slope = Self::slope_at(&here, reached);
-            let tangent = -(slope.inverse() * friction);
-            let room = pressure::reach(self.pads, self.load.normal, here.x);
-            loop {
-                let next = f64::min(1.0, reached + step);
-                let moved = (next - reached) * tangent;
-                let left = pressure::reach(self.pads, self.load.normal, here.x + moved);
-                let short = moved.length() <= FOLLOW_STEP && left >= FOLLOW_SHARE * room;
-                let found = if short { self.onwards(&at, here.x + moved, next) } else { None };
-                let close = |node: &Node| {
-                    (node.x - here.x - moved).length() <= (0.3 * moved.length()).max(FOLLOW_KINK)
-                };
-                match found {
-                    Some((found, node))
-                        if close(&node) && Self::slope_at(&node, next).determinant() > 0.0 =>
-                    {
-                        (at, reached) = (found, next);
-                        step *= 2.0;
-                        break;
-                    }
-                    _ => step /= 2.0,
-                }
-                if step < FOLLOW_LEAST {
-                    return None;
-                }
-            }
-        }
-        None
-    }
-
-    /// The solution at a coupling near the contact moment `x`, found from the solution `at`, and
-    /// its point of the map: Newton's method on the map until what is left is small beside the room
-    /// there, then on all seven equations.
-    fn onwards(&mut self, at: &State, mut x: DVec2, coupling: f64) -> Option<(State, Node)> {
-        let (mut z, mut before) = (at.z, f64::INFINITY);
-        loop {
-            z = self.state_near(x, Some(&z))?;
-            let node = self.node(&z)?;
-            let left = coupling * node.g + (1.0 - coupling) * (node.x - self.load.contact_moment());
-            let (size, room) = (left.length(), pressure::reach(self.pads, self.load.normal, x));
-            if size <= FOLLOW_CLOSE * room
-                && let Some(found) = self.newton(z, coupling, 8)
-            {
-                let node = self.node(&found.z)?;
-                return Some((found, node));
-            }
-            let step = Self::slope_at(&node, coupling).inverse() * left;
-            if size > 0.5 * before || size == 0.0 || !step.is_finite() {
-                return None;
-            }
-            (x, before) = (x - step, size);
-        }
-    }
-
-    /// Derivative of `g` at a coupling. Its determinant is positive where the branch starts and
-    /// changes its sign at a turning point; another limit state that a long step has led to most
-    /// often has the other sign, too.
-    fn slope_at(node: &Node, coupling: f64) -> DMat2 {
-        DMat2::IDENTITY + coupling * (node.slope - DMat2::IDENTITY)
     }
 }
 
-/// Longest step of [`Solver::follow`] in contact moment, of force times the pads' length.
-const FOLLOW_STEP: f64 = 0.25;
-/// Shortest step in coupling, and most steps.
-const FOLLOW_LEAST: f64 = 1e-9;
-const FOLLOW_MOST: usize = 1000;
-/// Share that a step leaves of the way to the region's rim, where no contact is left.
-const FOLLOW_SHARE: f64 = 0.25;
-/// What [`Solver::follow`] leaves to Newton's method on all equations, as a share of the way to the
-/// rim.
-const FOLLOW_CLOSE: f64 = 1e-3;
-/// How far from the tangent's end a step may lead, however short it is: where a pad begins to
-/// separate the branch turns sharply.
-const FOLLOW_KINK: f64 = 1e-3;
+/// Residual of the slip's equations up to which a point of the map is drawn; the states themselves
+/// are solved in full.
+const LOOSE: f64 = 1e-4;
 /// Residual at rounding level: no further step is taken.
 const ROUNDING: f64 = 1e-14;
 

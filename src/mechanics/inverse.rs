@@ -13,14 +13,16 @@ use std::cell::Cell;
 
 use crate::model::{Score, Status, Wrench};
 
-use super::{COUPLING_SEARCH, Options, Pads, Search, solve_next, solve_pads};
+use super::branch::COUPLING_SEARCH;
+use super::pads::Pads;
+use super::solve::{Options, Search, solve_next, solve_pads};
 
 /// The gripping force [N] needed to hold `wrench` with the pad friction `friction`: every larger
 /// force holds it too, and just below it the load slips (`mu_s` equals `friction`, to 1e-9), twists
 /// out or pulls a pad off (to 1e-4). `None` when no force up to `1e9` times the load's size holds
 /// it (or `friction` is not positive).
 ///
-/// Limit states are those that [`super::solve_pads`] finds with these `options`; with
+/// Limit states are those that [`solve_pads`] finds with these `options`; with
 /// [`Search::Off`] only those on the branch from `d = 0`, which errs towards more force.
 pub fn force_needed(
     pads: &Pads,

@@ -2,11 +2,13 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::contact::{Loops, moments};
+use crate::contact::{Loops, PlaneWrench, Twist, moments};
 use crate::geometry::hull::{convex_hull, support};
 use crate::model::{Contact, Pressure, Slip, Wrench};
 
-/// Both contact areas in units of `length`, about `origin`.
+/// Both contact areas in units of `length`, about `origin`; all that a contact decides for every
+/// load on it. Both areas lie in the pads' plane and are pressed by the pads' tilt alone; an area on
+/// a face with a shape of its own would have its height above that plane beside it here.
 #[derive(Debug, Clone)]
 pub struct Pads {
     /// The areas I and II, scaled.
@@ -18,7 +20,7 @@ pub struct Pads {
     /// Outward normals of the edges of `conv A_I - conv A_II` with the supports of the two terms in
     /// that direction, scaled.
     pub supports: Vec<(DVec2, [f64; 2])>,
-    /// Whether the areas agree in their moments, as two that are the same do.
+    /// Whether the areas are the same to [`ROUNDING`].
     pub congruent: bool,
     /// Middle of the areas in the grip frame [m]: the scaled frame's origin.
     pub origin: DVec2,
@@ -49,9 +51,7 @@ impl Pads {
             .chain(normals(&hulls[1], -1.0))
             .filter(|e| *e != DVec2::ZERO);
         let supports = all.map(|e| (e, [support(&hulls[0], e), support(&hulls[1], -e)])).collect();
-        let congruent = moments[0].iter().zip(moments[1]).all(|(a, b)| {
-            (a - b).abs() <= 1e-12 * moments[0][0].max(moments[0][3] + moments[0][5])
-        });
+        let congruent = congruent(&areas, ROUNDING);
         Some(Self { areas, moments, hulls, supports, congruent, origin, length })
     }
 
@@ -65,7 +65,7 @@ impl Pads {
         let size = in_plane.norm();
         let direction = if size > 0.0 { in_plane / size } else { nalgebra::Vector3::zeros() };
         Load {
-            direction,
+            direction: direction.into(),
             size,
             normal: [1.0 + f.z / 2.0, 1.0 - f.z / 2.0],
             moment: [m.x, m.y],
@@ -83,8 +83,8 @@ impl Pads {
     }
 
     /// The slip in SI about the grip origin from a scaled twist.
-    pub fn slip(&self, twist: nalgebra::Vector3<f64>) -> Slip {
-        let (u, omega) = (DVec2::new(twist.x, twist.y), twist.z);
+    pub fn slip(&self, twist: Twist) -> Slip {
+        let (u, omega) = (DVec2::new(twist.u1, twist.u2), twist.omega);
         if omega.abs() <= TRANSLATION * u.length() {
             let direction = u.normalize_or_zero();
             return Slip::Translation { direction: direction.to_array() };
@@ -93,15 +93,40 @@ impl Pads {
         Slip::Rotation { c: c.to_array(), sense: if omega > 0.0 { 1 } else { -1 } }
     }
 
-    /// A twist `(u1, u2, omega)` about the grip origin, SI up to scale, in the scaled frame.
-    pub fn scaled_twist(&self, twist: [f64; 3]) -> nalgebra::Vector3<f64> {
-        let [u1, u2, omega] = twist;
-        nalgebra::Vector3::new(
-            u1 - omega * self.origin.y,
-            u2 + omega * self.origin.x,
-            omega * self.length,
-        )
+    /// A twist about the grip origin, SI up to scale, in the scaled frame.
+    pub fn scaled_twist(&self, Twist { u1, u2, omega }: Twist) -> Twist {
+        Twist {
+            u1: u1 - omega * self.origin.y,
+            u2: u2 + omega * self.origin.x,
+            omega: omega * self.length,
+        }
     }
+}
+
+/// Tolerance of [`congruent`] for areas that differ by rounding: one stands for both in f64.
+pub const ROUNDING: f64 = 1e-12;
+
+/// Tolerance of [`congruent`] for what is summed in f32 and for parts from files with
+/// single-precision coordinates: the answer changes by less than a tenth of the tolerance of the
+/// bounds.
+pub const SINGLE_PRECISION: f64 = 2e-6;
+
+/// Whether both areas have the same edges, each loop perhaps begun at another point, to within
+/// `tolerance` over the perimeter of an area of one: a change of the area by no more than that
+/// share.
+pub fn congruent([a, b]: &[Loops; 2], tolerance: f64) -> bool {
+    if a.len() != b.len() {
+        return false;
+    }
+    let perimeter: f64 = a.edges().map(|(from, to)| from.distance(to)).sum();
+    let near = tolerance * moments(a)[0] / perimeter;
+    let same = |(a, b): (DVec2, DVec2), (c, d): (DVec2, DVec2)| {
+        a.distance(c) <= near && b.distance(d) <= near
+    };
+    // Mostly the areas list their points in the same order: look there first.
+    a.edges()
+        .zip(b.edges())
+        .all(|(edge, other)| same(edge, other) || b.edges().any(|any| same(edge, any)))
 }
 
 /// Angular over linear velocity, in pad lengths, below which a slip is called a translation:
@@ -111,8 +136,8 @@ const TRANSLATION: f64 = 1e-14;
 /// A scaled load: forces in units of the gripping force, lengths in the pads' length.
 #[derive(Debug, Clone, Copy)]
 pub struct Load {
-    /// Unit vector of `(F1, F2, M3)`, or zero.
-    pub direction: nalgebra::Vector3<f64>,
+    /// `(F1, F2, M3)` at the length 1, or zero.
+    pub direction: PlaneWrench,
     /// Norm of `(F1, F2, M3)`.
     pub size: f64,
     /// Normal forces `N_I`, `N_II` of equations (8)(9).
@@ -124,6 +149,12 @@ pub struct Load {
 }
 
 impl Load {
+    /// `(F1, F2, M3)`.
+    pub fn in_plane(&self) -> PlaneWrench {
+        let PlaneWrench { f1, f2, m3 } = self.direction;
+        PlaneWrench { f1: f1 * self.size, f2: f2 * self.size, m3: m3 * self.size }
+    }
+
     /// The contact moment `(X1, X2)` that the load asks for without friction coupling.
     pub fn contact_moment(&self) -> DVec2 {
         DVec2::new(-self.moment[1], self.moment[0])

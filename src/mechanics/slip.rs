@@ -8,22 +8,13 @@
 use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::contact::{Friction, Loops, friction, moments};
+use crate::contact::{Field, Friction, Loops, PlaneWrench, Twist, friction, moments};
 use crate::model::Bounds;
 use crate::request::Refiner;
 
 use super::pads::Pads;
 use super::pressure::{face_pressure, first_moment, separates};
 use super::shanno;
-
-/// An area with its pressure `p0 + p1 x1 + p2 x2`, not negative on the area.
-#[derive(Debug, Clone, Copy)]
-pub struct Field<'a> {
-    /// The area.
-    pub area: &'a Loops,
-    /// The pressure coefficients.
-    pub p: [f64; 3],
-}
 
 /// Both areas as the pressure `q` leaves them in contact, with it; a face that is pressed all over
 /// is not cut.
@@ -45,21 +36,24 @@ pub fn pressed_fields<'a>(
 
 /// `D`, its gradient and its Hessian at a twist.
 #[derive(Debug, Clone, Copy)]
-pub struct Dissipation {
+struct Dissipation {
     /// `sum int p |v| dA`.
-    pub value: f64,
-    /// Gradient.
-    pub gradient: Vector3<f64>,
-    /// Hessian.
-    pub hessian: Matrix3<f64>,
+    value: f64,
+    gradient: Vector3<f64>,
+    hessian: Matrix3<f64>,
+}
+
+/// The wrench that the friction gives with `mu = 1` against the twist `v`.
+pub fn friction_wrench(fields: &[Field<'_>], v: Twist) -> PlaneWrench {
+    dissipation(fields, v.into()).gradient.into()
 }
 
 /// Sum over the fields at twist `v`.
-pub fn dissipation(fields: &[Field<'_>], v: Vector3<f64>) -> Dissipation {
+fn dissipation(fields: &[Field<'_>], v: Vector3<f64>) -> Dissipation {
     let mut gradient = Vector3::zeros();
     let mut hessian = Matrix3::zeros();
     for field in fields {
-        let Friction { g, hessian: h } = friction(field.area, [v.x, v.y, v.z], field.p);
+        let Friction { g, hessian: h } = friction(*field, v.into());
         for m in 0..3 {
             gradient += field.p[m] * Vector3::from(g[m]);
         }
@@ -72,7 +66,7 @@ pub fn dissipation(fields: &[Field<'_>], v: Vector3<f64>) -> Dissipation {
 #[derive(Debug, Clone, Copy)]
 pub struct Solution {
     /// Twist scaled so that `w = D grad D`.
-    pub twist: Vector3<f64>,
+    pub twist: Twist,
     /// Smallest friction coefficient.
     pub mu: f64,
     /// Largest component of `D grad D - w` over that of `w`. The last step is not evaluated where
@@ -96,7 +90,7 @@ const PROMISED: f64 = 1e-12;
 
 /// A twist from an ellipsoid as the limit surface, its radius for the mix of force and moment at
 /// hand: the start where no seed is known.
-pub fn ellipsoid_start(fields: &[Field<'_>], w: Vector3<f64>) -> Vector3<f64> {
+fn ellipsoid_start(fields: &[Field<'_>], w: Vector3<f64>) -> Vector3<f64> {
     let (mut normal, mut first) = (0.0, DVec2::ZERO);
     let (mut q11, mut q12, mut q22, mut area) = (0.0, 0.0, 0.0, 0.0);
     for Field { area: loops, p } in fields {
@@ -132,14 +126,15 @@ pub fn ellipsoid_start(fields: &[Field<'_>], w: Vector3<f64>) -> Vector3<f64> {
 /// for a thin bar.
 const MEAN_DISTANCE: f64 = 0.85;
 
-/// Solves the slip problem for the in-plane load `w = (F1, F2, M3)`, not zero, from `start` or,
-/// without one, from the ellipsoid approximation.
+/// Solves the slip problem for the in-plane load `w`, not zero, from `start` or, without one, from
+/// the ellipsoid approximation.
 pub fn solve(
     fields: &[Field<'_>],
-    w: Vector3<f64>,
-    start: Option<Vector3<f64>>,
+    w: PlaneWrench,
+    start: Option<Twist>,
     refiner: Refiner,
 ) -> Solution {
+    let w = w.into();
     let (start, at_start) = begin(fields, w, start);
     match refiner {
         Refiner::Newton => newton(fields, w, start, at_start),
@@ -148,26 +143,23 @@ pub fn solve(
 }
 
 /// A twist near that of [`solve`], for one evaluation: the start and one Newton step.
-pub fn approach(
-    fields: &[Field<'_>],
-    w: Vector3<f64>,
-    start: Option<Vector3<f64>>,
-) -> Vector3<f64> {
+pub fn approach(fields: &[Field<'_>], w: PlaneWrench, start: Option<Twist>) -> Twist {
+    let w = w.into();
     let (start, at) = begin(fields, w, start);
-    start
-        - newton_step(
-            at.gradient * at.gradient.transpose() + at.value * at.hessian,
-            at.value * at.gradient - w,
-        )
+    let matrix = at.gradient * at.gradient.transpose() + at.value * at.hessian;
+    (start - newton_step(matrix, at.value * at.gradient - w)).into()
 }
 
 /// The minimum of `D^2/2 - w.v` along the ray of the start, and `D` there.
 fn begin(
     fields: &[Field<'_>],
     w: Vector3<f64>,
-    start: Option<Vector3<f64>>,
+    start: Option<Twist>,
 ) -> (Vector3<f64>, Dissipation) {
-    let start = start.filter(|v| w.dot(v) > 0.0).unwrap_or_else(|| ellipsoid_start(fields, w));
+    let start = start
+        .map(Vector3::from)
+        .filter(|v| w.dot(v) > 0.0)
+        .unwrap_or_else(|| ellipsoid_start(fields, w));
     let start = start / start.norm();
     let first = dissipation(fields, start);
     let scale = w.dot(&start) / (first.value * first.value);
@@ -203,7 +195,8 @@ fn newton(
         if size < LAST_STEP && promised < PROMISED {
             // At the minimum the function is -mu^2/2; the step takes it half the slope down.
             let mu = (-2.0 * value - slope).sqrt();
-            return Solution { twist: v + step, mu, residual: promised, evaluations, iterations };
+            let twist = (v + step).into();
+            return Solution { twist, mu, residual: promised, evaluations, iterations };
         }
         before = size;
         let mut t = 1.0;
@@ -230,7 +223,8 @@ fn newton(
             break;
         }
     }
-    Solution { twist: v, mu: at.value, residual: error.amax() / scale, evaluations, iterations }
+    let residual = error.amax() / scale;
+    Solution { twist: v.into(), mu: at.value, residual, evaluations, iterations }
 }
 
 /// Solves with the (semi-definite) matrix, lifted off singularity where the area is a line or a
@@ -295,7 +289,7 @@ fn conjugate(
     let end = dissipation(fields, twist);
     let residual = (end.value * end.gradient - w).amax() / scale;
     Solution {
-        twist,
+        twist: twist.into(),
         mu: end.value,
         residual,
         evaluations: run.evaluations + 2,
@@ -307,7 +301,7 @@ fn conjugate(
 #[derive(Debug, Clone, Copy)]
 pub struct Support {
     /// The wrench: the gradient of the dissipation at a twist.
-    pub gradient: Vector3<f64>,
+    pub gradient: PlaneWrench,
     /// Normal force of both faces together.
     pub normal: f64,
     /// The point where it acts.
@@ -327,17 +321,18 @@ const CERTIFYING_MOMENT: f64 = 1e-2;
 /// times the support is next to nothing at a solution; it is made up of two more, that of a
 /// translation and the support again or that of a rotation. The sizes of the coefficients add up.
 pub fn certificate(
-    w: Vector3<f64>,
-    v: Vector3<f64>,
+    w: PlaneWrench,
+    v: Twist,
     support: &Support,
-    rotation: impl FnOnce(Vector3<f64>) -> Vector3<f64>,
+    rotation: impl FnOnce(Twist) -> PlaneWrench,
 ) -> Bounds {
     let Support { gradient, normal, centre } = *support;
-    let lower = w.dot(&v) / gradient.dot(&v);
+    let lower = w.power(v) / gradient.power(v);
+    let (w, gradient) = (Vector3::from(w), Vector3::from(gradient));
     // The moment about the pressure's centre, which translations leave alone.
     let about = |g: &Vector3<f64>| g.z - centre.perp_dot(DVec2::new(g.x, g.y));
     let turning = if about(&gradient).abs() < CERTIFYING_MOMENT * normal {
-        rotation(Vector3::new(centre.y, -centre.x, 1.0))
+        rotation(Twist::about(centre)).into()
     } else {
         gradient
     };
@@ -364,7 +359,7 @@ mod tests {
         let m = moments(field.area);
         let normal = field.p[0] * m[0] + field.p[1] * m[1] + field.p[2] * m[2];
         Support {
-            gradient: dissipation(&[*field], v).gradient,
+            gradient: dissipation(&[*field], v).gradient.into(),
             normal,
             centre: first_moment(&m, field.p) / normal,
         }
@@ -389,18 +384,20 @@ mod tests {
     fn the_certificate_holds_at_any_twist_and_is_tight_at_the_solution() {
         let area = area();
         let field = Field { area: &area, p: [1.0, 0.4, -0.3] };
-        let rotation = |v| dissipation(&[field], v).gradient;
+        let rotation = |v| friction_wrench(&[field], v);
         for w in loads(&field) {
-            let exact = solve(&[field], w, None, Refiner::Newton);
-            let tight = certificate(w, exact.twist, &support(&field, exact.twist), rotation);
+            let exact = solve(&[field], w.into(), None, Refiner::Newton);
+            let twist = Vector3::from(exact.twist);
+            let tight = certificate(w.into(), exact.twist, &support(&field, twist), rotation);
             assert!(
                 (tight.lower / exact.mu - 1.0).abs() < 1e-13
                     && (tight.upper / exact.mu - 1.0).abs() < 1e-11,
                 "{w:?} {exact:?} {tight:?}"
             );
             for turn in [1e-3, 0.1, 0.5] {
-                let v = exact.twist + turn * exact.twist.norm() * Vector3::new(0.5, 0.7, -0.5);
-                let Bounds { lower, upper } = certificate(w, v, &support(&field, v), rotation);
+                let v = twist + turn * twist.norm() * Vector3::new(0.5, 0.7, -0.5);
+                let Bounds { lower, upper } =
+                    certificate(w.into(), v.into(), &support(&field, v), rotation);
                 assert!(
                     lower <= exact.mu * (1.0 + 1e-13) && exact.mu <= upper * (1.0 + 1e-13),
                     "{w:?} {turn}: {lower} {} {upper}",
@@ -415,8 +412,9 @@ mod tests {
         let area = area();
         let field = Field { area: &area, p: [1.0, 0.4, -0.3] };
         for w in loads(&field) {
-            let found = solve(&[field], w, None, Refiner::Newton);
-            let at = dissipation(&[field], found.twist);
+            let found = solve(&[field], w.into(), None, Refiner::Newton);
+            let twist = Vector3::from(found.twist);
+            let at = dissipation(&[field], twist);
             let residual = (at.value * at.gradient - w).amax() / w.amax();
             assert!(
                 residual < 1e-11 && (at.value / found.mu - 1.0).abs() < 1e-11,
@@ -424,10 +422,7 @@ mod tests {
             );
             // The maximum of (w.v)/D(v) is flat: the value is right to the square of the twist's
             // error.
-            assert!(
-                (w.dot(&found.twist) / at.value / found.mu - 1.0).abs() < 1e-14,
-                "{w:?} {found:?}"
-            );
+            assert!((w.dot(&twist) / at.value / found.mu - 1.0).abs() < 1e-14, "{w:?} {found:?}");
         }
     }
 }

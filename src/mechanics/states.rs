@@ -9,10 +9,9 @@
 //! up to the turns of `g` along the region's rim, which no zero inside can escape.
 
 use glam::{DMat2, DVec2};
-use nalgebra::SMatrix;
 use rustc_hash::FxHashMap;
 
-use super::equilibrium::{Matrix7, Solver, State, Vector7, same};
+use super::equilibrium::{Matrix7, Node, Solver, State, same};
 use super::pressure;
 
 /// What [`Solver::limit_states`] found.
@@ -54,24 +53,9 @@ const BEYOND: f64 = 0.05;
 const BEYOND_STEPS: f64 = 30.0;
 /// The same, up to which there should be one.
 const EXPECTED_STEPS: f64 = 5.0;
-/// Residual of the slip's equations up to which a point of the map is drawn; the states themselves
-/// are solved in full.
-const LOOSE: f64 = 1e-4;
 /// Most points looked at, and most starts of Newton's method.
 const MOST_NODES: usize = 500;
 const MOST_STARTS: usize = 60;
-
-/// A point of the map.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Node {
-    /// Contact moment.
-    pub(super) x: DVec2,
-    /// What (6)(7) leave over.
-    pub(super) g: DVec2,
-    /// Derivative of `g`.
-    pub(super) slope: DMat2,
-    z: Vector7,
-}
 
 /// A cell of the mesh between two rays and two rings, in units of the finest mesh.
 #[derive(Debug, Clone, Copy)]
@@ -101,38 +85,6 @@ impl Solver<'_> {
         };
         states.sort_by(|a, b| a.mu_over_size.total_cmp(&b.mu_over_size));
         LimitStates { states, complete }
-    }
-
-    /// The point of the map whose pressure and slip are those of `z`; `None` where they do not fit
-    /// each other.
-    pub(super) fn node(&mut self, z: &Vector7) -> Option<Node> {
-        let mut jacobian = Matrix7::zeros();
-        let state = self.evaluate(z, 1.0, Some(&mut jacobian));
-        if state.residual.fixed_rows::<5>(0).amax() > LOOSE {
-            return None;
-        }
-        let g = DVec2::new(state.residual[6], -state.residual[5]);
-        // Moving along the states of given contact moment: the first five equations stay, X moves.
-        let stiffness = pressure::stiffness(&state.moments);
-        let carried = stiffness * nalgebra::Vector4::from(state.q());
-        let mut along = jacobian;
-        along.fixed_view_mut::<2, 7>(5, 0).fill(0.0);
-        along.fixed_view_mut::<2, 4>(5, 3).copy_from(&stiffness.fixed_view::<2, 4>(2, 0));
-        let mut unit = SMatrix::<f64, 7, 2>::zeros();
-        unit[(5, 0)] = 1.0;
-        unit[(6, 1)] = 1.0;
-        let moved = along.lu().solve(&unit)?;
-        let change = jacobian.fixed_view::<2, 7>(5, 0) * moved;
-        let slope = DMat2::from_cols(
-            DVec2::new(change[(1, 0)], -change[(0, 0)]),
-            DVec2::new(change[(1, 1)], -change[(0, 1)]),
-        );
-        (g.is_finite() && slope.is_finite()).then_some(Node {
-            x: DVec2::new(carried[2], carried[3]),
-            g,
-            slope,
-            z: *z,
-        })
     }
 
     /// `1` or `-1`: how often `g` turns about the state.

@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3};
 use gripfast::backend::{
     Backend, Batch, Best, Polish, Problem, ScoreOptions, Scored, Seed, SeedSet, SeedStatus,
 };
-use gripfast::contact::Loops;
+use gripfast::contact::{Field, Loops};
 use gripfast::mechanics::{self, Options, slip};
 use gripfast::model::{Contact, Patch, Polygon, Wrench};
 
@@ -141,7 +141,9 @@ fn agrees(found: &[Seed], expected: &[Seed]) -> Result<(), String> {
             && (close(a.upper, b.upper) || (a.upper / b.upper - 1.0).abs() < 0.1);
         let hair = a.status != b.status
             && (a.status == SeedStatus::Unbounded || b.status == SeedStatus::Unbounded);
-        let finite = a.twist.iter().chain([&a.lower, &a.estimate]).all(|x| x.is_finite())
+        let finite = a.twist.is_finite()
+            && a.lower.is_finite()
+            && a.estimate.is_finite()
             && !a.upper.is_nan();
         if !(same || hair) || !finite {
             return Err(format!("load {i}: {a:?} instead of {b:?}"));
@@ -154,7 +156,7 @@ fn agrees(found: &[Seed], expected: &[Seed]) -> Result<(), String> {
 fn the_comparer_sees_one_wrong_number() {
     let right = Seed {
         status: SeedStatus::Bounded,
-        twist: [0.1, 0.2, 3.0],
+        twist: [0.1, 0.2, 3.0].into(),
         lower: 0.5,
         upper: 0.51,
         estimate: 0.5,
@@ -164,7 +166,7 @@ fn the_comparer_sees_one_wrong_number() {
         Seed { lower: 0.5001, ..right },
         Seed { upper: 0.6, ..right },
         Seed { upper: f64::NAN, ..right },
-        Seed { twist: [0.1, f64::NAN, 3.0], ..right },
+        Seed { twist: [0.1, f64::NAN, 3.0].into(), ..right },
         Seed { status: SeedStatus::NoContact, ..right },
     ];
     for wrong in wrong {
@@ -253,14 +255,14 @@ fn seeds_start_the_solver_close(backend: &Backend) {
         let [few, many] = [&set, &dense].map(|set| seed(backend, vec![problem], set));
         let area = Loops::new(&contact.face_i);
         let p = [1.0 / gripfast::contact::moments(&area)[0], 0.0, 0.0];
-        let fields = [slip::Field { area: &area, p }];
+        let fields = [Field { area: &area, p }];
         for (i, wrench) in wrenches.iter().enumerate() {
             let w = nalgebra::Vector3::new(wrench.force.x, wrench.force.y, wrench.moment.z);
             let [from_few, from_many] = [&few, &many].map(|seeds| {
                 slip::solve(
                     &fields,
-                    w,
-                    Some(seeds[i].twist.into()),
+                    w.into(),
+                    Some(seeds[i].twist),
                     gripfast::mechanics::Refiner::Newton,
                 )
             });
@@ -501,7 +503,7 @@ fn degenerate_contacts_and_loads(backend: &Backend) {
         rotation.lower <= mu && mu <= rotation.upper && rotation.upper < 1.0001 * rotation.lower,
         "{rotation:?} {mu}"
     );
-    assert!((rotation.twist[0] / rotation.twist[2]).abs() < 1e-4 * 0.02);
+    assert!((rotation.twist.u1 / rotation.twist.omega).abs() < 1e-4 * 0.02);
 
     let line = vec![Polygon { outer: vec![DVec2::ZERO, DVec2::X, DVec2::X * 0.5], holes: vec![] }];
     for (name, contact) in [
@@ -529,10 +531,7 @@ fn degenerate_contacts_and_loads(backend: &Backend) {
         let contact = congruent(patch);
         let problem = Problem { contact: &contact, ..problem };
         let found = seed(backend, vec![problem], &set);
-        assert!(
-            found.iter().all(|seed| seed.twist.iter().all(|x| x.is_finite())),
-            "{name}: {found:?}"
-        );
+        assert!(found.iter().all(|seed| seed.twist.is_finite()), "{name}: {found:?}");
         assert_bounds(&found, &problem);
     }
     for bad in [f64::NAN, f64::INFINITY] {
@@ -613,7 +612,7 @@ fn same_bytes_twice_and_permuted_answers_for_a_permuted_batch(backend: &Backend)
     let bytes = |seeds: &[Seed]| -> Vec<[u64; 5]> {
         seeds
             .iter()
-            .map(|s| [s.twist[0], s.twist[1], s.twist[2], s.lower, s.upper].map(f64::to_bits))
+            .map(|s| [s.twist.u1, s.twist.u2, s.twist.omega, s.lower, s.upper].map(f64::to_bits))
             .collect()
     };
     assert_eq!(bytes(&first), bytes(&seed(backend, (0..grips.len()).map(problem).collect(), &set)));

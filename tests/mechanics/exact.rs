@@ -4,7 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DVec2, DVec3};
-use gripfast::contact::{Loops, friction, moments};
+use gripfast::contact::{Field, Loops, friction, moments};
 use gripfast::mechanics::{Options, solve};
 use gripfast::model::{Contact, Patch, Polygon, Score, Slip, Status, Wrench};
 
@@ -58,8 +58,8 @@ fn disc(k: f64) -> (f64, f64) {
 
 /// `int |v|` and the force over a regular polygon.
 fn polygonal_disc(n: usize, k: f64) -> (f64, f64) {
-    let g = friction(&Loops::new(&patch(polygon(n, 1.0), vec![])), [0.0, -k, 1.0], [1.0, 0.0, 0.0])
-        .g[0];
+    let area = Loops::new(&patch(polygon(n, 1.0), vec![]));
+    let g = friction(Field { area: &area, p: [1.0, 0.0, 0.0] }, [0.0, -k, 1.0].into()).g[0];
     (g[2] - k * g[1], -g[1])
 }
 
@@ -104,7 +104,8 @@ fn a_disc_that_slides_and_spins_ends_both_at_once() {
 /// Torque over normal force of a pure turn about the middle under uniform pressure.
 fn mean_radius(patch: &Patch) -> f64 {
     let area = Loops::new(patch);
-    friction(&area, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]).g[0][2] / moments(&area)[0]
+    friction(Field { area: &area, p: [1.0, 0.0, 0.0] }, [0.0, 0.0, 1.0].into()).g[0][2]
+        / moments(&area)[0]
 }
 
 #[test]

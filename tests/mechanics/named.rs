@@ -4,7 +4,7 @@
 use crate::brute::cases::Case;
 use crate::brute::{Problem, check};
 use glam::{DVec2, DVec3};
-use gripfast::contact::{Loops, friction, moments};
+use gripfast::contact::{Field, Loops, friction, moments};
 use gripfast::mechanics::{Options, limit_states, solve};
 use gripfast::model::{Contact, Patch, Polygon, Slip, Status, Wrench};
 
@@ -81,7 +81,7 @@ fn three_limit_states_of_one_load() {
 fn posed(patch: &Patch, distance: f64, p: [[f64; 3]; 2], twist: [f64; 3], mu: f64) -> Case {
     let area = Loops::new(patch);
     let m = moments(&area);
-    let taken = p.map(|p| friction(&area, twist, p).gradient(p));
+    let taken = p.map(|p| friction(Field { area: &area, p }, twist.into()).gradient(p));
     let normal = p.map(|p| p[0] * m[0] + p[1] * m[1] + p[2] * m[2]);
     let first = |p: [f64; 3]| {
         DVec2::new(p[0] * m[1] + p[1] * m[3] + p[2] * m[4], p[0] * m[2] + p[1] * m[4] + p[2] * m[5])

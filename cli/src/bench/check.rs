@@ -168,7 +168,7 @@ fn batches(gpu: gripfast::backend::Gpu, start: &Instant, seconds: f64) -> Result
     };
     let bits = |seeds: &[Seed]| -> Vec<[u64; 6]> {
         let numbers = |s: &Seed| {
-            [s.twist[0], s.twist[1], s.twist[2], s.lower, s.upper, s.estimate].map(f64::to_bits)
+            [s.twist.u1, s.twist.u2, s.twist.omega, s.lower, s.upper, s.estimate].map(f64::to_bits)
         };
         seeds.iter().map(numbers).collect()
     };

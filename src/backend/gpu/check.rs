@@ -5,14 +5,15 @@ use std::sync::Arc;
 
 use glam::{DMat2, DVec2, DVec3};
 
+use super::super::job::Job;
 use super::super::layout::{BOUNDED, COUPLED, LEAST_DISSIPATION};
-use super::super::prepare::Prepared;
+use super::super::prepare::{Contacts, Records, not_searched};
 use super::super::seeds::{NEGATED, RING};
 use super::super::table::contact_basis;
-use super::super::{Batch, Job, Problem, SeedStatus, cpu, not_searched};
+use super::super::{Batch, Problem, SeedStatus, cpu};
 use super::{Chunk, ChunkSpans, Failure, Gpu, State, map};
 use crate::backend::{F32_TOLERANCE, SeedSet};
-use crate::contact::{Loops, friction};
+use crate::contact::{Field, Loops, Twist, friction};
 use crate::error::{Error, Result};
 use crate::geometry::polygon::rings_moments;
 use crate::model::{Contact, Patch, Polygon, Wrench};
@@ -105,13 +106,14 @@ struct Exact {
 }
 
 impl Exact {
-    fn new(contact: &Contact, prepared: &Prepared, seeds: &SeedSet) -> Self {
+    fn new(contact: &Contact, prepared: &Records, seeds: &SeedSet) -> Self {
         let loops = [&contact.face_i, &contact.face_ii]
             .map(|patch| Loops::mapped(patch, |point| (point - prepared.origin) / prepared.unit));
         let moments = [0, 1].map(|k: usize| rings_moments(&loops[k].rings().collect::<Vec<_>>()));
         let basis = [0, 1].map(|k: usize| {
             let one = |v: &[f32; 4]| {
-                friction(&loops[k], [v[0], v[1], v[2]].map(f64::from), [1.0, 0.0, 0.0]).g
+                let twist = Twist::from([v[0], v[1], v[2]].map(f64::from));
+                friction(Field { area: &loops[k], p: [1.0, 0.0, 0.0] }, twist).g
             };
             seeds.twists().iter().map(one).collect()
         });
@@ -244,7 +246,8 @@ impl Gpu {
             .map(|(contact, wrenches)| Problem { contact, distance: 0.0, force: 40.0, wrenches })
             .collect();
         let batch = Batch { problems };
-        let job = Job::new(&batch, seeds)?;
+        let made = Contacts::new(&batch.problems)?;
+        let job = Job::new(&made, &batch, seeds)?;
         let mut answers = vec![not_searched(SeedStatus::NoContact); job.loads];
         let (mut basis, mut bounds) = ([Most::default(); 3], [Most::default(); 3]);
         let (mut other_twist, mut other_status, mut loads, mut bounded) = (0, 0, 0, 0);
@@ -254,14 +257,14 @@ impl Gpu {
             let (records, found) = self.records_and_basis(&chunk, seeds)?;
             let twins = cpu::run(&chunk, seeds);
             for (header, (&member, index)) in chunk.contacts.iter().zip(members.iter().zip(0..)) {
-                let Some(prepared) = &job.prepared[member] else { continue };
+                let Some(prepared) = &job.contacts.ready[member].records else { continue };
                 let exact = Exact::new(&grips[member].0, prepared, seeds);
                 let face = |a: u32, b: u32| &chunk.edges[a as usize..b as usize];
                 let edges = [
                     face(header.edges_i, header.edges_ii),
                     face(header.edges_ii, header.edges_end),
                 ];
-                let twin = contact_basis(header, edges, seeds);
+                let twin = contact_basis(header, edges, seeds.twists()).concat();
                 let first = header.basis as usize * 4;
                 for (place, (&twin, &found)) in twin.iter().zip(&found[first..]).enumerate() {
                     let (k, weight, part) = (place / 12 % seeds.len(), place / 4 % 3, place % 4);

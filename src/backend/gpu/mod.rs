@@ -14,7 +14,7 @@ pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, list};
 pub use check::{Deviation, KernelCheck};
 pub use clock::{ChunkSpans, DeviceSpans, Span, Timeline};
 
-use super::Limits;
+use super::job::Limits;
 use super::layout::{ContactHeader, EdgeRecord, GAUSS, GroupRecord, LoadRecord, SeedRecord};
 use super::prepare::Chunk;
 use super::seeds::SeedSet;

@@ -1,7 +1,9 @@
 //! Rust f32 against WGSL, record by record, and the loss of a device.
 
+use super::super::job::Job;
 use super::super::layout::{BOUNDED, UNWRITTEN};
-use super::super::{Backend, Batch, Job, Polish, Problem, ScoreOptions, SeedStatus, cpu};
+use super::super::prepare::{Contacts, not_searched};
+use super::super::{Backend, Batch, Polish, Problem, ScoreOptions, SeedStatus, cpu};
 use super::*;
 use crate::model::{Contact, Patch, Polygon, Wrench};
 use glam::{DVec2, DVec3};
@@ -108,8 +110,9 @@ fn records(
     seeds: &SeedSet,
 ) -> (Vec<SeedRecord>, Vec<SeedRecord>) {
     let batch = Batch { problems };
-    let job = Job::new(&batch, seeds).unwrap();
-    let mut answers = vec![super::super::not_searched(SeedStatus::NoContact); job.loads];
+    let contacts = Contacts::new(&batch.problems).unwrap();
+    let job = Job::new(&contacts, &batch, seeds).unwrap();
+    let mut answers = vec![not_searched(SeedStatus::NoContact); job.loads];
     let mut chunks: Vec<Chunk> =
         job.plans(gpu.limits(), &mut answers).iter_mut().map(|plan| job.build(plan)).collect();
     let expected = chunks.iter().flat_map(|chunk| cpu::run(chunk, seeds)).collect();
@@ -281,9 +284,10 @@ fn a_record_that_was_not_written_is_an_error() {
             wrenches: &wrenches,
         }],
     };
-    let job = Job::new(&batch, &set).unwrap();
+    let contacts = Contacts::new(&batch.problems).unwrap();
+    let job = Job::new(&contacts, &batch, &set).unwrap();
     let run = |forget: bool| {
-        let mut answers = vec![super::super::not_searched(SeedStatus::NoContact); job.loads];
+        let mut answers = vec![not_searched(SeedStatus::NoContact); job.loads];
         let mut plans = job.plans(gpu.limits(), &mut answers).into_iter();
         let next = || {
             plans.next().map(|mut plan| {
@@ -396,9 +400,9 @@ fn exact_answers_overlap_the_kernels_of_the_next_block() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
     gpu.start_clock().unwrap();
     pool.install(|| {
-        backend.by_blocks(3000, &batch, &set, |block, seeds| {
-            order.push(block);
-            assert_eq!(seeds, expected);
+        backend.by_blocks(3000, &batch, &set, |block| {
+            order.push(block.range);
+            assert_eq!(block.seeds, expected);
             std::thread::sleep(std::time::Duration::from_millis(200));
             Vec::new()
         })

@@ -1,7 +1,7 @@
 //! The seven equations (3)-(9) of an answer in SI, put together anew.
 
 use glam::DVec2;
-use gripfast::contact::friction;
+use gripfast::contact::{Field, friction};
 use gripfast::model::{Score, Slip};
 
 use super::cases::Case;
@@ -56,7 +56,9 @@ pub(crate) fn check(case: &Case, score: &Score) -> Option<Check> {
         rounding += f64::EPSILON * reach * area * lever / case.force;
         if twist != [0.0; 3] {
             // Force -mu p t on the body, moment about the origin.
-            friction_on_body[k] = friction(&loops(&contact), twist, p).gradient(p).map(|g| -mu * g);
+            friction_on_body[k] = friction(Field { area: &loops(&contact), p }, twist.into())
+                .gradient(p)
+                .map(|g| -mu * g);
         }
     }
     let (f, m, d) = (case.wrench.force, case.wrench.moment, case.distance);

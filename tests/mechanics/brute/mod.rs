@@ -15,7 +15,7 @@ mod equations;
 mod precise;
 
 use glam::DVec2;
-use gripfast::contact::{Loops, friction};
+use gripfast::contact::{Field, Loops, friction};
 use gripfast::model::{Patch, Polygon};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
@@ -184,8 +184,9 @@ impl Problem {
         let p = planes(&q);
         let pressed = [0, 1].map(|k| loops(&pressed(&self.areas[k], p[k])));
         let v = self.slip(&pressed, &p, near.map(|near| near.v))?;
-        let [one, two] =
-            [0, 1].map(|k| Vector3::from(friction(&pressed[k], v.into(), p[k]).gradient(p[k])));
+        let [one, two] = [0, 1].map(|k| {
+            Vector3::from(friction(Field { area: &pressed[k], p: p[k] }, v.into()).gradient(p[k]))
+        });
         let mu = self.load.dot(&v) / (one + two).dot(&v);
         let difference = self.half_distance * mu * (one - two);
         let g = x - self.uncoupled - DVec2::new(difference.x, difference.y);
@@ -263,7 +264,7 @@ impl Problem {
         let at = |v: &Vector3<f64>| {
             let (mut g, mut h) = (Vector3::zeros(), Matrix3::zeros());
             for k in 0..2 {
-                let f = friction(&areas[k], (*v).into(), p[k]);
+                let f = friction(Field { area: &areas[k], p: p[k] }, (*v).into());
                 g += Vector3::from(f.gradient(p[k]));
                 h += Matrix3::from_fn(|i, j| f.hessian[i][j]);
             }

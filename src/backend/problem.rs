@@ -1,0 +1,98 @@
+//! What the bulk scorer is asked and what its seed stage answers.
+
+use std::sync::Arc;
+
+use crate::contact::Twist;
+use crate::error::{Error, Result};
+use crate::model::{Contact, LARGEST_LENGTH, Wrench};
+
+/// Relative widening of both bounds: ten times the largest error of the 32-bit kernels seen in
+/// tests (processor and software Vulkan; Vulkan allows a logarithm 5e-7 off).
+pub const F32_TOLERANCE: f64 = 2e-5;
+
+/// One grip: its contact and the loads on it.
+#[derive(Debug, Clone, Copy)]
+pub struct Problem<'a> {
+    /// Contact areas in the grip frame. Problems that share the `Arc` share the work that depends
+    /// on it alone.
+    pub contact: &'a Arc<Contact>,
+    /// Height of face I over face II [m], the `d` of the mechanics: negative for grips from inside
+    /// ([`crate::model::Grip::distance`]).
+    pub distance: f64,
+    /// Gripping force [N].
+    pub force: f64,
+    /// Wrenches on the body in the grip frame, moments about its origin.
+    pub wrenches: &'a [Wrench],
+}
+
+/// Grips to seed in one call.
+#[derive(Debug, Clone, Default)]
+pub struct Batch<'a> {
+    /// In the order of the answers.
+    pub problems: Vec<Problem<'a>>,
+}
+
+/// What kind of seed a load got.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum SeedStatus {
+    /// Congruent faces in full contact: a twist and bounds on `mu_s`, which depends on the in-plane
+    /// load alone.
+    Bounded,
+    /// Different faces in full contact: a twist, and bounds on `mu_s` that allow for all that the
+    /// friction coupling can do.
+    Coupled,
+    /// A twist; no bounds.
+    Unbounded,
+    /// No force in the pad plane and no moment about the closing axis.
+    NoLoad,
+    /// A contact area is empty.
+    NoContact,
+    /// `|F3| >= 2 Fn`.
+    NoNormalForce,
+}
+
+/// Where to start solving for one load, and what is known of the answer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seed {
+    /// What kind of seed this is.
+    pub status: SeedStatus,
+    /// Twist of the body about the grip origin, in the sense that the load drives: [m/s, m/s,
+    /// rad/s] up to a positive factor. Zero where nothing was searched.
+    pub twist: Twist,
+    /// `mu_s` is at least this (0 without bounds).
+    pub lower: f64,
+    /// `mu_s` is at most this (infinite without bounds).
+    pub upper: f64,
+    /// `mu_s` is about this: the best twist's value for the pressure without friction coupling,
+    /// shortened to full contact. Not a bound; zero where nothing was searched.
+    pub estimate: f64,
+}
+
+/// Refuses numbers that are not finite.
+pub(crate) fn check(problem: &Problem<'_>, index: usize) -> Result<()> {
+    let place = || format!("grip {index}");
+    if !(problem.force.is_finite() && problem.force > 0.0) {
+        return Err(Error::input(
+            place(),
+            format!("gripping force {} N", problem.force),
+            "give a positive force",
+        ));
+    }
+    if problem.distance.is_nan() || problem.distance.abs() > LARGEST_LENGTH {
+        return Err(Error::input(
+            place(),
+            format!("distance between the faces {} m", problem.distance),
+            "give a distance of at most 1e9 m",
+        ));
+    }
+    for (load, wrench) in problem.wrenches.iter().enumerate() {
+        if !(wrench.force.is_finite() && wrench.moment.is_finite()) {
+            return Err(Error::input(
+                place(),
+                format!("load {load} is not finite: {wrench:?}"),
+                "give finite forces and moments",
+            ));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,184 @@
+//! The limit state on the branch that starts without coupling, at `d = 0`.
+
+use glam::{DMat2, DVec2};
+
+use super::equilibrium::{Node, Solver, State, Vector7, unknowns};
+use super::pads::Load;
+use super::pressure::{self, face_pressure, separates};
+use super::slip;
+use crate::contact::{Field, Twist};
+use crate::request::Refiner;
+
+/// Strength of the coupling, `mu |d| / sqrt(A)`, above which other solutions are looked for. Below
+/// it none was ever seen (0 of 1408 random cases with different areas on the two faces); at 1-2
+/// they are 0.65 % of such cases, at 4-8 23 %.
+pub const COUPLING_SEARCH: f64 = 1.0;
+
+/// Whether there may be other limit states than this one.
+pub(super) fn strong(state: &State, load: &Load) -> bool {
+    state.mu_over_size * load.size * 2.0 * load.half_distance.abs() > COUPLING_SEARCH
+}
+
+impl Solver<'_> {
+    /// Newton's method on all seven equations from the pressure `q` without coupling and a rough
+    /// slip under it. Only for a coupling so weak that there is one solution: whichever way it was
+    /// reached, it is the one on the branch from `d = 0`.
+    fn direct(&mut self, q: [f64; 4], seed: Option<Twist>) -> Option<State> {
+        let p = [face_pressure(&q, 0), face_pressure(&q, 1)];
+        let parted = [0, 1].map(|k| separates(&self.pads.areas[k], p[k]));
+        let w = self.load.direction;
+        let v = if self.pads.congruent && parted == [false; 2] {
+            // The summed pressure is constant: the slip does not depend on the rest.
+            let level = [p[0][0] + p[1][0], 0.0, 0.0];
+            let slip = slip::solve(
+                &[Field { area: &self.pads.areas[0], p: level }],
+                w,
+                seed,
+                Refiner::Newton,
+            );
+            self.evaluations += slip.evaluations;
+            self.iterations += slip.iterations;
+            slip.twist
+        } else {
+            let fields = slip::pressed_fields(self.pads, &q, &mut self.scratch);
+            self.evaluations += 1;
+            slip::approach(&fields, w, seed)
+        };
+        let state = self.newton(unknowns(v, q), 1.0, 12)?;
+        (!strong(&state, &self.load)).then_some(state)
+    }
+
+    /// The solution on the branch that starts at `d = 0` without coupling; `None` when that branch
+    /// does not exist, or ends before the real `d`.
+    pub fn branch(&mut self, seed: Option<Twist>) -> Option<State> {
+        if self.refiner == Refiner::Newton {
+            // None at the rim, where [`Solver::state_at`] knows the way.
+            let q = pressure::solve(
+                self.pads,
+                self.load.normal,
+                self.load.contact_moment(),
+                None,
+                &mut self.scratch[0],
+            );
+            if let Some(state) = q.and_then(|q| self.direct(q, seed)) {
+                return Some(state);
+            }
+        }
+        let start = self.state_at(self.load.contact_moment(), seed)?;
+        if self.refiner == Refiner::Newton {
+            return self.follow(start);
+        }
+        let direct = self.conjugate(start).filter(|state| !strong(state, &self.load));
+        direct.or_else(|| {
+            let followed = self.follow(start)?;
+            Some(self.conjugate(followed.z).unwrap_or(followed))
+        })
+    }
+
+    /// The solution close to `z`, that of another load, by Newton's method from there; where the
+    /// coupling is so strong that there may be others, only a short way off and on the same side of
+    /// any turning point.
+    pub(super) fn next_to(&mut self, z: &Vector7) -> Option<State> {
+        let found = self.newton(*z, 1.0, 6)?;
+        if strong(&found, &self.load) {
+            let to = self.node(&found.z)?;
+            let q = [z[3], z[4], z[5], z[6]];
+            let x = pressure::carried(
+                &pressure::pressed_moments(self.pads, &q, &mut self.scratch[0]),
+                &q,
+            );
+            if to.x.distance(x) > FOLLOW_STEP / 2.0 || to.slope.determinant() <= 0.0 {
+                return None;
+            }
+        }
+        Some(found)
+    }
+
+    /// Follows the branch from coupling 0 to 1, in the plane of contact moments where even the last
+    /// of a contact has room: along its tangent, then Newton's method, in steps short enough that
+    /// each ends close to where the tangent led. `None` where the branch turns back or ends.
+    pub fn follow(&mut self, start: Vector7) -> Option<State> {
+        let mut at = self.newton(start, 0.0, 25)?;
+        let (mut reached, mut step) = (if self.load.half_distance == 0.0 { 1.0 } else { 0.0 }, 1.0);
+        for _ in 0..FOLLOW_MOST {
+            if reached == 1.0 {
+                return Some(at);
+            }
+            let here = self.node(&at.z)?;
+            // `g` is linear in the coupling, `x - x_0` without it.
+            let friction = here.g - (here.x - self.load.contact_moment());
+            let slope = Self::slope_at(&here, reached);
+            let tangent = -(slope.inverse() * friction);
+            let room = pressure::reach(self.pads, self.load.normal, here.x);
+            loop {
+                let next = f64::min(1.0, reached + step);
+                let moved = (next - reached) * tangent;
+                let left = pressure::reach(self.pads, self.load.normal, here.x + moved);
+                let short = moved.length() <= FOLLOW_STEP && left >= FOLLOW_SHARE * room;
+                let found = if short { self.onwards(&at, here.x + moved, next) } else { None };
+                let close = |node: &Node| {
+                    (node.x - here.x - moved).length() <= (0.3 * moved.length()).max(FOLLOW_KINK)
+                };
+                match found {
+                    Some((found, node))
+                        if close(&node) && Self::slope_at(&node, next).determinant() > 0.0 =>
+                    {
+                        (at, reached) = (found, next);
+                        step *= 2.0;
+                        break;
+                    }
+                    _ => step /= 2.0,
+                }
+                if step < FOLLOW_LEAST {
+                    return None;
+                }
+            }
+        }
+        None
+    }
+
+    /// The solution at a coupling near the contact moment `x`, found from the solution `at`, and
+    /// its point of the map: Newton's method on the map until what is left is small beside the room
+    /// there, then on all seven equations.
+    fn onwards(&mut self, at: &State, mut x: DVec2, coupling: f64) -> Option<(State, Node)> {
+        let (mut z, mut before) = (at.z, f64::INFINITY);
+        loop {
+            z = self.state_near(x, Some(&z))?;
+            let node = self.node(&z)?;
+            let left = coupling * node.g + (1.0 - coupling) * (node.x - self.load.contact_moment());
+            let (size, room) = (left.length(), pressure::reach(self.pads, self.load.normal, x));
+            if size <= FOLLOW_CLOSE * room
+                && let Some(found) = self.newton(z, coupling, 8)
+            {
+                let node = self.node(&found.z)?;
+                return Some((found, node));
+            }
+            let step = Self::slope_at(&node, coupling).inverse() * left;
+            if size > 0.5 * before || size == 0.0 || !step.is_finite() {
+                return None;
+            }
+            (x, before) = (x - step, size);
+        }
+    }
+
+    /// Derivative of `g` at a coupling. Its determinant is positive where the branch starts and
+    /// changes its sign at a turning point; another limit state that a long step has led to most
+    /// often has the other sign, too.
+    fn slope_at(node: &Node, coupling: f64) -> DMat2 {
+        DMat2::IDENTITY + coupling * (node.slope - DMat2::IDENTITY)
+    }
+}
+
+/// Longest step of [`Solver::follow`] in contact moment, of force times the pads' length.
+const FOLLOW_STEP: f64 = 0.25;
+/// Shortest step in coupling, and most steps.
+const FOLLOW_LEAST: f64 = 1e-9;
+const FOLLOW_MOST: usize = 1000;
+/// Share that a step leaves of the way to the region's rim, where no contact is left.
+const FOLLOW_SHARE: f64 = 0.25;
+/// What [`Solver::follow`] leaves to Newton's method on all equations, as a share of the way to the
+/// rim.
+const FOLLOW_CLOSE: f64 = 1e-3;
+/// How far from the tangent's end a step may lead, however short it is: where a pad begins to
+/// separate the branch turns sharply.
+const FOLLOW_KINK: f64 = 1e-3;
