@@ -1,4 +1,4 @@
-//! `gripfast figures`: the paper's figures, computed anew.
+//! `gripfast figures`: the paper's figures, computed again.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -9,8 +9,8 @@ use clap::Args as ClapArgs;
 use gripfast::error::Error;
 use gripfast::{file, lab};
 
-/// Draws the figures of the paper behind the mechanics, computed anew, as SVG with their numbers as
-/// CSV.
+/// Draws the figures of the paper on which the mechanics is based, computed again, as SVG with their
+/// numbers as CSV.
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "EXAMPLES:\n  gripfast figures\n  gripfast figures -o docs/figures\n\n\
 figure4    the line of separation turns with the moment about the closing axis\n\

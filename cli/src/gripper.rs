@@ -128,10 +128,7 @@ fn describe(gripper: &Gripper) -> String {
         }
     }
     if let Some(frame) = gripper.grip_from_flange {
-        row(
-            "flange".into(),
-            format!("{} mm behind the pads' middle", short_number(-frame.origin.x * 1e3)),
-        );
+        row("flange".into(), place_text(frame.origin.to_array()));
     }
     let throat = check::throat(gripper).map_or(String::new(), |throat| {
         format!("\nthroat (pad's rear edge to palm): {} mm", short_number(throat * 1e3))
@@ -139,6 +136,18 @@ fn describe(gripper: &Gripper) -> String {
     let warnings: Vec<String> =
         gripper::check(gripper).iter().map(|warning| format!("\nwarning: {warning}")).collect();
     format!("{}\n{table}{throat}{}", shown(&gripper.name), warnings.concat())
+}
+
+/// Where the origin of a frame lies, with its offsets to the side.
+fn place_text([behind, across, closing]: [f64; 3]) -> String {
+    let mut text = format!("{} mm behind the pads' middle", short_number(-behind * 1e3));
+    for (axis, offset) in [("x2", across), ("x3", closing)] {
+        let offset = short_number(offset * 1e3);
+        if offset != "0" {
+            text += &format!(", {offset} mm along {axis}");
+        }
+    }
+    text
 }
 
 fn body_text(body: &Body) -> String {

@@ -36,8 +36,8 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-/// Finds and ranks every two-finger grip on a CAD part by the smallest friction coefficient that
-/// holds it.
+/// Finds and ranks every two-finger grip (grasp) on a CAD part by the smallest friction coefficient
+/// that holds it.
 #[derive(Debug, Parser)]
 #[command(name = "gripfast", version, about, propagate_version = true, args_override_self = true)]
 #[command(

@@ -54,6 +54,20 @@ fn show_gives_a_file_that_checks() {
 }
 
 #[test]
+fn check_says_that_the_flange_lies_to_the_side() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mine.toml");
+    let text = gripfast::gripper::catalogue::text("generic").unwrap();
+    let [before, after] = [r#"["-132mm", "0mm", "0mm"]"#, r#"["-132mm", "60mm", "-2.5mm"]"#];
+    assert!(text.contains(before), "{text}");
+    std::fs::write(&path, text.replace(before, after)).unwrap();
+    let (code, out, error) = gripfast(&["gripper", "check", path.to_str().unwrap()]);
+    assert_eq!(code, 0, "{error}");
+    let place = "132 mm behind the pads' middle, 60 mm along x2, -2.5 mm along x3";
+    assert!(out.contains(place), "{out}");
+}
+
+#[test]
 fn bad_files_are_refused_with_place_and_remedy() {
     let good = gripfast::gripper::catalogue::text("generic").unwrap();
     let cases: &[(&str, &str, &str)] = &[

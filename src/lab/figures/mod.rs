@@ -1,6 +1,6 @@
-//! The paper's figures, computed anew: each a drawing and a table.
+//! The paper's figures, computed again: each a drawing and a table.
 //!
-//! [`all`] runs the studies; what of the paper they confirm is told in `docs/figures.md`.
+//! [`all`] runs the studies; `docs/figures.md` says what of the paper they confirm.
 
 mod draw;
 pub mod shapes;

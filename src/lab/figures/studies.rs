@@ -1,5 +1,5 @@
 //! The numbers behind the figures: each study of the paper's section 5 and its figure 4, computed
-//! anew.
+//! again.
 
 use glam::{DVec2, DVec3};
 
