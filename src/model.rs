@@ -93,6 +93,15 @@ pub struct Wrench {
     pub moment: DVec3,
 }
 
+/// One load of a run: an external wrench on the body about the centre of mass.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LoadCase {
+    /// What it is, e.g. `gravity -z`.
+    pub name: String,
+    /// Force and moment in the part frame, moment about the centre of mass.
+    pub wrench: Wrench,
+}
+
 /// Pressure planes of equations (1)(2): `p_I = a_i0 + a1 x1 + a2 x2`, `p_II = a_ii0 - a1 x1 - a2
 /// x2`, both `max(0, .)` where a pad separates (19)(20).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]

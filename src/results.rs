@@ -17,6 +17,8 @@ use crate::part::MassProperties;
 use crate::request::Request;
 use crate::units::{Force, Length};
 
+pub use crate::model::LoadCase;
+
 /// Marks a native result file.
 pub const FORMAT: &str = "gripfast-grips";
 /// Version of the layout of [`GripSet`].
@@ -110,15 +112,6 @@ pub struct PartSummary {
     pub bbox_max: DVec3,
     /// Mass, centre of mass, inertia.
     pub mass: MassProperties,
-}
-
-/// One load: an external wrench on the body about the centre of mass.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LoadCase {
-    /// What it is, e.g. `gravity -z`.
-    pub name: String,
-    /// Force and moment in the part frame, moment about the centre of mass.
-    pub wrench: Wrench,
 }
 
 /// Counts of a run.

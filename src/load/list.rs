@@ -5,9 +5,8 @@ use serde::Deserialize;
 
 use super::table::{Axes, Table};
 use crate::error::{Error, Result};
-use crate::model::{Frame, Wrench};
+use crate::model::{Frame, LoadCase, Wrench};
 use crate::part::MassProperties;
-use crate::results::LoadCase;
 use crate::units::Quantity;
 
 const FORCE: [&str; 3] = ["fx", "fy", "fz"];

@@ -16,9 +16,8 @@ use glam::{DMat3, DVec3};
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::geometry::sphere;
-use crate::model::{Frame, Wrench};
+use crate::model::{Frame, LoadCase, Wrench};
 use crate::part::MassProperties;
-use crate::results::LoadCase;
 use crate::units::STANDARD_GRAVITY;
 
 /// Largest number of load cases of one run; load indices are 32-bit and memory is finite.

@@ -11,9 +11,8 @@ use super::list::finite;
 use super::table::{Axes, Table};
 use super::{checked_mass, inertial_wrench};
 use crate::error::{Error, Result};
-use crate::model::Frame;
+use crate::model::{Frame, LoadCase};
 use crate::part::MassProperties;
-use crate::results::LoadCase;
 
 /// Rows that a derivative is taken from; fewer at hand, fewer used.
 const WINDOW: usize = 5;
