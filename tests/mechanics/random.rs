@@ -237,7 +237,7 @@ fn ten_thousand_random_cases() {
 }
 
 #[test]
-#[ignore = "a quarter of an hour on one core: a million cases by hand, GRIPFAST_CASES=1000000 cargo test --release --test mechanics_random -- --ignored"]
+#[ignore = "a quarter of an hour on one core: a million cases by hand, GRIPFAST_CASES=1000000 cargo test --release -p gripfast --test mechanics random -- --ignored"]
 fn many_random_cases() {
     let number = |name: &str, default: u64| {
         std::env::var(name).map_or(default, |text| text.parse().unwrap())

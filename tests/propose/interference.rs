@@ -320,7 +320,7 @@ fn no_false_accept_and_no_false_rejection() {
     );
 }
 
-/// `cargo test --test propose_interference -- --ignored --nocapture`
+/// `cargo test -p gripfast --test propose interference -- --ignored --nocapture`
 #[test]
 #[ignore = "takes minutes; run by hand"]
 fn no_false_accept_in_a_large_run() {

@@ -252,7 +252,7 @@ fn a_plate_of_320_thousand_triangles_gives_the_same_grips() {
     assert_same_grips(&plate, &fine);
 }
 
-/// `cargo test --test propose_parts -- --ignored --nocapture`
+/// `cargo test -p gripfast --test propose parts -- --ignored --nocapture`
 #[test]
 #[ignore = "1.3 million triangles; run by hand"]
 fn a_plate_of_a_million_triangles_gives_the_same_grips() {

@@ -275,7 +275,7 @@ fn pages_show_what_the_program_prints() {
     }
     assert!(
         write || wrong.is_empty(),
-        "{}\n\nGRIPFAST_DOCS=write cargo test --test docs_commands  rewrites the pages",
+        "{}\n\nGRIPFAST_DOCS=write cargo test -p gripfast-cli --test program docs_commands  rewrites the pages",
         wrong.join("\n\n")
     );
 }
