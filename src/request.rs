@@ -2,8 +2,8 @@
 //! share.
 //!
 //! A [`Request`] has one field for each flag of `gripfast plan`, of the same name, and its defaults
-//! stand here and nowhere else. Quantities are texts with a unit in TOML and JSON (`"2mm"`) and read
-//! back bit for bit; a number without a unit is refused. Nothing is computed here:
+//! stand here and nowhere else. Quantities are texts with a unit in TOML and JSON (`"2mm"`) and
+//! read back bit for bit; a number without a unit is refused. Nothing is computed here:
 //! [`crate::plan::Plan`] runs a request.
 //!
 //! ```
