@@ -127,12 +127,18 @@ fn compare_puts_the_earlier_method_beside_every_grip() {
         assert_eq!(earlier(a).place, better + (same + 1.0) / 2.0, "{}", a.grip.id);
     }
     // Pearson's correlation of the places, those by score counted out as well.
+    // Scores tie neighbour by neighbour, as in the ranking.
+    let mut scores: Vec<f64> = set.grips.iter().map(|a| a.score.unwrap()).collect();
+    scores.sort_by(|a, b| b.total_cmp(a));
     let by_score = |a: &RankedGrip| {
-        let near = |b: &&RankedGrip| {
-            (a.score.unwrap() - b.score.unwrap()).abs() <= 1e-9 * a.score.unwrap()
-        };
-        let better = set.grips.iter().filter(|b| b.score > a.score && !near(b)).count() as f64;
-        better + (set.grips.iter().filter(near).count() as f64 + 1.0) / 2.0
+        let mut better = 0;
+        for run in scores.chunk_by(|a, b| a - b <= 1e-9 * a) {
+            if run.contains(&a.score.unwrap()) {
+                return better as f64 + (run.len() as f64 + 1.0) / 2.0;
+            }
+            better += run.len();
+        }
+        panic!("a score that no grip has");
     };
     let pairs: Vec<(f64, f64)> =
         set.grips.iter().map(|a| (by_score(a), earlier(a).place)).collect();
