@@ -7,7 +7,7 @@ use gripfast::request::Scoring;
 #[derive(Debug, ClapArgs)]
 pub(crate) struct BackendArgs {
     /// Where slip twists are searched: auto, cpu or gpu. gpu without a graphics processor is an
-    /// error; the answers are the same.
+    /// error; the answers agree to 1e-9, in the same order.
     #[arg(long, default_value = "auto", value_name = "auto|cpu|gpu")]
     pub(crate) backend: Choice,
     /// Graphics adapter, by its number or part of its name as `gripfast devices` lists them

@@ -299,14 +299,14 @@ pub fn check(format: Format) -> Result<()> {
             ErrorKind::Unsupported,
             "format parquet",
             "this build has no Parquet",
-            "use a released binary or build with the feature `parquet`; csv holds the same columns",
+            "build with `cargo build --release --features full`; csv holds the same columns",
         )),
         Format::Acronym if !cfg!(feature = "hdf5") => Err(Error::new(
             ErrorKind::Unsupported,
             "format acronym",
             "this build has no HDF5",
-            "use a released binary or build with the feature `hdf5`; graspgen holds the same poses \
-             as JSON",
+            "build with `cargo build --release --features full`; graspgen holds the same poses as \
+             JSON",
         )),
         _ => Ok(()),
     }

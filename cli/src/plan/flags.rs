@@ -38,7 +38,7 @@ pub(crate) struct Args {
     /// Density of the part's material, e.g. 2700kg/m3.
     #[arg(long)]
     density: Option<Density>,
-    /// Gripping force, e.g. 80N [default: the gripper's largest].
+    /// Gripping force of one jaw, e.g. 80N [default: the gripper's largest].
     #[arg(long)]
     force: Option<Force>,
     /// Unit of the part file's numbers [default: the file's own, else mm].
@@ -139,7 +139,7 @@ struct CandidateArgs {
 #[derive(Debug, ClapArgs)]
 struct ScoringArgs {
     /// Where slip twists are searched: auto, cpu or gpu. gpu without a graphics processor is an
-    /// error; the answers are the same.
+    /// error; the answers agree to 1e-9, in the same order.
     #[arg(long, value_parser = words!(Choice), value_name = "auto|cpu|gpu", hide_possible_values = true)]
     backend: Option<Choice>,
     /// Graphics adapter, by its number or part of its name as `gripfast devices` lists them

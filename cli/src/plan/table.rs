@@ -40,7 +40,7 @@ pub(super) fn print(
     if let Some(friction) = set.provenance.resolved.pad_friction {
         writeln!(
             out,
-            "Pads with a friction of {friction}: gripping force needed for the worst load, and how far all of that load may grow (multiple)."
+            "Pads with a friction of {friction}: gripping force needed for the worst load, and the factor by which all of that load can grow (multiple)."
         )?;
     }
     writeln!(out, "Position of the grip's middle in the part frame.")?;
