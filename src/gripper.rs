@@ -6,6 +6,7 @@ pub mod check;
 pub mod drawing;
 pub mod file;
 mod mesh;
+mod travel;
 
 use std::collections::BTreeMap;
 
@@ -17,6 +18,7 @@ use crate::model::{Frame, Grip, Ring};
 pub use catalogue::find;
 pub use check::check;
 pub use file::{parse, read};
+pub use travel::{Travel, TravelRow};
 
 /// A two-finger gripper in SI units, in the grip frame (x1 approach, x3 closing; origin midway
 /// between the pads).
@@ -45,12 +47,17 @@ pub struct Gripper {
     /// pad face lies at `x3 = 0` and the body at `x3 >= 0`. The other finger's bodies are these
     /// turned by 180 degrees about `x1`.
     pub fingers: Vec<Body>,
-    /// Bodies fixed to the palm.
+    /// How the pads move along the approach while the jaws move.
+    #[serde(default)]
+    pub travel: Travel,
+    /// Bodies fixed to the palm, placed for pads touching at zero width; [`Gripper::palm_at`]
+    /// gives those of a grip.
     pub palm: Vec<Body>,
-    /// Flange frame (robot mounting) in the grip frame, where stated.
+    /// Flange frame (robot mounting) in the grip frame with the pads touching, where stated; that
+    /// of a grip is [`Gripper::palm_place`] of it.
     pub grip_from_flange: Option<Frame>,
     /// Tool frame in the grip frame, where it is not the usual one (z approach, y closing, origin
-    /// between the pads).
+    /// between the pads); fixed to the palm as the flange is.
     #[serde(default)]
     pub grip_from_tool: Option<Frame>,
     /// Where each dimension comes from, by its name in the file, e.g. `pad.friction` or
@@ -222,6 +229,26 @@ impl Gripper {
     pub fn finger(&self, jaw: Jaw, width: f64) -> Vec<Body> {
         let map = jaw.at(width / 2.0);
         self.fingers.iter().map(|body| body.moved(&map)).collect()
+    }
+
+    /// Where the palm, and what is fixed to it, stands in the grip frame with the pads `gap` apart
+    /// [m], seen from where the gripper file places it.
+    pub fn palm_place(&self, gap: f64) -> Frame {
+        Frame { rotation: DMat3::IDENTITY, origin: DVec3::NEG_X * self.travel.advance(gap) }
+    }
+
+    /// The bodies of the palm in the grip frame with the pads `gap` apart [m].
+    pub fn palm_at(&self, gap: f64) -> Vec<Body> {
+        let place = self.palm_place(gap);
+        self.palm.iter().map(|body| body.moved(&place)).collect()
+    }
+
+    /// A jaw's frame in the frame of a grip with the pads `gap` apart [m], with its own pad at
+    /// `offset` from the middle plane [m]: before it has closed, say.
+    pub fn jaw_at(&self, jaw: Jaw, gap: f64, offset: f64) -> Frame {
+        let mut place = jaw.at(offset);
+        place.origin.x = self.travel.advance(2.0 * offset) - self.travel.advance(gap);
+        place
     }
 
     /// Distance of the pads in a grip [m]: the faces' own, or less by the fingers where these

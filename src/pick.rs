@@ -211,7 +211,9 @@ impl<'a> Picker<'a> {
             }
         }
         if let Some(reach) = &self.scene.reach {
-            let flange = self.gripper.grip_from_flange.map_or(DVec3::ZERO, |flange| flange.origin);
+            let place = self.gripper.palm_place(self.gripper.jaw_gap(&self.set.grips[index].grip));
+            let flange = self.gripper.grip_from_flange;
+            let flange = flange.map_or(DVec3::ZERO, |flange| place.point(flange.origin));
             let distance = world_from_grip.point(flange).distance(reach.base);
             if !(reach.least..=reach.most).contains(&distance) {
                 return Some(Reason::Reach(distance));

@@ -218,6 +218,9 @@ impl Plan {
             resume: self.request.output.resume,
         };
         let found = search.run(&mut proposer, observer, stop)?;
+        for remark in proposer.tally().remarks(&self.gripper, &self.propose) {
+            observer.note(&remark);
+        }
         let (complete, checkpoint) = (found.complete, found.checkpoint.clone());
         let (set, shown) = self.finish(&proposer, &assessor, found)?;
         self.write(&set)?;

@@ -60,7 +60,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let chosen = pick.chosen.map(|index| &set.grips[index]);
     let pose = chosen.map(|grip| {
-        scene.world_from_part.compose(&grip.grip.part_from_grip).compose(&grip_from_tool)
+        let tool = match origin {
+            Origin::Stated(_) => {
+                let gap = picker.gripper().jaw_gap(&grip.grip);
+                picker.gripper().palm_place(gap).compose(&grip_from_tool)
+            }
+            _ => grip_from_tool,
+        };
+        scene.world_from_part.compose(&grip.grip.part_from_grip).compose(&tool)
     });
     let tool_frame = format!("{}, origin {origin}", convention.axes());
     let mut out = std::io::stdout().lock();

@@ -64,41 +64,46 @@ impl Volumes {
     /// Fingers, then palm, phase by phase.
     pub(crate) fn new(gripper: &Gripper, course: &Course) -> Self {
         let grown = DVec3::splat(course.clearance);
+        let palm = gripper.palm_at(course.gap);
         let mut list = Vec::new();
-        let mut add = |phase, body: usize, placed: Body, jaw, path| {
+        let mut add = |phase, body: usize, placed: Body, jaw, path, grown| {
             let sweep = Sweep::grown(placed, jaw, phase, path, grown);
             let bounds = [sweep.low.as_vec3a(), sweep.high.as_vec3a()];
             list.push(Volume { body, sweep, bounds });
         };
-        let mut fingers = |phase, offset: f64, path: &dyn Fn(DVec3) -> DVec3| {
-            for jaw in Jaw::BOTH {
-                let place = jaw.at(offset);
-                for (index, body) in gripper.fingers.iter().enumerate() {
-                    add(phase, index, body.moved(&place), jaw.name(), path(DVec3::Z * jaw.side()));
+        let back = DVec3::NEG_X * course.approach;
+        let (closed, opened) = (course.gap / 2.0, course.gap / 2.0 + course.opening);
+        let bulge = gripper.travel.bulge(2.0 * closed, 2.0 * opened);
+        for jaw in Jaw::BOTH {
+            let [at_grip, away] =
+                [closed, opened].map(|offset| gripper.jaw_at(jaw, course.gap, offset));
+            let closing = away.origin - at_grip.origin;
+            for (index, body) in gripper.fingers.iter().enumerate() {
+                let mut finger = |phase, place: &Frame, path, grown| {
+                    add(phase, index, body.moved(place), jaw.name(), path, grown);
+                };
+                finger(Phase::Grip, &at_grip, closing, grown + DVec3::X * bulge);
+                finger(Phase::Approach, &away, back, grown);
+                if course.retreat != DVec3::ZERO {
+                    finger(Phase::Retreat, &at_grip, course.retreat, grown);
                 }
             }
-        };
-        let back = DVec3::NEG_X * course.approach;
-        fingers(Phase::Grip, course.gap / 2.0, &|outwards| outwards * course.opening);
-        fingers(Phase::Approach, course.gap / 2.0 + course.opening, &|_| back);
-        if course.retreat != DVec3::ZERO {
-            fingers(Phase::Retreat, course.gap / 2.0, &|_| course.retreat);
         }
         // Straight back the palm passes where it came from.
         let known = course.retreat.y == 0.0
             && course.retreat.z == 0.0
             && course.retreat.x <= 0.0
             && -course.retreat.x <= course.approach;
-        for (index, body) in gripper.palm.iter().enumerate() {
-            add(Phase::Approach, index, body.clone(), "", back);
+        for (index, body) in palm.iter().enumerate() {
+            add(Phase::Approach, index, body.clone(), "", back, grown);
             if !known {
-                add(Phase::Retreat, index, body.clone(), "", course.retreat);
+                add(Phase::Retreat, index, body.clone(), "", course.retreat, grown);
             }
         }
         // The palm's place in the grip is a part of its approach; it is listed so that messages
         // tell the two apart.
-        for (index, body) in gripper.palm.iter().enumerate() {
-            add(Phase::Grip, index, body.clone(), "", DVec3::ZERO);
+        for (index, body) in palm.iter().enumerate() {
+            add(Phase::Grip, index, body.clone(), "", DVec3::ZERO, grown);
         }
         list.sort_by_key(|volume| (volume.sweep.phase, volume.sweep.jaw.is_empty()));
         let bounds = list

@@ -80,8 +80,10 @@ pub(crate) fn sweeps(gripper: &Gripper, motion: &Motion) -> Vec<Sweep> {
     let (mut grip, mut approach) = (Vec::new(), Vec::new());
     for jaw in Jaw::BOTH {
         // Away from the gripped face by the tolerance, so that lying on it is no collision.
-        let closed = jaw.at(gap / 2.0 + motion.touch * way.signum());
-        let opened = jaw.at(gap / 2.0 + way.abs().max(motion.touch) * way.signum());
+        let [closed, opened] = [motion.touch, way.abs().max(motion.touch)]
+            .map(|way_out| gap / 2.0 + way_out * way.signum());
+        let bulge = gripper.travel.bulge(2.0 * closed, 2.0 * opened);
+        let [closed, opened] = [closed, opened].map(|offset| gripper.jaw_at(jaw, gap, offset));
         // Named after the face that it grips.
         let jaw = match motion.kind {
             PairKind::External => jaw.name(),
@@ -89,26 +91,34 @@ pub(crate) fn sweeps(gripper: &Gripper, motion: &Motion) -> Vec<Sweep> {
         };
         for body in &gripper.fingers {
             let path = opened.origin - closed.origin;
-            grip.push(Sweep::new(body.moved(&closed), jaw, Phase::Grip, path, motion));
-            approach.push(Sweep::new(body.moved(&opened), jaw, Phase::Approach, back, motion));
+            grip.push(Sweep::new(body.moved(&closed), jaw, Phase::Grip, path, motion, bulge));
+            approach.push(Sweep::new(body.moved(&opened), jaw, Phase::Approach, back, motion, 0.0));
         }
     }
     let palm_at = Frame { rotation: motion.jaws.turn(), origin: DVec3::ZERO };
-    for body in &gripper.palm {
+    for body in gripper.palm_at(gap) {
         let body = body.moved(&palm_at);
-        grip.push(Sweep::new(body.clone(), "", Phase::Grip, DVec3::ZERO, motion));
-        approach.push(Sweep::new(body, "", Phase::Approach, back, motion));
+        grip.push(Sweep::new(body.clone(), "", Phase::Grip, DVec3::ZERO, motion, 0.0));
+        approach.push(Sweep::new(body, "", Phase::Approach, back, motion, 0.0));
     }
     grip.extend(approach);
     grip
 }
 
 impl Sweep {
-    fn new(body: Body, jaw: &'static str, phase: Phase, path: DVec3, motion: &Motion) -> Self {
+    /// `bulge`: how far the way leaves the straight `path` along the approach.
+    fn new(
+        body: Body,
+        jaw: &'static str,
+        phase: Phase,
+        path: DVec3,
+        motion: &Motion,
+        bulge: f64,
+    ) -> Self {
         // Clearance on all sides but along x3, where a finger may lie on its face (the touch
         // tolerance keeps it off).
         let side = motion.clearance - motion.flush;
-        let grown = DVec3::new(side, side, if jaw.is_empty() { side } else { 0.0 });
+        let grown = DVec3::new(side + bulge, side, if jaw.is_empty() { side } else { 0.0 });
         Self::grown(body, jaw, phase, path, grown)
     }
 
@@ -309,7 +319,7 @@ mod tests {
             for shape in [Shape::Box { half: DVec3::new(0.01, 0.005, 0.008) }, Shape::Cylinder { radius: 0.006, half_height: 0.01 }] {
                 let body = Body { name: "b".into(), shape: shape.clone(), grip_from_body: frame };
                 let path = DVec3::new(0.0, 0.0, 0.004);
-                let sweep = Sweep::new(body, "I", Phase::Grip, path, &Motion { touch: 0.0, flush: 0.0, ..motion() });
+                let sweep = Sweep::new(body, "I", Phase::Grip, path, &Motion { touch: 0.0, flush: 0.0, ..motion() }, 0.0);
                 prop_assert!(!sweep.is_box());
                 let triangle = [centre, centre + u, centre + v];
                 let inside = |point: DVec3, step: f64| {

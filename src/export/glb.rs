@@ -98,18 +98,21 @@ pub(super) fn write(
             (draw(&mut scene, &gripper.fingers), draw(&mut scene, &gripper.palm), pad)
         }
     };
-    let tool_from_grip = view.grip_from_tool.inverse();
     for (index, grip) in view.grips().iter().enumerate() {
         let variant = usize::from(index > 0);
         // Readers tell nodes apart by their names.
         let id = format!("grip_{}", grip.grip.id);
-        let place = |scene: &mut Scene, bodies: &[Drawn], jaw: &str| -> Vec<usize> {
-            let node = |body: &Drawn| json!({"name": format!("{id}/{jaw}{}", body.name), "mesh": body.meshes[variant], "matrix": columns(&body.frame)});
+        let place = |scene: &mut Scene, bodies: &[Drawn], jaw: &str, at: &Frame| -> Vec<usize> {
+            let node = |body: &Drawn| json!({"name": format!("{id}/{jaw}{}", body.name), "mesh": body.meshes[variant], "matrix": columns(&at.compose(&body.frame))});
             bodies.iter().map(|body| scene.node(node(body))).collect()
         };
-        let mut jaws = place(&mut scene, &palm, "");
+        let palm_place = view
+            .gripper
+            .as_ref()
+            .map_or(Frame::IDENTITY, |gripper| gripper.palm_place(view.gap(grip)));
+        let mut jaws = place(&mut scene, &palm, "", &palm_place);
         for (jaw, name) in Jaw::BOTH.into_iter().zip(["jaw_i", "jaw_ii"]) {
-            let mut children = place(&mut scene, &fingers, &format!("{name}/"));
+            let mut children = place(&mut scene, &fingers, &format!("{name}/"), &Frame::IDENTITY);
             children.extend(
                 pad.map(|pad| scene.node(json!({"name": format!("{id}/{name}/pad"), "mesh": pad}))),
             );
@@ -121,7 +124,7 @@ pub(super) fn write(
             }
             jaws.push(scene.node(jaw));
         }
-        let gripper = scene.node(json!({"name": format!("{id}/gripper"), "matrix": columns(&tool_from_grip), "children": jaws}));
+        let gripper = scene.node(json!({"name": format!("{id}/gripper"), "matrix": columns(&view.grip_from_tool(grip).inverse()), "children": jaws}));
         roots.push(scene.node(json!({
             "name": id,
             "matrix": columns(&view.pose(grip)),

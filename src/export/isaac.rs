@@ -43,7 +43,7 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
                     writer,
                     "      {}: {}",
                     string(&joint.name),
-                    number(joint.position(width))
+                    number(joint.position(width, view.gripper.as_ref()))
                 )?;
             }
         }

@@ -187,7 +187,19 @@ impl<'a> View<'a> {
                 "write the result again with `gripfast plan`",
             ));
         }
-        Ok(Self { set, gripper: gripper.ok(), options, grip_from_tool, convention })
+        let gripper = gripper.ok();
+        let unknown = |gripper: &Gripper| gripper.travel.joint(0.0, gripper.stroke).is_none();
+        let by_motion = options.joints.iter().find(|joint| joint.by_motion);
+        if let Some(joint) = by_motion
+            && gripper.as_ref().is_none_or(unknown)
+        {
+            return Err(Error::input(
+                format!("joint {}", joint.name),
+                "the gripper of this result does not say how its joint follows the pads",
+                "state motion with its joint in the gripper file and plan again, or give scale and offset",
+            ));
+        }
+        Ok(Self { set, gripper, options, grip_from_tool, convention })
     }
 
     fn grips(&self) -> &'a [RankedGrip] {
@@ -195,9 +207,19 @@ impl<'a> View<'a> {
         &grips[..self.options.top.unwrap_or(grips.len()).min(grips.len())]
     }
 
+    /// The tool frame in the grip frame: what is fixed to the palm stands by how far the jaws close.
+    fn grip_from_tool(&self, grip: &RankedGrip) -> Frame {
+        match (self.options.origin, &self.gripper) {
+            (Origin::Stated(_), Some(gripper)) => {
+                gripper.palm_place(self.gap(grip)).compose(&self.grip_from_tool)
+            }
+            _ => self.grip_from_tool,
+        }
+    }
+
     /// The tool frame in the part frame.
     fn pose(&self, grip: &RankedGrip) -> Frame {
-        grip.grip.part_from_grip.compose(&self.grip_from_tool)
+        grip.grip.part_from_grip.compose(&self.grip_from_tool(grip))
     }
 
     /// Distance of the pads in the grip [m].

@@ -22,7 +22,7 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
             .options
             .joints
             .iter()
-            .map(|joint| number(joint.position(width)))
+            .map(|joint| number(joint.position(width, view.gripper.as_ref())))
             .collect::<Vec<_>>()
             .join(", ");
         let efforts = effort

@@ -183,17 +183,20 @@ pub struct Joint {
     pub scale: f64,
     /// Joint units.
     pub offset: f64,
+    /// Follows the gripper file's `motion` where that states the joint, not the straight line.
+    pub by_motion: bool,
 }
 
 impl Default for Joint {
     /// A joint called `width` that is the distance of the pads.
     fn default() -> Self {
-        Self { name: "width".into(), scale: 1.0, offset: 0.0 }
+        Self { name: "width".into(), scale: 1.0, offset: 0.0, by_motion: false }
     }
 }
 
 impl Joint {
-    /// Parses `NAME`, `NAME:SCALE` or `NAME:SCALE:OFFSET`.
+    /// Parses `NAME`, `NAME:SCALE`, `NAME:SCALE:OFFSET` or `NAME:motion` (as the gripper file's
+    /// `motion` states it).
     ///
     /// # Errors
     /// When the name is empty, or scale or offset is not a finite number.
@@ -207,6 +210,13 @@ impl Joint {
         };
         let mut pieces = text.split(':');
         let name = pieces.next().unwrap_or_default().trim().to_owned();
+        if let Some((name, "motion")) = text.split_once(':') {
+            let name = name.trim().to_owned();
+            return match name.is_empty() {
+                true => Err(wrong(format!("'{text}' is not a joint"))),
+                false => Ok(Self { name, by_motion: true, ..Self::default() }),
+            };
+        }
         let mut number = |default: f64| match pieces.next() {
             None => Ok(default),
             Some(piece) => piece
@@ -220,12 +230,15 @@ impl Joint {
         if name.is_empty() || pieces.next().is_some() {
             return Err(wrong(format!("'{text}' is not a joint")));
         }
-        Ok(Self { name, scale, offset })
+        Ok(Self { name, scale, offset, by_motion: false })
     }
 
-    /// Position at this distance of the pads [m].
-    pub fn position(&self, width: f64) -> f64 {
-        self.scale * width + self.offset
+    /// Position at this distance of the pads [m] of a gripper.
+    pub fn position(&self, width: f64, gripper: Option<&Gripper>) -> f64 {
+        let stated = gripper
+            .filter(|_| self.by_motion)
+            .and_then(|gripper| gripper.travel.joint(width, gripper.stroke));
+        stated.unwrap_or(self.scale * width + self.offset)
     }
 }
 
@@ -306,12 +319,15 @@ mod tests {
         assert_eq!(Origin::parse("origin", "103.4mm").unwrap(), Origin::Behind(0.1034));
         assert!(Origin::parse("origin", "103.4").is_err());
         let joint = Joint::parse("joint", "finger_joint:-9.41:0.8").unwrap();
-        assert!((joint.position(0.085) - 0.00015).abs() < 1e-12);
+        assert!((joint.position(0.085, None) - 0.00015).abs() < 1e-12);
         assert_eq!(
             Joint::parse("joint", "a:0.5").unwrap(),
-            Joint { name: "a".into(), scale: 0.5, offset: 0.0 }
+            Joint { name: "a".into(), scale: 0.5, offset: 0.0, by_motion: false }
         );
-        for bad in ["", ":1", "a:x", "a:1:2:3", "a:nan"] {
+        let joint = Joint::parse("joint", "finger_joint:motion").unwrap();
+        let gripper = crate::gripper::find("robotiq-2f85").unwrap();
+        assert!(joint.by_motion && (joint.position(0.0, Some(&gripper)) - 0.8133).abs() < 1e-12);
+        for bad in ["", ":1", "a:x", "a:1:2:3", "a:nan", ":motion"] {
             assert!(Joint::parse("joint", bad).is_err(), "{bad}");
         }
     }

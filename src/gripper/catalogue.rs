@@ -174,6 +174,9 @@ mod tests {
             wanted.extend(gripper.pad_thickness.map(|_| "pad.thickness".into()));
             wanted.extend(gripper.pad_modulus.map(|_| "pad.modulus".into()));
             wanted.extend(gripper.grip_from_flange.map(|_| "flange".into()));
+            if gripper.travel != crate::gripper::Travel::Parallel {
+                wanted.push("motion".into());
+            }
             for field in wanted {
                 assert!(gripper.sources.contains_key(&field), "{short}: no source for {field}");
             }

@@ -18,7 +18,7 @@ const MARGIN: f64 = 90.0;
 /// The drawing as a complete SVG document; lengths in its text are millimetres.
 pub fn svg(gripper: &Gripper) -> String {
     let open = gripper.stroke[1];
-    let bodies: Vec<(&str, Body)> = (gripper.palm.iter().map(|body| ("palm", body.clone())))
+    let bodies: Vec<(&str, Body)> = (gripper.palm_at(open).into_iter().map(|body| ("palm", body)))
         .chain(gripper.finger(Jaw::I, open).into_iter().map(|body| ("finger", body)))
         .chain(gripper.finger(Jaw::II, open).into_iter().map(|body| ("finger", body)))
         .collect();

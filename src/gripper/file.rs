@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DVec2, DVec3};
 use serde::Deserialize;
 
-use super::{Body, Gripper, Shape, Source, mesh, rectangle};
+use super::{Body, Gripper, Shape, Source, Travel, TravelRow, mesh, rectangle};
 use crate::error::{Error, Result};
 use crate::geometry::{convex_hull, is_convex, polygon, ring_area};
 use crate::model::Frame;
@@ -23,6 +23,7 @@ struct File {
     finger: Vec<Solid>,
     #[serde(default)]
     palm: Vec<Solid>,
+    motion: Option<Motion>,
     flange: Option<Axes>,
     tool: Option<Axes>,
     #[serde(default)]
@@ -95,6 +96,23 @@ impl Axis {
     }
 }
 
+/// How the pads move along the approach.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Motion {
+    arc: Option<Arc>,
+    /// Distance of the pads, advance, and, where known, the joint's value.
+    table: Option<Vec<Vec<String>>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Arc {
+    crank: String,
+    angle: String,
+    joint: Option<[String; 2]>,
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Axes {
@@ -165,6 +183,10 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
     }
     let fingers = reader.bodies("finger", &file.finger)?;
     let palm = reader.bodies("palm", &file.palm)?;
+    let travel = match &file.motion {
+        Some(motion) => reader.travel(motion, stroke)?,
+        None => Travel::Parallel,
+    };
     let axes = |field: &str, axes: &Option<Axes>| {
         axes.as_ref().map(|axes| reader.frame(field, axes)).transpose()
     };
@@ -178,6 +200,7 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
         "pad.modulus",
         "pad.outer_face",
         "pad.friction",
+        "motion",
         "flange",
         "tool",
     ]
@@ -216,6 +239,7 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
         pad_modulus,
         outer_pad,
         fingers,
+        travel,
         palm,
         grip_from_flange,
         grip_from_tool,
@@ -402,6 +426,74 @@ impl Reader<'_> {
             ));
         }
         Ok(shapes)
+    }
+
+    fn travel(&self, motion: &Motion, stroke: [f64; 2]) -> Result<Travel> {
+        let field = "motion";
+        let remedy = "give arc = { crank = \"57mm\", angle = \"-5deg\" } (length, and angle from the approach axis with touching pads, outwards positive) or table = [[\"0mm\", \"0mm\"], ...] (distance of the pads, advance, and the joint if known)";
+        match (&motion.arc, &motion.table) {
+            (Some(arc), None) => {
+                let crank = self.positive("motion.arc.crank", Quantity::Length, &arc.crank)?;
+                let angle = self.value("motion.arc.angle", Quantity::Angle, &arc.angle)?;
+                let reach = angle.sin() + stroke[1] / 2.0 / crank;
+                if !(angle.abs() < std::f64::consts::FRAC_PI_2 && reach < 1.0) {
+                    let problem = format!(
+                        "a crank of {} from {} does not carry the pads as far apart as the stroke",
+                        arc.crank, arc.angle
+                    );
+                    return Err(self.bad("motion.arc", problem, "give a longer crank"));
+                }
+                let joint = match &arc.joint {
+                    None => None,
+                    Some([closed, opened]) => {
+                        let value = |text| self.value("motion.arc.joint", Quantity::Angle, text);
+                        Some([value(closed)?, value(opened)?])
+                    }
+                };
+                Ok(Travel::Arc { crank, angle, joint })
+            }
+            (None, Some(table)) => {
+                let rows = table
+                    .iter()
+                    .map(|row| self.travel_row(row))
+                    .collect::<Result<Vec<TravelRow>>>()?;
+                let rising = rows.windows(2).all(|pair| pair[0].width < pair[1].width);
+                let alike = rows.iter().all(|row| row.joint.is_some() == rows[0].joint.is_some());
+                let covers = |rows: &[TravelRow]| match rows {
+                    [first, .., last] => first.width <= stroke[0] && last.width >= stroke[1],
+                    _ => false,
+                };
+                if !(rising && alike && covers(&rows)) {
+                    return Err(self.bad(
+                        "motion.table",
+                        "does not cover the stroke with rising distances and equal rows",
+                        remedy,
+                    ));
+                }
+                Ok(Travel::Table { rows })
+            }
+            _ => Err(self.bad(field, "needs exactly one of arc and table", remedy)),
+        }
+    }
+
+    fn travel_row(&self, row: &[String]) -> Result<TravelRow> {
+        let field = "motion.table";
+        let joint = |text: &String| {
+            self.value(field, Quantity::Angle, text)
+                .or_else(|_| self.value(field, Quantity::Length, text))
+        };
+        match row {
+            [width, advance, rest @ ..] if rest.len() <= 1 => Ok(TravelRow {
+                width: self.value(field, Quantity::Length, width)?,
+                advance: self.value(field, Quantity::Length, advance)?,
+                joint: rest.first().map(joint).transpose()?,
+            }),
+            _ => Err(self.bad(
+                field,
+                format!("has a row of {} values", row.len()),
+                "give distance, advance and, if known, the joint",
+            )),
+        }
     }
 
     fn frame(&self, field: &str, axes: &Axes) -> Result<Frame> {

@@ -11,9 +11,21 @@ use super::topology::NONE;
 const SMOOTH: f64 = 25.0 * std::f64::consts::PI / 180.0;
 /// How much larger than a neighbour a facet of a curved surface may be.
 const FACET_RATIO: f64 = 4.0;
+/// Height of the arc over a facet, as a share of the part's diagonal, up to which it may belong to a
+/// curved surface: more than a circle about the part has at 25 degrees a facet (0.8 %).
+const ARC: f64 = 0.01;
 /// Side of a square, as a share of the diagonal, below whose area a region with one such neighbour
 /// is taken for a facet.
 const SMALL: f64 = 0.02;
+
+/// A neighbour under a small angle.
+struct Smooth {
+    region: usize,
+    /// Length of the common boundary [m].
+    shared: f64,
+    /// Not 4 times smaller.
+    comparable: bool,
+}
 
 /// Boundaries between regions and what follows from them.
 pub(super) struct Facets {
@@ -31,7 +43,9 @@ impl Facets {
     /// them 4 times smaller: so do the strips of a tessellated cylinder, cone or fillet. For a
     /// region smaller than a square of 2 % of the part's diagonal one such neighbour is enough. The
     /// flat between two fillets is far larger than their strips and stays; nut flats and chamfers
-    /// meet their neighbours under larger angles and stay. Where a mesh leaves it open (the
+    /// meet their neighbours under larger angles and stay, and so do the flats of a sheet bent by
+    /// little: three of a kind in a row that goes no further, or so wide that the arc over one would
+    /// rise by more than 1 % of the part's diagonal. Where a mesh leaves it open (the
     /// outermost strip of a gear's flank) the region stays: a flat too many costs a few candidates,
     /// a flat too few loses grips.
     pub(super) fn new(part: &Repaired, regions: &Regions) -> Self {
@@ -55,28 +69,47 @@ impl Facets {
                 }
             }
         }
-        let small = (SMALL * part.diagonal).powi(2);
         let mut facets = Self { perimeter, is_facet: Vec::new(), shared };
-        facets.is_facet =
-            (0..count).map(|index| facets.curved(&regions.all, index, small)).collect();
+        let smooth: Vec<Vec<Smooth>> =
+            (0..count).map(|index| facets.smooth(&regions.all, index, part.diagonal)).collect();
+        let small = (SMALL * part.diagonal).powi(2);
+        facets.is_facet = (0..count)
+            .map(|index| {
+                let long = 0.25 * facets.perimeter[index];
+                let total: f64 = smooth[index].iter().map(|other| other.shared).sum();
+                let comparable: Vec<&Smooth> =
+                    smooth[index].iter().filter(|other| other.comparable).collect();
+                let along: f64 = comparable.iter().map(|other| other.shared).sum();
+                let is_small = regions.all[index].area < small;
+                // The middle one of three.
+                let ends = |other: &&Smooth| {
+                    let mut beyond = smooth[other.region].iter().filter(|next| next.comparable);
+                    beyond.all(|next| next.region == index)
+                        && smooth[other.region].iter().any(|n| n.region == index && n.comparable)
+                };
+                let three = comparable.len() == 2 && !is_small && comparable.iter().all(ends);
+                (comparable.len() >= 2 && along >= long && !three)
+                    || (!comparable.is_empty() && total >= long && is_small)
+            })
+            .collect();
         facets
     }
 
-    fn curved(&self, regions: &[Region], index: usize, small: f64) -> bool {
+    /// Neighbours with which a region may lie on one curved surface.
+    fn smooth(&self, regions: &[Region], index: usize, diagonal: f64) -> Vec<Smooth> {
         let region = &regions[index];
-        let (mut count, mut smooth, mut comparable) = (0, 0.0, 0.0);
-        for (&neighbour, &shared) in &self.shared[index] {
+        let neighbours = self.shared[index].iter().filter_map(|(&neighbour, &shared)| {
             let other = &regions[neighbour as usize];
-            if region.plane.normal.angle_between(other.plane.normal) <= SMOOTH {
-                smooth += shared;
-                if region.area <= FACET_RATIO * other.area {
-                    count += 1;
-                    comparable += shared;
-                }
-            }
-        }
-        let long = 0.25 * self.perimeter[index];
-        (count >= 2 && comparable >= long) || (count >= 1 && smooth >= long && region.area < small)
+            let angle = region.plane.normal.angle_between(other.plane.normal);
+            // Of a strip as wide as its area over the shared edge.
+            let arc = region.area / shared / 2.0 * (angle / 4.0).tan();
+            (angle <= SMOOTH && arc <= ARC * diagonal).then_some(Smooth {
+                region: neighbour as usize,
+                shared,
+                comparable: region.area <= FACET_RATIO * other.area,
+            })
+        });
+        neighbours.collect()
     }
 
     /// Whether flat faces have crumbled because the mesh is rougher than the growth allowed for:
@@ -120,5 +153,79 @@ impl Facets {
         // corners moved at random by 1e-5 of the diagonal give 3.5e-3 to 4e-2. A wrong guess only
         // widens tolerances that are narrow either way.
         above + below > 3.2e-3 * flat && above.min(below) > 2e-4 * flat
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec2, DVec3};
+
+    use crate::part::Part;
+
+    /// A sheet of 3 mm, 40 mm deep, of flats of 40 mm with a bend after each.
+    fn sheet(flats: usize, bend: f64) -> Part {
+        let directions: Vec<DVec2> =
+            (0..flats).map(|k| DVec2::from_angle(bend * (k as f64 + 0.3))).collect();
+        let mut inner = vec![DVec2::ZERO];
+        for direction in &directions {
+            inner.push(inner[inner.len() - 1] + *direction * 0.04);
+        }
+        let outer: Vec<DVec2> = (0..=flats)
+            .map(|k| {
+                let (a, b) = (directions[k.max(1) - 1], directions[k.min(flats - 1)]);
+                let across = (a + b).normalize().perp();
+                inner[k] - across * (0.003 / across.dot(a.perp()))
+            })
+            .collect();
+        let count = (flats + 1) as u32;
+        let mut vertices = Vec::new();
+        for depth in [0.0, 0.04] {
+            vertices.extend(inner.iter().chain(&outer).map(|point| point.extend(depth)));
+        }
+        let mut triangles: Vec<[u32; 3]> = Vec::new();
+        let mut quad = |a: u32, b: u32, c: u32, d: u32| triangles.extend([[a, b, c], [a, c, d]]);
+        let back = 2 * count;
+        for k in 0..flats as u32 {
+            quad(k, k + 1, count + k + 1, count + k);
+            quad(back + k, back + count + k, back + count + k + 1, back + k + 1);
+            quad(k, back + k, back + k + 1, k + 1);
+            quad(count + k, count + k + 1, back + count + k + 1, back + count + k);
+        }
+        quad(0, count, back + count, back);
+        let last = flats as u32;
+        quad(last, back + last, back + count + last, count + last);
+        let part = Part::from_triangles("sheet", &vertices, &triangles).unwrap();
+        assert!(part.health.watertight, "{:?}", part.health);
+        part
+    }
+
+    #[test]
+    fn flats_of_a_bent_sheet_are_faces_at_any_bend() {
+        for degrees in [1.0_f64, 2.0, 5.0, 10.0, 20.0, 24.0, 26.0, 40.0] {
+            let faces = sheet(3, degrees.to_radians()).faces.len();
+            assert_eq!(faces, 10, "{degrees}");
+        }
+        assert_eq!(sheet(5, 20_f64.to_radians()).faces.len(), 14);
+    }
+
+    #[test]
+    fn strips_of_cylinders_are_no_faces() {
+        for count in [16_u32, 24, 36, 90] {
+            let step = std::f64::consts::TAU / f64::from(count);
+            let ring = |z: f64| {
+                (0..count).map(move |k| (DVec2::from_angle(f64::from(k) * step) * 0.02).extend(z))
+            };
+            let vertices: Vec<DVec3> = ring(0.0).chain(ring(0.03)).collect();
+            let mut triangles: Vec<[u32; 3]> = Vec::new();
+            for k in 0..count {
+                let next = (k + 1) % count;
+                triangles.extend([[k, next, count + next], [k, count + next, count + k]]);
+            }
+            for k in 1..count - 1 {
+                triangles.extend([[0, k + 1, k], [count, count + k, count + k + 1]]);
+            }
+            let part = Part::from_triangles("cylinder", &vertices, &triangles).unwrap();
+            assert_eq!(part.faces.len(), 2, "{count}");
+        }
     }
 }

@@ -158,3 +158,52 @@ fn a_mesh_that_cannot_be_used_is_refused_with_place_and_remedy() {
     );
     assert!(message.unwrap_err().to_string().contains("save it to a file"));
 }
+
+#[test]
+fn palm_and_closing_fingers_follow_the_pads() {
+    let folder = tempfile::tempdir().unwrap();
+    // A block 60 mm wide, 100 mm high, gripped from above; the palm ends 12 mm behind the middle of
+    // the touching pads, and pads 60 mm apart stand 6 mm nearer to it.
+    let size = [DVec3::new(-30.0, -50.0, 0.0), DVec3::new(30.0, 50.0, 100.0)];
+    std::fs::write(folder.path().join("block.stl"), stl(&[size])).unwrap();
+    let part = Part::read(&folder.path().join("block.stl"), &ReadOptions::default()).unwrap();
+    let lowest = |motion: &str| {
+        let text = format!(
+            "name = \"test\"\nstroke = [\"0mm\", \"80mm\"]\nforce = [\"10N\", \"150N\"]\n[pad]\nrectangle = [\"20mm\", \"20mm\"]\n\
+             [[finger]]\nname = \"tip\"\nbox = [\"20mm\", \"20mm\", \"5mm\"]\nat = [\"0mm\", \"0mm\", \"2.5mm\"]\n\
+             [[palm]]\nname = \"housing\"\nbox = [\"40mm\", \"60mm\", \"40mm\"]\nat = [\"-32mm\", \"0mm\", \"0mm\"]\n{motion}"
+        );
+        let gripper = gripper::parse(&text, "test").unwrap();
+        let options = ProposeOptions { spacing: Some(1e-3), ..ProposeOptions::default() };
+        let grips = Proposer::new(&part, &gripper, &options).unwrap().flat_map(|c| c.grips);
+        grips
+            .filter(|grip| {
+                (grip.width - 0.06).abs() < 1e-9 && grip.part_from_grip.rotation.x_axis.z < -0.999
+            })
+            .map(|grip| grip.part_from_grip.origin.z)
+            .fold(f64::INFINITY, f64::min)
+    };
+    let parallel = lowest("");
+    assert!((parallel - 0.088).abs() < 1.1e-3, "{parallel}");
+    let table = "[motion]\ntable = [[\"0mm\", \"0mm\"], [\"80mm\", \"-8mm\"]]\n";
+    assert!((lowest(table) - 0.094).abs() < 1.1e-3, "{}", lowest(table));
+    // A crank of 57 mm from -5.4 degrees: 5.3 mm at 60 mm.
+    let arc = "[motion]\narc = { crank = \"57.12mm\", angle = \"-5.43deg\" }\n";
+    assert!((lowest(arc) - 0.0933).abs() < 1.1e-3, "{}", lowest(arc));
+}
+
+#[test]
+fn motions_that_make_no_sense_are_refused() {
+    let text = gripper::catalogue::text("generic").unwrap();
+    for (motion, word) in [
+        ("", "exactly one"),
+        ("arc = { crank = \"20mm\", angle = \"0deg\" }", "longer crank"),
+        ("table = [[\"0mm\", \"0mm\"]]", "cover the stroke"),
+        ("table = [[\"0mm\", \"0mm\"], [\"1mm\", \"0mm\"]]", "cover the stroke"),
+        ("table = [[\"0mm\"], [\"200mm\", \"0mm\"]]", "row of 1"),
+        ("table = [[\"0mm\", \"0mm\", \"1rad\"], [\"200mm\", \"0mm\"]]", "cover the stroke"),
+    ] {
+        let error = gripper::parse(&format!("{text}\n[motion]\n{motion}\n"), "g").unwrap_err();
+        assert!(error.to_string().contains(word), "{motion}: {error}");
+    }
+}

@@ -106,6 +106,7 @@ fn random_gripper(random: &mut Random) -> Gripper {
         pad_modulus: None,
         outer_pad: None,
         fingers: vec![tip, finger],
+        travel: gripfast::gripper::Travel::Parallel,
         palm: vec![palm],
         grip_from_flange: None,
         grip_from_tool: None,

@@ -4,6 +4,7 @@
 
 mod bodies;
 mod interference;
+mod motion;
 mod options;
 mod parts;
 mod places;

@@ -215,3 +215,43 @@ fn a_pad_over_two_lands_touches_both() {
         assert!(lands.len() == 2);
     }
 }
+
+#[test]
+fn the_flat_between_two_bends_is_gripped() {
+    for (name, offset) in [("bent_20", 0.02), ("bent_26", 0.02)] {
+        let Some(part) = trial(&format!("faces/{name}.stl")) else { return };
+        assert_eq!(part.faces.len(), 10, "{name}");
+        let flat = |face: &&gripfast::part::PlanarFace| face.normal.y.abs() > 0.999;
+        assert_eq!(part.faces.iter().filter(flat).count(), 2, "{name}");
+        assert!(part.pairs(0.0, offset).iter().any(|pair| (pair.width - 0.003).abs() < 1e-6));
+    }
+}
+
+#[test]
+fn two_tessellations_of_a_part_give_the_same_angles() {
+    let files = ["trials/tessellation/panel_cascadio.glb", "parts/parts/o2ac__02-PANEL.stl"];
+    let gripper = gripper::find("robotiq-2f85").unwrap();
+    let mut found = Vec::new();
+    for file in files {
+        let Some(path) = reference(file) else { return };
+        let part = Part::read(&path, &ReadOptions::default()).unwrap();
+        let options =
+            ProposeOptions { angle_step: 90_f64.to_radians(), ..ProposeOptions::default() };
+        let proposer = Proposer::new(&part, &gripper, &options).unwrap();
+        let mut angles: Vec<(i64, Vec<i64>)> = proposer
+            .sites()
+            .iter()
+            .map(|site| {
+                let steps = |value: f64, step: f64| (value / step).round() as i64;
+                let mut angles: Vec<i64> =
+                    site.angles.iter().map(|angle| steps(*angle, 2e-3)).collect();
+                angles.sort_unstable();
+                (steps(site.width, 1e-4), angles)
+            })
+            .collect();
+        angles.sort();
+        found.push(angles);
+    }
+    assert!(!found[0].is_empty());
+    assert_eq!(found[0], found[1]);
+}
