@@ -173,7 +173,9 @@ note() { # name, words
     say "   $1: $2"
     ended+=(--ended "$1=$2")
     "$program" bench entry --out "$out" --date "$(date -u +%F)" --commit "${commit:-unknown}" \
-        "${ended[@]}" || code=1
+        "${ended[@]}" && return
+    say "device.sh: entry.md and entry.json in $out, if any, are those before this part" >&2
+    code=1
 }
 
 # Keeps a file of the work folder under its name in the output folder, whole or not at all.
@@ -230,7 +232,8 @@ words=
 part check "$(share 80)" "$program" bench check "${named[@]}" --seconds "$(share 50)" --out "$out"
 status=$?
 [ -z "$words" ] || note check "$words"
-if [ $status -eq 2 ] && ! grep -q '"adapter"' "$out/check.json" 2>/dev/null; then
+if [ $status -eq 2 ] && ! grep -q '"adapter"' "$out/check.json" 2>/dev/null &&
+    ! grep -q 'cannot write' "$work/check.stderr"; then
     say "device.sh: the adapter cannot be used; the parts that need none run" >&2
     usable=0
 fi
