@@ -239,6 +239,10 @@ fn the_device_script_measures_an_adapter_and_says_what_it_had_no_time_for() {
     let (code, said) = device_script(folder.path(), "25", name, "");
     // Cut off or whole, by how busy the machine is; never for another reason.
     assert!(code == 0 || code == 1 && !said.contains("FAILED"), "{code}: {said}");
+    if said.contains("check: cut off") || said.contains("sweep: cut off") {
+        crate::support::say("SKIPPED: the machine is too busy for the device script's short run");
+        return;
+    }
     let (entry, text) = entry(folder.path());
     let adapter = entry["adapter"].as_str().unwrap();
     assert!(adapter.starts_with(name), "{adapter}");
@@ -276,6 +280,10 @@ fn the_device_script_says_what_is_wrong_and_runs_what_it_can() {
     // A device that goes in the sweep: the part says so, the others run.
     let (code, said) = device_script(folder.path(), "12", device["name"].as_str().unwrap(), "2");
     assert_eq!(code, 1, "{said}");
+    if said.contains("check: cut off") || said.contains("sweep: cut off") {
+        crate::support::say("SKIPPED: the machine is too busy for the device script's short run");
+        return;
+    }
     assert!(said.contains("the graphics processor was lost"), "{said}");
     let (found, _) = entry(folder.path());
     assert!(found["parts"]["sweep"]["failure"].as_str().unwrap().contains("lost"), "{found}");
