@@ -74,9 +74,11 @@ fn plates_on_a_table_are_gripped_from_above_at_any_spacing() {
                     .map(|grip| patch_area(&grip.contact.face_i))
                     .fold(0.0, f64::max);
                 let across: f64 = 2.0 * gripper.pad.iter().map(|p| p.y).fold(0.0, f64::max);
-                // Flush with the table a finger may lie a few micrometres in it.
+                // Flush with the table a finger may lie a few micrometres in it; where pads run along
+                // arcs, closing fingers are given as much room as these leave their chord.
+                let bulge = gripper.travel.bulge(width, (width + 0.01).min(gripper.stroke[1]));
                 let more = most / across - covered;
-                assert!((-2e-6..5e-6).contains(&more), "{place}: {more}");
+                assert!((-2e-6 - bulge..5e-6).contains(&more), "{place}: {more} {bulge}");
                 for grip in &grips {
                     for body in gripper
                         .finger(Jaw::I, grip.width)
