@@ -6,17 +6,20 @@ use std::path::Path;
 use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
+use crate::contact::field::{Gap, Piece, Surfaces};
 use crate::error::{Error, ErrorKind, Result};
 use crate::file;
-use crate::model::{Contact, Patch, Wrench};
+use crate::model::{Contact, Patch, Ring, Wrench};
 
 /// One contact pair under one wrench.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Case {
     /// The case's own name, if it has one.
     pub id: Option<String>,
-    /// Both contact areas [m].
+    /// Both contact areas [m]: of curved faces their outlines.
     pub contact: Contact,
+    /// The faces as they are and the pads' stiffness, where the case gives them.
+    pub surfaces: Option<Surfaces>,
     /// Height of face I over face II [m], negative for a grip from inside.
     pub distance: f64,
     /// Gripping force [N].
@@ -30,10 +33,8 @@ pub struct Case {
 #[derive(Deserialize)]
 struct Raw {
     id: Option<serde_json::Value>,
-    #[serde(rename = "A_I")]
-    a_i: Patch,
-    #[serde(rename = "A_II")]
-    a_ii: Patch,
+    k: Option<[f64; 2]>,
+    layer: Option<f64>,
     d: f64,
     #[serde(rename = "Fn")]
     force: f64,
@@ -43,7 +44,84 @@ struct Raw {
     m: DVec3,
 }
 
+/// The faces as pieces.
+#[derive(Deserialize)]
+struct Pieces {
+    #[serde(rename = "A_I")]
+    face_i: Vec<Piece>,
+    #[serde(rename = "A_II")]
+    face_ii: Vec<Piece>,
+}
+
+/// A body between wide pads, its axis along `x1` [m].
+#[derive(Deserialize)]
+struct Body {
+    kind: Kind,
+    /// Radius about the axis.
+    #[serde(rename = "R")]
+    radius: Option<f64>,
+    /// Radius of a barrel's meridian.
+    #[serde(rename = "R1")]
+    meridian: Option<f64>,
+    /// Length along `x1`.
+    #[serde(rename = "L")]
+    length: f64,
+    /// Half width of the pads, or of a flat body.
+    b: Option<f64>,
+    /// Half width of the flat of a D-bar, which is face I.
+    bflat: Option<f64>,
+}
+
+#[derive(Deserialize, Clone, Copy, PartialEq)]
+#[serde(rename_all = "lowercase")]
+enum Kind {
+    Cylinder,
+    Sphere,
+    Barrel,
+    Dbar,
+    Flat,
+}
+
+impl Body {
+    /// Pieces under pad I and pad II; `place` for messages.
+    fn pieces(&self, place: &str) -> Result<Pieces> {
+        let given = |value: Option<f64>, name: &str| {
+            value.ok_or_else(|| Error::format(place, format!("gives no \"{name}\""), CURVED))
+        };
+        let piece = |half: f64, gap: Gap| {
+            let x = 0.5 * self.length;
+            let outer: Ring =
+                [(-x, -half), (x, -half), (x, half), (-x, half)].map(DVec2::from).to_vec();
+            vec![Piece { outer, holes: Vec::new(), gap }]
+        };
+        let (axis, at, height) = (DVec2::X, DVec2::ZERO, 0.0);
+        if self.kind == Kind::Flat {
+            let flat = piece(given(self.b.or(self.bflat), "b")?, Gap::default());
+            return Ok(Pieces { face_i: flat.clone(), face_ii: flat });
+        }
+        let radius = given(self.radius, "R")?;
+        let width = self.b.unwrap_or(radius.abs());
+        let gap = match self.kind {
+            Kind::Sphere => Gap::Sphere { radius, at, height },
+            Kind::Barrel => {
+                let meridian = given(self.meridian, "R1")?;
+                Gap::Barrel { radius, meridian, axis, at, height }
+            }
+            Kind::Cylinder | Kind::Dbar | Kind::Flat => Gap::Cylinder { radius, axis, at, height },
+        };
+        let round = piece(width, gap);
+        let first = match self.kind {
+            Kind::Dbar => piece(given(self.bflat, "bflat")?, Gap::default()),
+            _ => round.clone(),
+        };
+        Ok(Pieces { face_i: first, face_ii: round })
+    }
+}
+
 const SHAPE: &str = r#"a case is {"A_I":[{"outer":[[x,y],..],"holes":[..]}],"A_II":[..],"d":..,"Fn":..,"F":[f1,f2,f3],"M":[m1,m2,m3]} in m, N, N m"#;
+
+/// The same for faces that are not plane.
+const CURVED: &str = r#"a case with curved faces gives each piece a "gap" and the pads' stiffness "k":[kI,kII] in Pa/m, or "kind", "R", "L" and "k" instead of the pieces: docs/formats.md"#;
 
 /// Reads all cases of a file, or of standard input for `-`, in order.
 ///
@@ -136,14 +214,30 @@ fn check_distance(place: &str, contact: &Contact, distance: f64) -> Result<()> {
 /// When the value is not of the form.
 pub fn parse(place: &str, value: serde_json::Value) -> Result<Case> {
     check_keys(place, &value)?;
-    let raw: Raw = serde_json::from_value(value)
-        .map_err(|error| Error::format(place, error.to_string(), SHAPE))?;
+    let wrong = |shape: &'static str| {
+        move |error: serde_json::Error| Error::format(place, error.to_string(), shape)
+    };
+    let (pieces, shape) = if value.get("kind").is_some() {
+        (Body::deserialize(&value).map_err(wrong(CURVED))?.pieces(place)?, CURVED)
+    } else {
+        (Pieces::deserialize(&value).map_err(wrong(SHAPE))?, SHAPE)
+    };
+    let Pieces { face_i, face_ii } = pieces;
+    let raw: Raw = serde_json::from_value(value).map_err(wrong(shape))?;
     let id = raw.id.map(|id| id.as_str().map_or_else(|| id.to_string(), str::to_string));
-    let contact = Contact { face_i: raw.a_i, face_ii: raw.a_ii };
+    let outlines = |pieces: &[Piece]| -> Patch { pieces.iter().map(Piece::polygon).collect() };
+    let contact = Contact { face_i: outlines(&face_i), face_ii: outlines(&face_ii) };
     check_distance(place, &contact, raw.d)?;
+    let plane = [&face_i, &face_ii].into_iter().flatten().all(|piece| piece.gap == Gap::default());
+    let surfaces = match raw.k {
+        Some(stiffness) => Some(Surfaces { face_i, face_ii, stiffness, layer: raw.layer }),
+        None if plane => None,
+        None => return Err(Error::format(place, "has curved faces but no \"k\"", CURVED)),
+    };
     Ok(Case {
         id,
         contact,
+        surfaces,
         distance: raw.d,
         force: raw.force,
         wrench: Wrench { force: raw.f, moment: raw.m },

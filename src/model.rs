@@ -137,6 +137,27 @@ pub enum Slip {
     },
     /// No load in the pad plane: nothing slips at any friction.
     None,
+    /// Rotation about an axis in the pad plane, beside others: a part that is round about it on
+    /// both faces ([`crate::mechanics::curved`]).
+    Spin {
+        /// Angular velocity about `x1`, `x2`, `x3`.
+        omega: [f64; 3],
+        /// Velocity along `x1`, `x2` of the point midway between the faces, in metres where
+        /// `omega` is in radians.
+        velocity: [f64; 2],
+        /// The face that does not slip, if one does not: the part rolls on it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        rolls_on: Option<Face>,
+    },
+}
+
+/// One of the two faces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Face {
+    /// At `x3 = +d/2`.
+    I,
+    /// At `x3 = -d/2`.
+    II,
 }
 
 /// What the solver found out about a grip under a load.

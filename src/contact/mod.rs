@@ -18,6 +18,8 @@ mod field;
 mod friction;
 mod lanes;
 mod loops;
+pub mod quadric;
+pub mod surface;
 mod thin;
 
 pub use far::FAR;

@@ -3,6 +3,7 @@
 //! [`solve`] answers one case; [`Pads`] keeps what a contact determines for many loads.
 
 mod branch;
+pub mod curved;
 #[doc(hidden)]
 pub mod equilibrium;
 pub mod inverse;

@@ -1,0 +1,302 @@
+//! Tilt, pressure and slip together: equations (6)(7) for the rotations that the pressure resists.
+//!
+//! For a given tilt the normal forces fix the pressure on each face and the slip problem the
+//! friction, so that the moments about the resisted axes are functions of the tilt alone: two, one
+//! or none.
+
+use glam::DVec2;
+use nalgebra::Vector5;
+
+use super::face::{Face, Pressed};
+use super::slip::{self, Slipping, Space};
+use crate::model::Wrench;
+
+/// What is asked: both faces, their distance, normal forces, and the load.
+pub(super) struct Problem<'a> {
+    pub(super) faces: [&'a Face; 2],
+    pub(super) distance: f64,
+    pub(super) normal: [f64; 2],
+    pub(super) wrench: Wrench,
+    pub(super) space: Space,
+    /// Axes of the rotations that the pressure resists.
+    pub(super) held: Vec<DVec2>,
+    /// Moment per angle about each of them beside that of the pressure: of round faces that roll.
+    pub(super) rolling: Vec<f64>,
+    /// Angle about each of them that changes the compression by itself.
+    pub(super) units: Vec<f64>,
+    /// Width of the pressure across each of them.
+    pub(super) widths: Vec<f64>,
+    /// Moment by which the residuals are measured: normal force times the pressure's width.
+    pub(super) moment: f64,
+}
+
+/// A tilt with its pressure and slip.
+#[derive(Clone)]
+pub(super) struct State<'a> {
+    /// Angles about the held axes, in their units.
+    pub(super) angles: Vec<f64>,
+    pub(super) faces: [Pressed<'a>; 2],
+    /// None where only the pressure was asked for.
+    pub(super) slip: Option<Slipping>,
+    /// What (6)(7) leave over about the held axes, over [`Problem::moment`].
+    pub(super) residual: Vec<f64>,
+}
+
+impl State<'_> {
+    pub(super) fn error(&self) -> f64 {
+        self.residual.iter().map(|r| r * r).sum::<f64>().sqrt()
+    }
+}
+
+/// Residual at which a state is a solution, but for rounding.
+const SOLVED: f64 = 1e-9;
+/// Residual at which Newton's method is content; its last step has mostly gone far beyond.
+const ENOUGH: f64 = 1e-13;
+/// Newton steps at most.
+const STEPS: u32 = 40;
+/// Step of the difference quotients, in units of the tilt.
+const DIFFERENCE: f64 = 1e-6;
+/// Points of the scan over the tilt: along a line, and rays by rings in the plane.
+const LINE: usize = 48;
+const RAYS: usize = 16;
+const RINGS: usize = 7;
+/// Starts of Newton's method in the plane.
+const STARTS: usize = 10;
+
+impl<'a> Problem<'a> {
+    /// `(a1, a2)` for angles in their units: compression is `delta - h +- a . x`.
+    pub(super) fn tilt(&self, angles: &[f64]) -> DVec2 {
+        let turn: DVec2 =
+            self.held.iter().zip(&self.units).zip(angles).map(|((e, u), x)| *u * *x * *e).sum();
+        DVec2::new(-turn.y, turn.x)
+    }
+
+    /// The load along the space's motions: what comes from outside, what the pressure brings, and
+    /// `more` force along the pads.
+    pub(super) fn along(
+        &self,
+        faces: [&Pressed<'_>; 2],
+        moment: DVec2,
+        more: DVec2,
+    ) -> Vector5<f64> {
+        let Wrench { force, moment: outer } = self.wrench;
+        let push = more - faces[0].slope - faces[1].slope;
+        let turn = faces[0].turn + faces[1].turn;
+        let mut w = Vector5::new(force.x + push.x, force.y + push.y, outer.z + turn, 0.0, 0.0);
+        for (i, e) in self.space.spins.iter().enumerate() {
+            w[3 + i] = e.dot(moment);
+        }
+        // What is left of a cancellation is no load.
+        let size = (self.normal[0] + self.normal[1])
+            .max(force.length())
+            .max(outer.length() / self.distance.abs());
+        let (length, lever) = (slip::length(faces), self.distance.abs());
+        let rounding = 4.0 * f64::EPSILON * size;
+        let scales = [1.0, 1.0, length, lever, lever];
+        for (load, scale) in w.iter_mut().zip(scales) {
+            if load.abs() <= rounding * scale {
+                *load = 0.0;
+            }
+        }
+        w
+    }
+
+    /// The moment in the pad plane that the pressure leaves over.
+    pub(super) fn moment_beyond(&self, faces: [&Pressed<'_>; 2]) -> DVec2 {
+        let xi = |face: &Pressed<'_>| face.first - 0.5 * self.distance * face.slope;
+        let pressed = xi(faces[0]) - xi(faces[1]);
+        let outer = DVec2::new(self.wrench.moment.x, self.wrench.moment.y);
+        outer + DVec2::new(-pressed.y, pressed.x)
+    }
+
+    /// What friction would do with the pressure of a state if the force along the pads counted
+    /// that planes bring when they tilt.
+    pub(super) fn with_tilting_planes(&self, state: &State<'_>) -> Option<(DVec2, Slipping)> {
+        let faces = [&state.faces[0], &state.faces[1]];
+        let more = faces[0].tilted + faces[1].tilted;
+        let w = self.along(faces, self.moment_beyond(faces), more);
+        Some((more, slip::solve(&self.space, faces, self.distance, w, None)?))
+    }
+
+    /// The state at a tilt. `coupling`: share of the friction's lever `d/2` that counts; zero needs
+    /// no slip.
+    pub(super) fn at(
+        &self,
+        angles: &[f64],
+        coupling: f64,
+        near: Option<&State<'_>>,
+    ) -> Option<State<'a>> {
+        let tilt = self.tilt(angles);
+        let start = |k: usize| near.map(|state| state.faces[k].delta);
+        let one = self.faces[0].carry(self.normal[0], tilt, start(0))?;
+        let two = self.faces[1].carry(self.normal[1], tilt, start(1))?;
+        let half = 0.5 * self.distance;
+        let moment = self.moment_beyond([&one, &two]);
+        let faces = [&one, &two];
+        let (slip, left) = if coupling == 0.0 {
+            (None, moment)
+        } else {
+            let w = self.along(faces, moment, DVec2::ZERO);
+            let zeta = near.and_then(|state| state.slip.as_ref()).map(|slip| &slip.zeta);
+            let slip = slip::solve(&self.space, faces, self.distance, w, zeta)?;
+            let couple = slip.shares[0] - slip.shares[1];
+            (Some(slip), moment + coupling * half * DVec2::new(couple.y, -couple.x))
+        };
+        let residual = (0..self.held.len())
+            .map(|i| {
+                let back = self.rolling[i] * self.units[i] * angles[i];
+                (self.held[i].dot(left) - back) / self.moment
+            })
+            .collect();
+        Some(State { angles: angles.to_vec(), faces: [one, two], slip, residual })
+    }
+
+    /// Newton's method on the tilt with differences, from a state.
+    pub(super) fn newton(&self, start: State<'a>, coupling: f64) -> Option<State<'a>> {
+        let n = self.held.len();
+        let mut state = start;
+        let mut stuck = 0;
+        for _ in 0..STEPS {
+            if n == 0 || state.error() <= ENOUGH {
+                break;
+            }
+            let slope = |i: usize| -> Option<Vec<f64>> {
+                let mut angles = state.angles.clone();
+                let h = DIFFERENCE * angles[i].abs().max(1.0);
+                angles[i] += h;
+                let up = self.at(&angles, coupling, Some(&state))?;
+                angles[i] -= 2.0 * h;
+                let down = self.at(&angles, coupling, Some(&state))?;
+                Some((0..n).map(|j| (up.residual[j] - down.residual[j]) / (2.0 * h)).collect())
+            };
+            let columns = (0..n).map(slope).collect::<Option<Vec<_>>>()?;
+            let r = &state.residual;
+            let step = if n == 1 {
+                vec![-r[0] / columns[0][0]]
+            } else {
+                let (a, b) = (&columns[0], &columns[1]);
+                let det = a[0] * b[1] - a[1] * b[0];
+                vec![(b[0] * r[1] - b[1] * r[0]) / det, (a[1] * r[0] - a[0] * r[1]) / det]
+            };
+            if step.iter().any(|x| !x.is_finite()) {
+                break;
+            }
+            // A step of many times the compression is cut: the pressure is another one there.
+            let longest = step.iter().map(|x| x.abs()).fold(0.0, f64::max);
+            let reach = 2.0 * (1.0 + state.angles.iter().map(|x| x.abs()).fold(0.0, f64::max));
+            let mut t = (reach / longest).min(1.0);
+            let mut next = None;
+            for _ in 0..16 {
+                let angles: Vec<f64> =
+                    state.angles.iter().zip(&step).map(|(a, s)| a + t * s).collect();
+                if let Some(tried) = self.at(&angles, coupling, Some(&state))
+                    && tried.error() < (1.0 - 1e-4 * t) * state.error()
+                {
+                    next = Some(tried);
+                    break;
+                }
+                t *= 0.5;
+            }
+            match next {
+                Some(next) => {
+                    stuck = if next.error() > 0.5 * state.error() { stuck + 1 } else { 0 };
+                    state = next;
+                }
+                None => break,
+            }
+            if stuck > 8 {
+                break;
+            }
+        }
+        (state.error() <= SOLVED).then_some(state)
+    }
+
+    /// The state on the branch from `d = 0`: friction's lever grows from nothing.
+    pub(super) fn branch(&self) -> Option<State<'a>> {
+        let still = vec![0.0; self.held.len()];
+        let start = self.at(&still, 0.0, None)?;
+        let mut state = self.newton(start, 0.0)?;
+        let (mut done, mut step) = (0.0, 1.0);
+        while done < 1.0 {
+            let next: f64 = f64::min(done + step, 1.0);
+            let moved = self
+                .at(&state.angles, next, Some(&state))
+                .and_then(|start| self.newton(start, next));
+            match moved {
+                Some(found) => (state, done) = (found, next),
+                None if step > 0.02 => step *= 0.25,
+                None => return None,
+            }
+        }
+        Some(state)
+    }
+
+    /// Other states: Newton's method from the best places of a scan over all tilts; `known` is
+    /// among the answers. The second value: whether anything could be evaluated at all.
+    pub(super) fn scan(&self, known: Option<State<'a>>) -> (Vec<State<'a>>, bool) {
+        let mut found: Vec<State<'a>> = known.into_iter().collect();
+        let mut any = !found.is_empty();
+        let stretch = |rho: f64| 3.0 * rho / (1.0 - rho);
+        let mut take = |state: State<'a>| {
+            let same = |other: &State<'a>| {
+                let size = 1.0 + state.angles.iter().map(|x| x.abs()).fold(0.0, f64::max);
+                state.angles.iter().zip(&other.angles).all(|(a, b)| (a - b).abs() < 1e-5 * size)
+            };
+            if !found.iter().any(same) {
+                found.push(state);
+            }
+        };
+        if self.held.len() == 1 {
+            let mut before: Option<State<'a>> = None;
+            for i in 0..=2 * LINE {
+                let rho = (i as f64 / LINE as f64 - 1.0) * 0.97;
+                let angle = stretch(rho.abs()).copysign(rho);
+                let here = self.at(&[angle], 1.0, before.as_ref());
+                any |= here.is_some();
+                if let (Some(one), Some(two)) = (&before, &here)
+                    && one.residual[0] * two.residual[0] <= 0.0
+                    && let Some(state) = self.between(one.clone(), two.clone())
+                {
+                    take(state);
+                }
+                before = here;
+            }
+        } else if self.held.len() == 2 {
+            let mut nodes = Vec::new();
+            for ray in 0..RAYS {
+                let e = DVec2::from_angle(std::f64::consts::TAU * ray as f64 / RAYS as f64);
+                for ring in 0..=RINGS {
+                    let x = stretch(0.95 * ring as f64 / RINGS as f64) * e;
+                    if ring > 0 || ray == 0 {
+                        nodes.extend(self.at(&[x.x, x.y], 1.0, None));
+                    }
+                }
+            }
+            any |= !nodes.is_empty();
+            nodes.sort_by(|a, b| a.error().total_cmp(&b.error()));
+            for node in nodes.into_iter().take(STARTS) {
+                if let Some(state) = self.newton(node, 1.0) {
+                    take(state);
+                }
+            }
+        }
+        let mu = |state: &State<'_>| state.slip.map_or(f64::INFINITY, |slip| slip.mu);
+        found.sort_by(|a, b| mu(a).total_cmp(&mu(b)));
+        (found, any)
+    }
+
+    /// A zero between two tilts of different sign.
+    fn between(&self, mut one: State<'a>, mut two: State<'a>) -> Option<State<'a>> {
+        for _ in 0..60 {
+            if let Some(state) = self.newton(one.clone(), 1.0)
+                && state.angles[0] >= one.angles[0].min(two.angles[0])
+                && state.angles[0] <= one.angles[0].max(two.angles[0])
+            {
+                return Some(state);
+            }
+            let middle = self.at(&[0.5 * (one.angles[0] + two.angles[0])], 1.0, Some(&one))?;
+            if middle.residual[0] * one.residual[0] > 0.0 { one = middle } else { two = middle }
+        }
+        None
+    }
+}

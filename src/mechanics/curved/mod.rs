@@ -1,0 +1,476 @@
+//! Contacts that are curved, drafted or stepped: pieces of surface with gaps under soft flat pads.
+//!
+//! The pressure is `k (delta - h + tilt)` where that is positive; it acts along the surface's
+//! normal, so that a slope of the gap moves its lever (`xi = x - (d/2) grad h` in (6)(7)) and
+//! pushes along the pad (`-p grad h` in (3)(4)). A part that is round about an axis on both faces
+//! can spin about it, which friction alone resists: the slip problem then has four or five
+//! dimensions. `docs/curved.md` says what is solved and what is neglected.
+
+mod equilibrium;
+mod face;
+mod slip;
+mod space;
+
+use glam::DVec2;
+use nalgebra::Vector5;
+use serde::Serialize;
+
+use crate::contact::field::{Piece, Surfaces};
+use crate::error::{Error, Result};
+use crate::model::{Face as Side, Score, Slip, Status, Wrench};
+
+use super::{COUPLING_SEARCH, refused};
+use equilibrium::{Problem, State};
+use face::{Face, Pressed};
+use slip::{Slipping, Space};
+use space::{Kind, Rotation};
+
+/// What one face carries at the limit.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct FaceAnswer {
+    /// Normal force [N].
+    pub load: f64,
+    /// Compression of the layer at the origin of the pad plane [m].
+    pub delta: f64,
+    /// Pressed area [m^2].
+    pub area: f64,
+    /// Mean pressure [Pa].
+    pub mean_pressure: f64,
+    /// Greatest pressure [Pa].
+    pub greatest_pressure: f64,
+    /// Smallest box around what is pressed: its lower and upper corner in `(x1, x2)` [m].
+    pub extent: [[f64; 2]; 2],
+    /// What the face carries by friction: force along `x1`, `x2` [N] and moment about `x3` [N m].
+    pub share: [f64; 3],
+}
+
+/// What a user should know beside the numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(tag = "note", rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Note {
+    /// The pad is too soft or its contact too wide for the flat formula.
+    TooSoft {
+        /// The face.
+        face: Side,
+        /// Which limit is passed.
+        limit: SoftLimit,
+        /// The value: compression or half width over the layer's thickness, or half width over
+        /// radius.
+        value: f64,
+    },
+    /// The part rolls out of the grip unless friction holds it: its round faces stand farther
+    /// apart than their radii.
+    Unstable {
+        /// Stiffness against the rotation [N m per rad], negative.
+        stiffness: f64,
+    },
+    /// A pad ends within the contact of a part that can spin, and pushes it off sideways.
+    OverEdge {
+        /// Force on the body across the axis [N].
+        force: f64,
+    },
+    /// The part turns by this angle before it stops, more than the layers give: the rotation is
+    /// counted as free.
+    SettlesBy {
+        /// Angle [rad].
+        angle: f64,
+    },
+    /// The faces are of facets that could be meant to be round: they are taken as round.
+    FacetedOrRound {
+        /// Facets of the whole round.
+        facets: f64,
+    },
+    /// The part tilts by this angle and slips by half the distance times it before the limit is
+    /// there: friction may hold a little below the limit.
+    TiltsFirst {
+        /// Angle [rad].
+        angle: f64,
+        /// Slip [m].
+        slip: f64,
+    },
+    /// Planes that tilt under their load push along the pads, which the theory leaves out as the
+    /// paper does; with a plane opposite a round face it does not cancel.
+    TiltPushes {
+        /// Force on the body along `x1`, `x2` [N].
+        force: [f64; 2],
+        /// `mu_s` with it, for the same pressure.
+        mu_s: f64,
+    },
+}
+
+/// Change of `mu_s` from which [`Note::TiltPushes`] is given.
+const TILTING_PUSH: f64 = 1e-3;
+
+/// Push across the axis of a part that can spin, over the normal forces, from which
+/// [`Note::OverEdge`] is given.
+const OVER_EDGE: f64 = 1e-3;
+
+/// Limits of [`Note::TooSoft`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SoftLimit {
+    /// Compression above a third of the layer.
+    Compression,
+    /// Half width above 0.4 of the radius: friction needed is overestimated by over 1.6 %.
+    Width,
+    /// Half width below the layer's thickness: the layer is no bed of springs there.
+    Thickness,
+}
+
+/// The answer for one contact of [`Surfaces`] and one load.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Answer {
+    /// Status, `mu_s`, certificate, as for planes; there are no pressure planes.
+    #[serde(flatten)]
+    pub score: Score,
+    /// Dimensions of the slip problem: 3, 4 or 5.
+    pub dimensions: u8,
+    /// Incipient motion `(u1, u2, omega3, omega1, omega2)` of the point midway between the faces,
+    /// the largest part 1 in m/s and rad/s.
+    pub motion: Option<[f64; 5]>,
+    /// Tilt of the body `(a1, a2)` [rad]: compression is `delta - h + a . x` on face I and `delta -
+    /// h - a . x` on face II.
+    pub tilt: Option<[f64; 2]>,
+    /// Both faces.
+    pub faces: Option<[FaceAnswer; 2]>,
+    /// What to know beside.
+    pub notes: Vec<Note>,
+}
+
+/// Smallest friction coefficient that holds `wrench` (about the grip origin) in a grip on these
+/// surfaces, squeezed with `force` [N]. `distance` [m] is the height of face I's pad plane over
+/// that of face II, negative for a grip from inside.
+///
+/// # Errors
+/// When a number is not finite, `force` or a stiffness is not positive, or a gap is not a surface.
+/// A hard case is a [`Status`].
+pub fn solve(surfaces: &Surfaces, distance: f64, force: f64, wrench: &Wrench) -> Result<Answer> {
+    check(surfaces, distance, force, wrench)?;
+    let faces = [
+        Face::new(&surfaces.face_i, surfaces.stiffness[0], 1.0),
+        Face::new(&surfaces.face_ii, surfaces.stiffness[1], -1.0),
+    ];
+    if faces.iter().any(|face| face.fields.is_empty()) {
+        return Ok(no_answer(Status::NoContact));
+    }
+    let normal = [force + 0.5 * wrench.force.z, force - 0.5 * wrench.force.z];
+    if normal.iter().any(|n| *n <= 0.0) {
+        return Ok(no_answer(Status::NoNormalForce));
+    }
+    let pressed = [0, 1].map(|k| faces[k].carry(normal[k], DVec2::ZERO, None));
+    let [Some(one), Some(two)] = &pressed else { return Ok(no_answer(Status::NotConverged)) };
+    let rotations = space::rotations([one, two], distance);
+    let case = Case { faces: &faces, pressed: [one, two], distance, normal, wrench, rotations };
+    let mut answer = case.solve();
+    answer.notes.extend(case.softness(surfaces, &answer));
+    Ok(answer)
+}
+
+/// A case with what is known of it before any slip.
+struct Case<'a> {
+    faces: &'a [Face; 2],
+    /// Without tilt.
+    pressed: [&'a Pressed<'a>; 2],
+    distance: f64,
+    normal: [f64; 2],
+    wrench: &'a Wrench,
+    rotations: [Rotation; 2],
+}
+
+/// Lever of a stiffness over the distance of the faces below which it is none.
+const NO_LEVER: f64 = 1e-6;
+
+impl<'a> Case<'a> {
+    /// With the rotations free that are free in any case, and those that turn out to be.
+    fn solve(&self) -> Answer {
+        let force = 0.5 * (self.normal[0] + self.normal[1]);
+        let none = NO_LEVER * force * self.distance.abs();
+        let mut notes = Vec::new();
+        let mut free = self.rotations.map(|rotation| match rotation.kind {
+            Kind::Free => true,
+            Kind::Facets(facets) => {
+                if facets < 16.5 {
+                    notes.push(Note::FacetedOrRound { facets });
+                }
+                true
+            }
+            Kind::Nearly(stiffness) => {
+                if stiffness < -none {
+                    notes.push(Note::Unstable { stiffness });
+                }
+                stiffness <= none
+            }
+            Kind::Held => false,
+        });
+        loop {
+            let problem = self.problem(free);
+            let (status, state) = find(&problem);
+            // A round part that turns by more than the layers give is free to turn.
+            let mut settles = None;
+            for i in 0..2 {
+                let Rotation { axis, kind: Kind::Nearly(stiffness) } = self.rotations[i] else {
+                    continue;
+                };
+                if free[i] {
+                    continue;
+                }
+                let angle = match &state {
+                    Some(state) => {
+                        let tilt = problem.tilt(&state.angles);
+                        axis.dot(DVec2::new(tilt.y, -tilt.x)).abs()
+                    }
+                    None => axis.dot(problem.moment_beyond(self.pressed)).abs() / stiffness,
+                };
+                let give = 0.5 * (self.pressed[0].compression() + self.pressed[1].compression());
+                if 0.5 * self.distance.abs() * angle > give {
+                    settles = Some((i, angle));
+                }
+            }
+            match settles {
+                Some((i, angle)) => {
+                    free[i] = true;
+                    notes.push(Note::SettlesBy { angle });
+                }
+                None => return self.finish(&problem, status, state, notes),
+            }
+        }
+    }
+
+    fn problem(&self, free: [bool; 2]) -> Problem<'a> {
+        let axes = |wanted: bool| -> Vec<DVec2> {
+            (0..2).filter(|&i| free[i] == wanted).map(|i| self.rotations[i].axis).collect()
+        };
+        let held = axes(false);
+        let rolling = (0..2)
+            .filter(|&i| !free[i])
+            .map(|i| match self.rotations[i].kind {
+                Kind::Nearly(stiffness) => stiffness,
+                _ => 0.0,
+            })
+            .collect();
+        let widths: Vec<f64> = held
+            .iter()
+            .map(|e| {
+                let width = self.pressed.map(|face| {
+                    let [low, high] = face.extent_along(e.perp());
+                    high - low
+                });
+                width[0].max(width[1])
+            })
+            .collect();
+        let give = self.pressed[0].compression().max(self.pressed[1].compression());
+        let units = widths.iter().map(|width| 2.0 * give / width).collect();
+        let length = slip::length(self.pressed);
+        Problem {
+            faces: [&self.faces[0], &self.faces[1]],
+            distance: self.distance,
+            normal: self.normal,
+            wrench: *self.wrench,
+            space: Space { spins: axes(true) },
+            held,
+            rolling,
+            units,
+            widths,
+            moment: (self.normal[0] + self.normal[1]) * length,
+        }
+    }
+
+    fn finish(
+        &self,
+        problem: &Problem<'_>,
+        status: Status,
+        state: Option<State<'_>>,
+        mut notes: Vec<Note>,
+    ) -> Answer {
+        let dimensions = problem.space.dimensions() as u8;
+        let (Some(state), Some(slipping)) = (&state, state.as_ref().and_then(|s| s.slip)) else {
+            let mut answer = no_answer(status);
+            (answer.dimensions, answer.notes) = (dimensions, notes);
+            return answer;
+        };
+        let tilt = problem.tilt(&state.angles);
+        let give = 0.5 * (self.pressed[0].compression() + self.pressed[1].compression());
+        let angle = tilt.length();
+        let slip = 0.5 * self.distance.abs() * angle;
+        if slip > give {
+            notes.push(Note::TiltsFirst { angle, slip });
+        }
+        if let Some((force, pushed)) = problem.with_tilting_planes(state)
+            && (pushed.mu - slipping.mu).abs() > TILTING_PUSH * slipping.mu
+        {
+            notes.push(Note::TiltPushes { force: force.to_array(), mu_s: pushed.mu });
+        }
+        for axis in &problem.space.spins {
+            let push = -axis.perp().dot(state.faces[0].slope + state.faces[1].slope);
+            if push.abs() > OVER_EDGE * (self.normal[0] + self.normal[1]) {
+                notes.push(Note::OverEdge { force: push });
+            }
+        }
+        let motion = motion(&problem.space, &slipping);
+        Answer {
+            score: Score {
+                status,
+                mu_s: Some(slipping.mu),
+                slip: Some(describe(&motion, &slipping)),
+                pressure: None,
+                contact_area_i: state.faces[0].area,
+                contact_area_ii: state.faces[1].area,
+                residual: state.error(),
+                bounds: Some(slipping.bounds),
+                evaluations: slipping.evaluations,
+            },
+            dimensions,
+            motion: Some(motion),
+            tilt: Some([tilt.x + 0.0, tilt.y + 0.0]),
+            faces: Some([0, 1].map(|k| face_answer(&state.faces[k], &slipping, k))),
+            notes,
+        }
+    }
+
+    /// Notes on pads too soft for the theory.
+    fn softness(&self, surfaces: &Surfaces, answer: &Answer) -> Vec<Note> {
+        let mut notes = Vec::new();
+        let pieces: [&[Piece]; 2] = [&surfaces.face_i, &surfaces.face_ii];
+        for (k, face) in [Side::I, Side::II].into_iter().enumerate() {
+            if answer.faces.is_none() {
+                continue;
+            }
+            let pressed = self.pressed[k];
+            let delta = pressed.compression();
+            let mut note = |limit, value| notes.push(Note::TooSoft { face, limit, value });
+            if let Some(layer) = surfaces.layer
+                && delta > layer / 3.0
+            {
+                note(SoftLimit::Compression, delta / layer);
+            }
+            let round = pieces[k].iter().filter_map(|piece| piece.gap.radius());
+            let Some(radius) = round.map(f64::abs).reduce(f64::min) else { continue };
+            // The half width that a round piece of this compression has.
+            let half = (2.0 * radius * delta).sqrt();
+            if half > 0.4 * radius {
+                note(SoftLimit::Width, half / radius);
+            }
+            if let Some(layer) = surfaces.layer
+                && half < layer
+            {
+                note(SoftLimit::Thickness, half / layer);
+            }
+        }
+        notes
+    }
+}
+
+/// The limit state of a problem, and its status.
+fn find<'a>(problem: &Problem<'a>) -> (Status, Option<State<'a>>) {
+    let branch = problem.branch();
+    let strong = |state: &State<'_>| {
+        let mu = state.slip.map_or(0.0, |slip| slip.mu);
+        let width = problem.widths.iter().copied().fold(f64::INFINITY, f64::min);
+        mu * problem.distance.abs() > COUPLING_SEARCH * width
+    };
+    match branch {
+        Some(state) if problem.held.is_empty() || !strong(&state) => (Status::Ok, Some(state)),
+        branch => {
+            let (states, any) = problem.scan(branch.clone());
+            match (states.len(), branch) {
+                (0, _) if any => (Status::TwistedOut, None),
+                (0, _) => (Status::NotConverged, None),
+                (1, _) => (Status::Ok, states.into_iter().next()),
+                (_, Some(state)) => (Status::Ambiguous, Some(state)),
+                (_, None) => (Status::Ambiguous, states.into_iter().next()),
+            }
+        }
+    }
+}
+
+fn no_answer(status: Status) -> Answer {
+    Answer {
+        score: refused(status, 0),
+        dimensions: 3,
+        motion: None,
+        tilt: None,
+        faces: None,
+        notes: Vec::new(),
+    }
+}
+
+/// `(u1, u2, omega3, omega1, omega2)`, the largest part 1.
+fn motion(space: &Space, slipping: &Slipping) -> [f64; 5] {
+    let zeta: &Vector5<f64> = &slipping.zeta;
+    let spin: DVec2 = space.spins.iter().enumerate().map(|(i, e)| zeta[3 + i] * *e).sum();
+    let parts = [zeta[0], zeta[1], zeta[2], spin.x, spin.y];
+    let most = parts.iter().map(|x| x.abs()).fold(0.0, f64::max);
+    parts.map(|x| if most > 0.0 { x / most } else { 0.0 })
+}
+
+/// Share of the spin below which a motion counts as none.
+const NO_SPIN: f64 = 1e-9;
+
+fn describe(motion: &[f64; 5], slipping: &Slipping) -> Slip {
+    let [u1, u2, omega, s1, s2] = *motion;
+    if slipping.mu == 0.0 || motion.iter().all(|x| *x == 0.0) {
+        return Slip::None;
+    }
+    if s1.hypot(s2) > NO_SPIN {
+        let rolls_on = slipping.rolls_on.map(|k| if k == 0 { Side::I } else { Side::II });
+        return Slip::Spin { omega: [s1, s2, omega], velocity: [u1, u2], rolls_on };
+    }
+    if omega.abs() > NO_SPIN * u1.hypot(u2) {
+        return Slip::Rotation {
+            c: [-u2 / omega + 0.0, u1 / omega + 0.0],
+            sense: if omega > 0.0 { 1 } else { -1 },
+        };
+    }
+    let speed = u1.hypot(u2);
+    Slip::Translation { direction: [u1 / speed, u2 / speed] }
+}
+
+fn face_answer(face: &Pressed<'_>, slipping: &Slipping, k: usize) -> FaceAnswer {
+    FaceAnswer {
+        load: face.load,
+        delta: face.delta,
+        area: face.area,
+        mean_pressure: face.load / face.area,
+        greatest_pressure: face.greatest(),
+        extent: face.extent().map(|x| x.to_array()),
+        share: slipping.shares[k].into(),
+    }
+}
+
+fn check(surfaces: &Surfaces, distance: f64, force: f64, wrench: &Wrench) -> Result<()> {
+    let outlines = crate::model::Contact {
+        face_i: surfaces.face_i.iter().map(Piece::polygon).collect(),
+        face_ii: surfaces.face_ii.iter().map(Piece::polygon).collect(),
+    };
+    super::check(&outlines, distance, force, wrench)?;
+    for (name, pieces) in [("A_I", &surfaces.face_i), ("A_II", &surfaces.face_ii)] {
+        for (index, piece) in pieces.iter().enumerate() {
+            if let Some(fault) = piece.gap.fault() {
+                return Err(Error::input(
+                    format!("{name}[{index}].gap"),
+                    format!("has {fault}"),
+                    "give finite lengths [m], radii that are not zero, axes that are not zero",
+                ));
+            }
+        }
+    }
+    let [one, two] = surfaces.stiffness;
+    if !(one.is_finite() && one > 0.0 && two.is_finite() && two > 0.0) {
+        return Err(Error::input(
+            "k",
+            format!("is [{one}, {two}]"),
+            "give the pads' stiffness on face I and II, finite and positive [Pa/m]",
+        ));
+    }
+    if let Some(layer) = surfaces.layer
+        && !(layer.is_finite() && layer > 0.0)
+    {
+        return Err(Error::input(
+            "layer",
+            format!("is {layer}"),
+            "give the thickness of the pads' layer, finite and positive [m]",
+        ));
+    }
+    Ok(())
+}

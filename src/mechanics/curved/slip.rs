@@ -1,0 +1,353 @@
+//! The slip problem in three to five dimensions for a given pressure: planar twists of the two
+//! faces that follow from one motion `zeta = (u1, u2, omega3, spins)`.
+//!
+//! `mu_s = max w . zeta / D(zeta)`, `D = sum_k D_k(B_k zeta)`, as for planes; but `D` has a crease
+//! where a face is at rest, and there the answer often lies: the body rolls on the less loaded
+//! face. Those two candidates are tested first; elsewhere Newton's method has a smooth function.
+
+use glam::DVec2;
+use nalgebra::{Matrix3, Matrix3x5, Matrix5, Vector3, Vector5};
+
+use super::face::Pressed;
+use crate::model::Bounds;
+
+/// The motions without resistance but friction.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Space {
+    /// Unit vectors in the pad plane about which the body can spin: none, one or two.
+    pub(super) spins: Vec<DVec2>,
+}
+
+impl Space {
+    /// Three to five.
+    pub(super) fn dimensions(&self) -> usize {
+        3 + self.spins.len()
+    }
+
+    /// `B_k`: the planar twist of face `k` from `zeta`, for faces `distance` apart.
+    pub(super) fn basis(&self, k: usize, distance: f64) -> Matrix3x5<f64> {
+        let lever = if k == 0 { 0.5 * distance } else { -0.5 * distance };
+        let mut basis = Matrix3x5::identity();
+        for (i, e) in self.spins.iter().enumerate() {
+            basis[(0, 3 + i)] = lever * e.y;
+            basis[(1, 3 + i)] = -lever * e.x;
+        }
+        for i in self.dimensions()..5 {
+            basis.column_mut(i).fill(0.0);
+        }
+        basis
+    }
+}
+
+/// The answer of the slip problem.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slipping {
+    pub(super) mu: f64,
+    /// The motion, of any length.
+    pub(super) zeta: Vector5<f64>,
+    /// Load on each face: force along the pad and moment about the closing axis.
+    pub(super) shares: [Vector3<f64>; 2],
+    /// The face at rest, on which the body rolls.
+    pub(super) rolls_on: Option<usize>,
+    /// Lower and upper bound.
+    pub(super) bounds: Bounds,
+    /// Evaluations of the integrals.
+    pub(super) evaluations: u32,
+}
+
+/// Dissipation of both faces with its derivatives in `zeta`.
+struct Both {
+    value: f64,
+    gradient: Vector5<f64>,
+    hessian: Matrix5<f64>,
+    faces: [Vector3<f64>; 2],
+}
+
+/// The problem in its own units: force over the normal forces, lengths over the contact's.
+struct Problem<'a, 'b> {
+    faces: [&'a Pressed<'b>; 2],
+    basis: [Matrix3x5<f64>; 2],
+    active: usize,
+    /// What a unit of each coordinate is.
+    units: Vector5<f64>,
+    /// Sum of the normal forces that count.
+    normal: f64,
+    evaluations: std::cell::Cell<u32>,
+}
+
+/// Newton steps at most.
+const STEPS: u32 = 100;
+/// Residual at which Newton's method is content; `mu` is right to its square.
+const ENOUGH: f64 = 1e-14;
+/// Share of the sliding face's friction below which the other face counts as at rest: at a tie both
+/// may slip.
+const AT_REST: f64 = 1.0 - 1e-9;
+
+/// Solves for the load `w` along the space; the faces are `distance` apart.
+pub(super) fn solve(
+    space: &Space,
+    faces: [&Pressed<'_>; 2],
+    distance: f64,
+    w: Vector5<f64>,
+    start: Option<&Vector5<f64>>,
+) -> Option<Slipping> {
+    let basis = [space.basis(0, distance), space.basis(1, distance)];
+    let length = length(faces);
+    let reach = 2.0 / distance.abs();
+    let problem = Problem {
+        faces,
+        basis,
+        active: space.dimensions(),
+        units: Vector5::new(1.0, 1.0, 1.0 / length, reach, reach),
+        normal: faces[0].load + faces[1].load,
+        evaluations: std::cell::Cell::new(0),
+    };
+    if w.amax() == 0.0 {
+        let bounds = Bounds { lower: 0.0, upper: 0.0 };
+        let shares = [Vector3::zeros(); 2];
+        let zeta = Vector5::zeros();
+        return Some(Slipping { mu: 0.0, zeta, shares, rolls_on: None, bounds, evaluations: 0 });
+    }
+    let rolling = (0..2).filter_map(|k| problem.rolling(space, k, distance, &w, false)).next();
+    rolling
+        .or_else(|| problem.interior(&w, start))
+        .or_else(|| (0..2).filter_map(|k| problem.rolling(space, k, distance, &w, true)).next())
+}
+
+/// Root mean square distance of the pressure from its middle on both faces, but for a constant.
+pub(super) fn length(faces: [&Pressed<'_>; 2]) -> f64 {
+    let spread = faces.iter().map(|face| face.spread() * face.load).sum::<f64>();
+    (spread / faces.iter().map(|face| face.load).sum::<f64>()).sqrt()
+}
+
+impl Problem<'_, '_> {
+    fn both(&self, z: &Vector5<f64>) -> Both {
+        self.evaluations.set(self.evaluations.get() + 1);
+        let mut sum = Both {
+            value: 0.0,
+            gradient: Vector5::zeros(),
+            hessian: Matrix5::zeros(),
+            faces: [Vector3::zeros(); 2],
+        };
+        let units = Matrix5::from_diagonal(&self.units);
+        for k in 0..2 {
+            let basis = self.basis[k] * units;
+            let found = self.faces[k].dissipation(&(basis * z));
+            sum.value += found.value / self.normal;
+            sum.gradient += basis.tr_mul(&found.gradient) / self.normal;
+            sum.hessian += basis.tr_mul(&(found.hessian * basis)) / self.normal;
+            sum.faces[k] = found.gradient;
+        }
+        sum
+    }
+
+    /// Newton's method on `D^2/2 - w . z` where the function is smooth. At the end the length of
+    /// `z` is `mu` in these units.
+    fn interior(&self, w: &Vector5<f64>, start: Option<&Vector5<f64>>) -> Option<Slipping> {
+        let w = w.component_mul(&self.units) / self.normal;
+        let size = w.amax();
+        let w = w / size;
+        let mut z = start
+            .map(|zeta| zeta.component_div(&self.units))
+            .filter(|z| z.dot(&w) > 0.0 && z.iter().all(|x| x.is_finite()))
+            .unwrap_or_else(|| self.ellipsoid(&w));
+        // The best length along z: D^2 = w . z.
+        let mut at = self.both(&z);
+        let along = w.dot(&z) / (at.value * at.value);
+        if !(along.is_finite() && along > 0.0) {
+            return None;
+        }
+        z *= along;
+        let scaled = |at: Both, t: f64| Both {
+            value: at.value * t,
+            gradient: at.gradient,
+            hessian: at.hessian / t,
+            faces: at.faces,
+        };
+        at = scaled(at, along);
+        let residual = |at: &Both| at.value * at.gradient - w;
+        let merit = |at: &Both, z: &Vector5<f64>| 0.5 * at.value * at.value - w.dot(z);
+        let mut error = residual(&at);
+        for _ in 0..STEPS {
+            if error.amax() <= ENOUGH {
+                break;
+            }
+            let mut matrix = at.gradient * at.gradient.transpose() + at.value * at.hessian;
+            let trace = matrix.trace();
+            for i in self.active..5 {
+                matrix[(i, i)] = 1.0;
+            }
+            let mut moved = false;
+            for lift in [1e-15, 1e-12, 1e-9, 1e-6, 1e-3] {
+                let lifted = matrix + lift * trace * Matrix5::identity();
+                let Some(factor) = lifted.cholesky() else { continue };
+                let step = -factor.solve(&error);
+                let slope = error.dot(&step);
+                let here = merit(&at, &z);
+                let mut t = 1.0;
+                for _ in 0..30 {
+                    let tried = z + t * step;
+                    let there = self.both(&tried);
+                    let left = residual(&there);
+                    if left.amax() < 0.5 * error.amax()
+                        || merit(&there, &tried) < here + 1e-4 * t * slope
+                            && left.amax() < 2.0 * error.amax().max(0.1)
+                            && error.amax() > 1e-9
+                        || left.amax() < 0.9 * error.amax()
+                    {
+                        (z, at, error, moved) = (tried, there, left, true);
+                        break;
+                    }
+                    t *= 0.5;
+                }
+                if moved {
+                    break;
+                }
+            }
+            if !moved {
+                break;
+            }
+        }
+        let lower = w.dot(&z) / at.value;
+        let mu = lower * size;
+        let upper = size * self.upper(&w, lower, &at, &error)?;
+        // A twist that is not the best, e.g. caught at a crease.
+        if error.amax() > 1e-8 && upper > mu * (1.0 + 1e-6) {
+            return None;
+        }
+        Some(Slipping {
+            mu,
+            zeta: z.component_mul(&self.units),
+            shares: at.faces.map(|share| mu * share),
+            rolls_on: None,
+            bounds: Bounds { lower: mu, upper: upper.max(mu) },
+            evaluations: self.evaluations.get(),
+        })
+    }
+
+    /// A twist from the ellipsoid of each face: the pressure's moments in place of its norm.
+    fn ellipsoid(&self, w: &Vector5<f64>) -> Vector5<f64> {
+        let mut matrix = Matrix5::zeros();
+        let units = Matrix5::from_diagonal(&self.units);
+        for k in 0..2 {
+            let face = self.faces[k];
+            let (n, c) = (face.load, face.centre());
+            let polar = n * (face.spread() + c.length_squared());
+            let inertia = Matrix3::new(
+                n,
+                0.0,
+                -n * c.y, //
+                0.0,
+                n,
+                n * c.x, //
+                -n * c.y,
+                n * c.x,
+                polar,
+            );
+            let basis = self.basis[k] * units;
+            matrix += basis.tr_mul(&(inertia * basis)) / self.normal;
+        }
+        for i in self.active..5 {
+            matrix[(i, i)] = 1.0;
+        }
+        matrix.cholesky().map_or(*w, |factor| factor.solve(w))
+    }
+
+    /// Upper bound from the supports: what `w` has beyond `lower` times the support at the answer
+    /// is made up of the supports of other motions; the sizes of the coefficients add up.
+    fn upper(&self, w: &Vector5<f64>, lower: f64, at: &Both, error: &Vector5<f64>) -> Option<f64> {
+        let left = w - lower * at.gradient;
+        if left.amax() <= 4.0 * f64::EPSILON && error.amax() <= 1e-14 {
+            return Some(lower + 5.0 * left.amax());
+        }
+        // About the middle of pressure, so that a turn's support is a moment.
+        let loads = self.faces[0].load + self.faces[1].load;
+        let centre = (self.faces[0].first + self.faces[1].first) / loads;
+        let mut supports = Matrix5::identity();
+        for i in 0..self.active {
+            let mut z = Vector5::zeros();
+            z[i] = 1.0;
+            if i == 2 {
+                let turn = self.units[2];
+                (z[0], z[1]) = (centre.y * turn, -centre.x * turn);
+            }
+            supports.set_column(i, &self.both(&z).gradient);
+        }
+        let coefficients = supports.lu().solve(&left)?;
+        Some(lower + coefficients.iter().map(|c| c.abs()).sum::<f64>())
+    }
+
+    /// The body rolls on face `k`: the other face slides along the pad, and `k` carries the rest of
+    /// the load at no more friction. `ties`: whether as much friction will do.
+    fn rolling(
+        &self,
+        space: &Space,
+        k: usize,
+        distance: f64,
+        w: &Vector5<f64>,
+        ties: bool,
+    ) -> Option<Slipping> {
+        let other = 1 - k;
+        let mut zeta = Vector5::zeros();
+        for i in 0..space.spins.len() {
+            // The spin about this axis with face k at rest.
+            let column = self.basis[k].column(3 + i);
+            let mut at_rest = Vector5::zeros();
+            at_rest[3 + i] = 1.0;
+            for j in 0..3 {
+                at_rest[j] = -column[j];
+            }
+            zeta += w.dot(&at_rest) * at_rest;
+        }
+        let slide = self.basis[other] * zeta;
+        let along = DVec2::new(slide.x, slide.y);
+        let speed = along.length();
+        if speed == 0.0 || distance == 0.0 {
+            return None;
+        }
+        let face = self.faces[other];
+        let mu = w.dot(&zeta) / (face.load * speed);
+        let e = along / speed;
+        let sliding = mu * Vector3::new(face.load * e.x, face.load * e.y, face.first.perp_dot(e));
+        let resting = Vector3::new(w[0], w[1], w[2]) - sliding;
+        let most = if ties { 1.0 + 1e-6 } else { AT_REST } * mu;
+        if resting.x.hypot(resting.y) > most * self.faces[k].load {
+            return None;
+        }
+        let alone = self.alone(k, &resting)?;
+        if alone > most {
+            return None;
+        }
+        let mut shares = [sliding, resting];
+        if k == 0 {
+            shares.reverse();
+        }
+        Some(Slipping {
+            mu,
+            zeta,
+            shares,
+            rolls_on: Some(k),
+            bounds: Bounds { lower: mu, upper: mu.max(alone) },
+            evaluations: self.evaluations.get(),
+        })
+    }
+
+    /// The friction that face `k` alone needs for a load.
+    fn alone(&self, k: usize, load: &Vector3<f64>) -> Option<f64> {
+        if load.amax() <= 1e-15 * self.normal {
+            return Some(0.0);
+        }
+        let one = Problem {
+            faces: [self.faces[k]; 2],
+            basis: [Space::default().basis(k, 0.0), Matrix3x5::zeros()],
+            active: 3,
+            units: self.units,
+            normal: self.faces[k].load,
+            evaluations: std::cell::Cell::new(0),
+        };
+        let w = Vector5::new(load.x, load.y, load.z, 0.0, 0.0);
+        let answer = one.interior(&w, None).map(|slipping| slipping.bounds.upper);
+        self.evaluations.set(self.evaluations.get() + one.evaluations.get());
+        answer
+    }
+}

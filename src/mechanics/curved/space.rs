@@ -1,0 +1,159 @@
+//! Which rotations the pressure does not resist.
+//!
+//! Translations along the pads and the turn about the closing axis map flat pads onto themselves.
+//! A rotation about an axis in the pad plane is free if it maps both faces together onto themselves:
+//! both patches on one cylinder, barrel or sphere. Then friction alone carries the moment about it.
+//! For a unit rotation the normal velocity of a point is the pressure's lever `xi` about the axis;
+//! it is zero on a common axis, of the size of a facet's half width on a polyhedral model of one,
+//! and as large as the contact on a plane.
+
+use glam::DVec2;
+use nalgebra::{Matrix2, Matrix4, Matrix4x2, SVector, SymmetricEigen};
+
+use super::face::Pressed;
+
+/// A rotation about an axis in the pad plane, and how the faces take it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rotation {
+    /// Direction of the axis.
+    pub(super) axis: DVec2,
+    pub(super) kind: Kind,
+}
+
+/// How the pressure takes a rotation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Kind {
+    /// It holds: a plane, or surfaces without a common axis, is among the faces.
+    Held,
+    /// Both faces are round about it, not about one axis: it holds as far as its stiffness [N m per
+    /// rad] goes, which may be negative.
+    Nearly(f64),
+    /// It does not resist.
+    Free,
+    /// It does not resist: faces of facets stand for round ones. So many would make the full round.
+    Facets(f64),
+}
+
+/// Lever of the pressure about an axis, over its root mean square distance from its middle across
+/// the axis, up to which both faces are on one axis.
+const ON_AXIS: f64 = 1e-6;
+/// The same for faces of facets. On one plane, however it lies, the two are the same; on facets as
+/// wide as the contact of the round face that they stand for it is about 0.98 of it. Wider ones
+/// hold by the pressure on a single facet.
+const FACETS: f64 = 0.98;
+
+/// A point of the pressure: `(u, omega) -> normal velocity` as coefficients, its face, its force,
+/// its place and the gap's slope.
+struct Point {
+    c: SVector<f64, 6>,
+    face: usize,
+    p: f64,
+    x: DVec2,
+    slope: DVec2,
+}
+
+/// The two principal rotations of the pressure, the softer one first.
+pub(super) fn rotations(faces: [&Pressed<'_>; 2], distance: f64) -> [Rotation; 2] {
+    let mut points = Vec::new();
+    for (k, face) in faces.iter().enumerate() {
+        let (side, height) = if k == 0 { (1.0, 0.5 * distance) } else { (-1.0, -0.5 * distance) };
+        face.points(|x, slope, p| {
+            let normal = [slope.x, slope.y, side];
+            let c = SVector::from([
+                normal[0],
+                normal[1],
+                normal[2],
+                x.y * normal[2] - height * normal[1],
+                height * normal[0] - x.x * normal[2],
+                x.x * normal[1] - x.y * normal[0],
+            ]);
+            points.push(Point { c, face: k, p, x, slope });
+        });
+    }
+    // Free motions that go with a rotation: three translations and the turn about x3.
+    let (rest, turns) = ([0, 1, 2, 5], [3, 4]);
+    let mut inner = Matrix4::zeros();
+    let mut mixed = Matrix4x2::zeros();
+    let mut own = Matrix2::zeros();
+    for point in &points {
+        let outer = point.p * point.c * point.c.transpose();
+        inner += Matrix4::from_fn(|i, j| outer[(rest[i], rest[j])]);
+        mixed += Matrix4x2::from_fn(|i, j| outer[(rest[i], turns[j])]);
+        own += Matrix2::from_fn(|i, j| outer[(turns[i], turns[j])]);
+    }
+    // Each coordinate in units of its own size; those that do nothing drop out.
+    let units = Matrix4::from_diagonal(
+        &inner.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 }),
+    );
+    let back = SymmetricEigen::new(units * inner * units);
+    let most = back.eigenvalues.amax();
+    let inverse = Matrix4::from_diagonal(
+        &back.eigenvalues.map(|d| if d > 1e-12 * most { 1.0 / d } else { 0.0 }),
+    );
+    let half = units * back.eigenvectors;
+    let follow = half * inverse * half.transpose() * mixed;
+    let left = own - mixed.transpose() * follow;
+    let principal = SymmetricEigen::new(left);
+    let order = if principal.eigenvalues[0] <= principal.eigenvalues[1] { [0, 1] } else { [1, 0] };
+    order.map(|i| {
+        let turn = principal.eigenvectors.column(i);
+        let mut motion = SVector::<f64, 6>::zeros();
+        for (k, &j) in turns.iter().enumerate() {
+            motion[j] = turn[k];
+        }
+        let moved = -follow * turn;
+        for (k, &j) in rest.iter().enumerate() {
+            motion[j] = moved[k];
+        }
+        let mut axis = DVec2::new(turn[0], turn[1]);
+        // One sense for the same axis.
+        if axis.x < -1e-9 || axis.x.abs() <= 1e-9 && axis.y < 0.0 {
+            axis = -axis;
+        }
+        Rotation { axis, kind: kind(&points, faces, axis, &motion, distance) }
+    })
+}
+
+fn kind(
+    points: &[Point],
+    faces: [&Pressed<'_>; 2],
+    axis: DVec2,
+    motion: &SVector<f64, 6>,
+    distance: f64,
+) -> Kind {
+    let across = axis.perp();
+    let mut radii = [0.0; 2];
+    let mut round = true;
+    let steps = faces.map(|face| face.slopes(across));
+    let faceted = steps.iter().any(|steps| steps.len() >= 2);
+    let limit = if faceted { FACETS } else { ON_AXIS };
+    let mut free = true;
+    for k in 0..2 {
+        let of_face = || points.iter().filter(move |point| point.face == k);
+        let n: f64 = of_face().map(|point| point.p).sum();
+        let mean = |f: &dyn Fn(&Point) -> f64| of_face().map(|q| q.p * f(q)).sum::<f64>() / n;
+        let (x, s) = (mean(&|q| across.dot(q.x)), mean(&|q| across.dot(q.slope)));
+        let width = mean(&|q| (across.dot(q.x) - x).powi(2)).sqrt();
+        let lever = mean(&|q| q.c.dot(motion).powi(2)).sqrt() / width;
+        // The round surface that fits best: x = s R.
+        let slopes = mean(&|q| (across.dot(q.slope) - s).powi(2));
+        let both = mean(&|q| (across.dot(q.slope) - s) * (across.dot(q.x) - x));
+        radii[k] = both / slopes;
+        let off =
+            mean(&|q| (across.dot(q.x) - x - radii[k] * (across.dot(q.slope) - s)).powi(2)).sqrt();
+        round &= slopes * distance * distance > 1e-12 * width * width && off <= FACETS * width;
+        free &= lever <= limit;
+    }
+    if free && faceted {
+        let gaps = steps.iter().flat_map(|steps| steps.windows(2).map(|pair| pair[1] - pair[0]));
+        return Kind::Facets(std::f64::consts::TAU / gaps.fold(0.0, f64::max).atan());
+    }
+    if free {
+        return Kind::Free;
+    }
+    if round && !faceted && radii.iter().all(|r| r.is_finite()) {
+        let lever = |k: usize| faces[k].load * (radii[k] - 0.5 * distance);
+        return Kind::Nearly(lever(0) + lever(1));
+    }
+    Kind::Held
+}
