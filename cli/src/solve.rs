@@ -1,13 +1,14 @@
 //! `gripfast solve`: one contact pair at a time, with everything visible.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args as ClapArgs, ValueEnum};
 use gripfast::case::{self, Case};
+use gripfast::contact::field::Surfaces;
 use gripfast::lab::{earlier, paper};
-use gripfast::mechanics::{self, Options, Pads, inverse};
+use gripfast::mechanics::{self, Options, Pads, curved, inverse};
 use gripfast::model::{Score, Slip, Status};
 use gripfast::report::contact_svg;
 use gripfast::request::{Refiner, Separation};
@@ -79,6 +80,15 @@ struct Answer<'a> {
     inverse: Option<Inverse>,
 }
 
+/// The same for faces as they are.
+#[derive(serde::Serialize)]
+struct CurvedAnswer<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    id: Option<&'a str>,
+    #[serde(flatten)]
+    answer: &'a curved::Answer,
+}
+
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(mu) = args.pad_friction
         && !(mu.is_finite() && mu > 0.0)
@@ -97,6 +107,25 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         let place = || case.id.clone().unwrap_or_else(|| format!("case {}", index + 1));
         let (contact, distance, force, wrench) =
             (&case.contact, case.distance, case.force, &case.wrench);
+        if let Some(surfaces) = &case.surfaces {
+            let answer = curved_answer(&args, case, surfaces).map_err(|error| {
+                anyhow::anyhow!("{}: {}: {error}", args.case.display(), place())
+            })?;
+            any |= answer.score.status.holds();
+            if let Some(path) = &args.plot {
+                plot(path, &place(), cases.len() > 1, case, &answer.score)?;
+            }
+            if args.json {
+                let line = CurvedAnswer { id: case.id.as_deref(), answer: &answer };
+                writeln!(out, "{}", serde_json::to_string(&line)?)?;
+            } else {
+                if cases.len() > 1 {
+                    writeln!(out, "{}{}", if index > 0 { "\n" } else { "" }, place())?;
+                }
+                print_curved(&mut out, case, &answer, args.explain)?;
+            }
+            continue;
+        }
         let answer = match args.method {
             Method::Gripfast => mechanics::solve(contact, distance, force, wrench, &options)
                 .map(|score| (score, None)),
@@ -114,17 +143,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             .map_err(|error| anyhow::anyhow!("{}: {}: {error}", args.case.display(), place()))?;
         any |= score.status.holds();
         if let Some(path) = &args.plot {
-            let path = if cases.len() > 1 {
-                path.with_file_name(format!(
-                    "{}-{}.svg",
-                    path.file_stem().unwrap_or_default().to_string_lossy(),
-                    place()
-                ))
-            } else {
-                path.clone()
-            };
-            let svg = contact_svg::draw(&place(), &case.contact, &score);
-            gripfast::file::write(&path, |writer| writer.write_all(svg.as_bytes()))?;
+            plot(path, &place(), cases.len() > 1, case, &score)?;
         }
         let inverse = args.pad_friction.and_then(|friction| {
             let pads = Pads::new(&case.contact)?;
@@ -166,6 +185,227 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(if any { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
+/// Draws one case; among several the name of each is added to the file's.
+fn plot(path: &Path, name: &str, many: bool, case: &Case, score: &Score) -> anyhow::Result<()> {
+    let path = if many {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        path.with_file_name(format!("{stem}-{name}.svg"))
+    } else {
+        path.to_path_buf()
+    };
+    let svg = contact_svg::draw(name, &case.contact, score);
+    Ok(gripfast::file::write(&path, |writer| writer.write_all(svg.as_bytes()))?)
+}
+
+/// The answer for faces as they are.
+fn curved_answer(args: &Args, case: &Case, surfaces: &Surfaces) -> anyhow::Result<curved::Answer> {
+    let unknown = match args.method {
+        Method::Gripfast => None,
+        Method::Paper => Some("--method paper"),
+        Method::Centroid => Some("--method centroid"),
+    };
+    if let Some(method) = unknown {
+        anyhow::bail!(
+            "{method} knows plane faces only, and this case gives its faces as they are: \
+             leave --method out"
+        );
+    }
+    if args.pad_friction.is_some() {
+        anyhow::bail!(
+            "--pad-friction asks for force and load multiple, which are known for plane faces \
+             only: leave it out"
+        );
+    }
+    Ok(curved::solve(surfaces, case.distance, case.force, &case.wrench)?)
+}
+
+/// The part of a curved answer that users read.
+fn print_curved(
+    out: &mut impl Write,
+    case: &Case,
+    answer: &curved::Answer,
+    explain: bool,
+) -> anyhow::Result<()> {
+    let score = &answer.score;
+    match score.mu_s {
+        Some(mu) => {
+            writeln!(
+                out,
+                "smallest friction coefficient that holds  {mu:.6}{}",
+                note(score.status)
+            )?;
+        }
+        None => writeln!(out, "no answer: {}", reason(score.status))?,
+    }
+    if let Some(slip) = score.slip {
+        print_slip(out, slip)?;
+    }
+    let mm = 1e3;
+    if let Some(faces) = answer.faces {
+        for (name, face) in ["I", "II"].into_iter().zip(&faces) {
+            let [low, high] = face.extent;
+            writeln!(
+                out,
+                "contact on face {name:<3}                       {:.4} mm2, {:.3} mm along x1, \
+                 {:.3} mm along x2",
+                face.area * mm * mm,
+                (high[0] - low[0]) * mm,
+                (high[1] - low[1]) * mm
+            )?;
+            writeln!(
+                out,
+                "pressure on face {name:<3}                      mean {:.4} MPa, greatest {:.4} MPa",
+                face.mean_pressure * 1e-6,
+                face.greatest_pressure * 1e-6
+            )?;
+        }
+        if explain {
+            for (name, face) in ["I", "II"].into_iter().zip(&faces) {
+                let [low, high] = face.extent;
+                writeln!(
+                    out,
+                    "half width on face {name:<3}                    {:.6} mm across x1, \
+                     compression at the origin {:.6} mm",
+                    0.5 * (high[1] - low[1]) * mm,
+                    face.delta * mm
+                )?;
+                writeln!(
+                    out,
+                    "load on face {name:<3}                          {:.4} N normal; by friction \
+                     ({:.4}, {:.4}) N and {:.6} N m",
+                    face.load,
+                    face.share[0] + 0.0,
+                    face.share[1] + 0.0,
+                    face.share[2] + 0.0
+                )?;
+            }
+        }
+    }
+    if let Some([a1, a2]) = answer.tilt.filter(|_| explain) {
+        writeln!(
+            out,
+            "tilt of the part                          {a1:.3e} along x1, {a2:.3e} along x2 [rad]"
+        )?;
+    }
+    for note in &answer.notes {
+        writeln!(out, "note: {}", say(note, case))?;
+    }
+    if explain {
+        writeln!(
+            out,
+            "dimensions of the slip problem            {}{}",
+            answer.dimensions,
+            match answer.dimensions {
+                4 => ": the part can spin about an axis in the pad plane",
+                5 => ": the part can spin about any axis in the pad plane",
+                _ => "",
+            }
+        )?;
+        if let Some(bounds) = score.bounds {
+            writeln!(
+                out,
+                "certificate for this pressure             {:.15} <= mu_s <= {:.15}",
+                bounds.lower, bounds.upper
+            )?;
+        }
+        writeln!(
+            out,
+            "largest residual of the tilt's equations  {:.2e}  (over Fn times the contact's size)",
+            score.residual
+        )?;
+    }
+    Ok(())
+}
+
+/// A note in words.
+fn say(note: &curved::Note, case: &Case) -> String {
+    use curved::{Note, SoftLimit};
+    let mm = 1e3;
+    match *note {
+        Note::TooSoft { face, limit, value } => {
+            let what = match limit {
+                SoftLimit::Compression => {
+                    format!("is compressed by {:.0} % of its thickness", 100.0 * value)
+                }
+                SoftLimit::Width => {
+                    format!("touches {value:.2} radii to either side; mu_s is over 1.6 % too high")
+                }
+                SoftLimit::Thickness => format!(
+                    "touches {value:.2} of its thickness to either side; it is no bed of springs"
+                ),
+            };
+            format!("pad {face:?} is too soft for the theory: it {what}")
+        }
+        Note::Unstable { stiffness } => format!(
+            "unstable: the round faces stand farther apart than their radii; the part rolls out \
+             unless friction holds it ({stiffness:.4} N m per rad)"
+        ),
+        Note::OverEdge { force } => format!(
+            "unstable: a pad ends within the contact and pushes the part aside with {:.4} N",
+            force.abs()
+        ),
+        Note::SettlesBy { angle } => format!(
+            "the faces are nearly on one axis: without friction the part settles by {:.3} deg; \
+             the rotation is counted as free",
+            angle.to_degrees()
+        ),
+        Note::FacetedOrRound { facets } => {
+            format!("faceted or round? about {facets:.0} facets to the round are taken as round")
+        }
+        Note::TiltsFirst { angle, slip } => format!(
+            "the part tilts by {:.3} deg and slips {:.3} mm first; friction may hold a little \
+             below mu_s",
+            angle.to_degrees(),
+            slip * mm
+        ),
+        Note::TiltPushes { force, mu_s } => format!(
+            "the tilted flat pushes ({:.4}, {:.4}) N along the pads, which mu_s leaves out; with \
+             it {mu_s:.6}",
+            force[0], force[1]
+        ),
+        _ => format!("{note:?} (d = {} mm)", case.distance * mm),
+    }
+}
+
+/// The incipient motion in words.
+fn print_slip(out: &mut impl Write, slip: Slip) -> anyhow::Result<()> {
+    let mm = 1e3;
+    match slip {
+        Slip::Rotation { c, sense } => {
+            let turn = if sense > 0 { "counter-clockwise" } else { "clockwise" };
+            // Rounded first: no negative zeros.
+            let [x, y] = c.map(|value| (value * mm * 1e4).round() / 1e4 + 0.0);
+            writeln!(
+                out,
+                "about to turn                             {turn} about ({x:.4}, {y:.4}) mm"
+            )?;
+        }
+        Slip::Translation { direction } => writeln!(
+            out,
+            "about to slide                            along ({:.4}, {:.4})",
+            direction[0], direction[1]
+        )?,
+        Slip::Spin { omega, velocity, rolls_on } => {
+            let [o1, o2, o3] = omega.map(|value| (value * 1e4).round() / 1e4 + 0.0);
+            let [u1, u2] = velocity.map(|value| (value * mm * 1e4).round() / 1e4 + 0.0);
+            let how = match rolls_on {
+                Some(face) => format!("rolls on face {face:?}"),
+                None => "spins, both faces slip".into(),
+            };
+            writeln!(
+                out,
+                "about to spin                             {how}: omega ({o1:.4}, {o2:.4}, \
+                 {o3:.4}) with ({u1:.4}, {u2:.4}) mm along the pads per rad"
+            )?;
+        }
+        Slip::None => writeln!(
+            out,
+            "nothing slips                             the load has no part in the pad plane"
+        )?,
+    }
+    Ok(())
+}
+
 fn print(
     out: &mut impl Write,
     case: &Case,
@@ -182,26 +422,8 @@ fn print(
         )?,
         None => writeln!(out, "no answer: {}", reason(score.status))?,
     }
-    match score.slip {
-        Some(Slip::Rotation { c, sense }) => {
-            let turn = if sense > 0 { "counter-clockwise" } else { "clockwise" };
-            // Rounded first: no negative zeros.
-            let [x, y] = c.map(|value| (value * mm * 1e4).round() / 1e4 + 0.0);
-            writeln!(
-                out,
-                "about to turn                             {turn} about ({x:.4}, {y:.4}) mm"
-            )?;
-        }
-        Some(Slip::Translation { direction }) => writeln!(
-            out,
-            "about to slide                            along ({:.4}, {:.4})",
-            direction[0], direction[1]
-        )?,
-        Some(Slip::None) => writeln!(
-            out,
-            "nothing slips                             the load has no part in the pad plane"
-        )?,
-        None => {}
+    if let Some(slip) = score.slip {
+        print_slip(out, slip)?;
     }
     if let Some(p) = score.pressure {
         let per_mm = 1e-3;

@@ -122,6 +122,7 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
         text("slip", &|grip| match grip.worst.slip {
             Some(Slip::Rotation { .. }) => "rotation".into(),
             Some(Slip::Translation { .. }) => "translation".into(),
+            Some(Slip::Spin { .. }) => "spin".into(),
             Some(Slip::None) => "none".into(),
             None => String::new(),
         }),

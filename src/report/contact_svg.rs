@@ -199,7 +199,8 @@ fn arrows(
             let velocity = match slip {
                 Slip::Rotation { c, sense } => f64::from(sense) * (x - DVec2::from_array(c)).perp(),
                 Slip::Translation { direction } => DVec2::from_array(direction),
-                Slip::None => return,
+                // The faces of a part that spins each move their own way.
+                Slip::Spin { .. } | Slip::None => return,
             };
             // Beside the slip centre the direction of one arrow says nothing.
             let near = matches!(slip, Slip::Rotation { c, .. } if (x - DVec2::from_array(c)).length() < 0.35 * step);

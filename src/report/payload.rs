@@ -192,13 +192,14 @@ fn poses_and_scores(columns: &mut Columns, grips: &[RankedGrip]) -> Vec<Value> {
         grips.iter().flat_map(|g| g.worst.bounds.map_or([nan; 2], |b| [b.lower, b.upper])),
     );
     columns.f32("residual", grips.iter().map(|g| g.worst.residual));
-    // Slip: kind (0 unknown, 1 rotation, 2 translation, 3 none), then centre or direction, then
-    // sense.
+    // Slip: kind (0 unknown, 1 rotation, 2 translation, 3 none, 4 spin), then centre, direction or
+    // the spin about x1 and x2, then sense or the spin about x3.
     let slip = |slip: Option<Slip>| match slip {
         Option::None => [0.0, nan, nan, nan],
         Some(Slip::Rotation { c, sense }) => [1.0, c[0], c[1], f64::from(sense)],
         Some(Slip::Translation { direction }) => [2.0, direction[0], direction[1], nan],
         Some(Slip::None) => [3.0, nan, nan, nan],
+        Some(Slip::Spin { omega, .. }) => [4.0, omega[0], omega[1], omega[2]],
     };
     columns.f32("slip", grips.iter().flat_map(|g| slip(g.worst.slip)));
     let mut statuses: Vec<Value> = Vec::new();

@@ -234,8 +234,7 @@ fn the_flat_limit_is_the_planar_solver() {
             rectangle([low[0] + shift, low[1]], [high[0] + shift, high[1]], Gap::default())
         };
         let (one, two) = (piece(0.0), piece(0.001));
-        let contact =
-            Contact { face_i: vec![one.polygon()], face_ii: vec![two.polygon()] };
+        let contact = Contact { face_i: vec![one.polygon()], face_ii: vec![two.polygon()] };
         let size = 0.4 * random.unit();
         let wrench = Wrench {
             force: DVec3::new(random.signed(), random.signed(), 0.3 * random.signed())
@@ -244,12 +243,8 @@ fn the_flat_limit_is_the_planar_solver() {
         };
         let d = 0.01 + 0.02 * random.unit();
         let wanted = mechanics::solve(&contact, d, 50.0, &wrench, &Options::default()).unwrap();
-        let surfaces = Surfaces {
-            face_i: vec![one],
-            face_ii: vec![two],
-            stiffness: [2e9; 2],
-            layer: None,
-        };
+        let surfaces =
+            Surfaces { face_i: vec![one], face_ii: vec![two], stiffness: [2e9; 2], layer: None };
         let got = solve(&surfaces, d, 50.0, &wrench).unwrap();
         if wanted.status != Status::Ok {
             continue;
@@ -288,17 +283,10 @@ fn the_answer_knows_no_units_and_no_sides() {
         vec![rectangle([-0.018, -0.01], [0.02, 0.01], round(x, y))],
     ];
     let flat = vec![rectangle([-0.02, -0.006], [0.02, 0.006], Gap::default())];
-    let wrench = Wrench {
-        force: DVec3::new(10.0, 8.0, 6.0),
-        moment: DVec3::new(0.1, 0.3, 0.12),
-    };
+    let wrench = Wrench { force: DVec3::new(10.0, 8.0, 6.0), moment: DVec3::new(0.1, 0.3, 0.12) };
     for face_i in [faces[0].clone(), flat] {
-        let base = Surfaces {
-            face_i,
-            face_ii: faces[1].clone(),
-            stiffness: [4e9, 6e9],
-            layer: None,
-        };
+        let base =
+            Surfaces { face_i, face_ii: faces[1].clone(), stiffness: [4e9, 6e9], layer: None };
         let wanted = solve(&base, 0.02, 50.0, &wrench).unwrap().score.mu_s.unwrap();
         let check = |surfaces: &Surfaces, d: f64, n: f64, wrench: Wrench, what: &str| {
             let got = solve(surfaces, d, n, &wrench).unwrap();
@@ -332,8 +320,7 @@ fn the_answer_knows_no_units_and_no_sides() {
         let load = Wrench { force: 5.0 * wrench.force, moment: 15.0 * wrench.moment };
         check(&scaled, 0.06, 250.0, load, "units");
         // Harder pads and as much more load.
-        let harder =
-            Surfaces { stiffness: base.stiffness.map(|k| 4.0 * k), ..base.clone() };
+        let harder = Surfaces { stiffness: base.stiffness.map(|k| 4.0 * k), ..base.clone() };
         let load = Wrench { force: 4.0 * wrench.force, moment: 4.0 * wrench.moment };
         check(&harder, 0.02, 200.0, load, "harder");
         // Turned about the closing axis.
@@ -344,10 +331,8 @@ fn the_answer_knows_no_units_and_no_sides() {
         // Mirrored: x2 changes its sign, and the moments in its plane.
         let mirror = mapped(&|x| DVec2::new(x.x, -x.y), 1.0);
         let (f, m) = (wrench.force, wrench.moment);
-        let load = Wrench {
-            force: DVec3::new(f.x, -f.y, f.z),
-            moment: DVec3::new(-m.x, m.y, -m.z),
-        };
+        let load =
+            Wrench { force: DVec3::new(f.x, -f.y, f.z), moment: DVec3::new(-m.x, m.y, -m.z) };
         check(&mirror, 0.02, 50.0, load, "mirrored");
         // Upside down: turned by half a turn about x1, so that the faces change places.
         let over = mapped(&|x| DVec2::new(x.x, -x.y), 1.0);
@@ -389,19 +374,12 @@ fn strips_of_equal_area_stand_for_a_cylinder() {
                 rectangle(
                     [-0.5 * l, low - out[0]],
                     [0.5 * l, low + w + out[1]],
-                    Gap::Plane {
-                        height: height(low) - slope * low,
-                        slope: DVec2::new(0.0, slope),
-                    },
+                    Gap::Plane { height: height(low) - slope * low, slope: DVec2::new(0.0, slope) },
                 )
             })
             .collect();
-        let surfaces = Surfaces {
-            face_i: strips.clone(),
-            face_ii: strips,
-            stiffness: [k; 2],
-            layer: None,
-        };
+        let surfaces =
+            Surfaces { face_i: strips.clone(), face_ii: strips, stiffness: [k; 2], layer: None };
         let got = solve(&surfaces, 2.0 * r, n, &load).unwrap();
         assert_eq!((got.score.status, got.dimensions), (Status::Ok, 4), "{got:?}");
         errors.push((got.score.mu_s.unwrap() / smooth - 1.0).abs());
@@ -759,8 +737,7 @@ fn agree_on_points(numbers: std::ops::Range<u64>, grid: usize) -> Seen {
         .into_par_iter()
         .map(|number| {
             let posed = posed(number);
-            let got =
-                solve(&posed.surfaces, posed.distance, posed.force, &posed.wrench).unwrap();
+            let got = solve(&posed.surfaces, posed.distance, posed.force, &posed.wrench).unwrap();
             assert_ne!(got.score.status, Status::NotConverged, "case {number}");
             let free = usize::from(got.dimensions) - 3;
             let mut spins = posed.spins.clone();

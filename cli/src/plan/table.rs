@@ -313,7 +313,7 @@ fn moved(grip: &RankedGrip) -> Option<f64> {
     match grip.worst.slip? {
         Slip::Rotation { c, .. } => Some((c[0] - x).hypot(c[1] - y)),
         Slip::Translation { .. } => Some(f64::INFINITY),
-        Slip::None => None,
+        Slip::Spin { .. } | Slip::None => None,
     }
 }
 
@@ -334,6 +334,8 @@ fn slip(grip: &RankedGrip) -> String {
         Some(Slip::Rotation { c, .. }) if c[0].hypot(c[1]) > SLIDES => "slides".into(),
         Some(Slip::Rotation { c, .. }) => tuple(&[c[0] * 1e3, c[1] * 1e3]),
         Some(Slip::Translation { .. }) => "slides".into(),
+        Some(Slip::Spin { rolls_on: Some(_), .. }) => "rolls".into(),
+        Some(Slip::Spin { .. }) => "spins".into(),
         _ => "-".into(),
     }
 }

@@ -76,12 +76,14 @@ struct Problem<'a, 'b> {
 }
 
 /// Newton steps at most.
-const STEPS: u32 = 100;
+const STEPS: u32 = 60;
 /// Residual at which Newton's method is content; `mu` is right to its square.
 const ENOUGH: f64 = 1e-14;
 /// Share of the sliding face's friction below which the other face counts as at rest: at a tie both
 /// may slip.
 const AT_REST: f64 = 1.0 - 1e-9;
+/// The same where Newton's method finds nothing, so near the tie.
+const TIED: f64 = 1.0 + 1e-6;
 
 /// Solves for the load `w` along the space; the faces are `distance` apart.
 pub(super) fn solve(
@@ -108,10 +110,22 @@ pub(super) fn solve(
         let zeta = Vector5::zeros();
         return Some(Slipping { mu: 0.0, zeta, shares, rolls_on: None, bounds, evaluations: 0 });
     }
-    let rolling = (0..2).filter_map(|k| problem.rolling(space, k, distance, &w, false)).next();
-    rolling
-        .or_else(|| problem.interior(&w, start))
-        .or_else(|| (0..2).filter_map(|k| problem.rolling(space, k, distance, &w, true)).next())
+    let candidates = [0, 1].map(|k| problem.rolling(space, k, distance, &w));
+    let held = |candidate: &Option<Rolling>, most: f64| {
+        candidate.filter(|rolling| rolling.alone <= most * rolling.answer.mu)
+    };
+    let rolls = candidates.iter().find_map(|candidate| held(candidate, AT_REST));
+    if let Some(rolling) = rolls {
+        return Some(problem.counted(rolling.answer));
+    }
+    problem
+        .interior(&w, start)
+        .or_else(|| {
+            let start = problem.off_crease(&w, &candidates)?;
+            problem.interior(&w, Some(&start))
+        })
+        .or_else(|| candidates.iter().find_map(|candidate| held(candidate, TIED)).map(|r| r.answer))
+        .map(|answer| problem.counted(answer))
 }
 
 /// Root mean square distance of the pressure from its middle on both faces, but for a constant.
@@ -277,16 +291,9 @@ impl Problem<'_, '_> {
         Some(lower + coefficients.iter().map(|c| c.abs()).sum::<f64>())
     }
 
-    /// The body rolls on face `k`: the other face slides along the pad, and `k` carries the rest of
-    /// the load at no more friction. `ties`: whether as much friction will do.
-    fn rolling(
-        &self,
-        space: &Space,
-        k: usize,
-        distance: f64,
-        w: &Vector5<f64>,
-        ties: bool,
-    ) -> Option<Slipping> {
+    /// The body rolls on face `k`: the other face slides along the pad. The answer if `k` carries
+    /// the rest of the load at no more friction.
+    fn rolling(&self, space: &Space, k: usize, distance: f64, w: &Vector5<f64>) -> Option<Rolling> {
         let other = 1 - k;
         let mut zeta = Vector5::zeros();
         for i in 0..space.spins.len() {
@@ -310,32 +317,26 @@ impl Problem<'_, '_> {
         let e = along / speed;
         let sliding = mu * Vector3::new(face.load * e.x, face.load * e.y, face.first.perp_dot(e));
         let resting = Vector3::new(w[0], w[1], w[2]) - sliding;
-        let most = if ties { 1.0 + 1e-6 } else { AT_REST } * mu;
-        if resting.x.hypot(resting.y) > most * self.faces[k].load {
-            return None;
-        }
-        let alone = self.alone(k, &resting)?;
-        if alone > most {
-            return None;
-        }
+        let (alone, lifted) = self.alone(k, &resting)?;
         let mut shares = [sliding, resting];
         if k == 0 {
             shares.reverse();
         }
-        Some(Slipping {
+        let answer = Slipping {
             mu,
             zeta,
             shares,
             rolls_on: Some(k),
             bounds: Bounds { lower: mu, upper: mu.max(alone) },
-            evaluations: self.evaluations.get(),
-        })
+            evaluations: 0,
+        };
+        Some(Rolling { answer, alone, lifted })
     }
 
-    /// The friction that face `k` alone needs for a load.
-    fn alone(&self, k: usize, load: &Vector3<f64>) -> Option<f64> {
+    /// The friction that face `k` alone needs for a load, and its motion.
+    fn alone(&self, k: usize, load: &Vector3<f64>) -> Option<(f64, Vector5<f64>)> {
         if load.amax() <= 1e-15 * self.normal {
-            return Some(0.0);
+            return Some((0.0, Vector5::zeros()));
         }
         let one = Problem {
             faces: [self.faces[k]; 2],
@@ -346,8 +347,46 @@ impl Problem<'_, '_> {
             evaluations: std::cell::Cell::new(0),
         };
         let w = Vector5::new(load.x, load.y, load.z, 0.0, 0.0);
-        let answer = one.interior(&w, None).map(|slipping| slipping.bounds.upper);
+        let answer = one.interior(&w, None).map(|slip| (slip.bounds.upper, slip.zeta));
         self.evaluations.set(self.evaluations.get() + one.evaluations.get());
         answer
     }
+
+    /// A motion that does better than rolling on either face. Where Newton's method has run into a
+    /// crease that is not the answer, it cannot come back to it from here.
+    fn off_crease(
+        &self,
+        w: &Vector5<f64>,
+        candidates: &[Option<Rolling>; 2],
+    ) -> Option<Vector5<f64>> {
+        let best =
+            candidates.iter().flatten().max_by(|a, b| a.answer.mu.total_cmp(&b.answer.mu))?;
+        let gain = |zeta: &Vector5<f64>| {
+            w.dot(zeta) / (self.normal * self.both(&zeta.component_div(&self.units)).value)
+        };
+        // The face at rest is moved as it would move by itself.
+        let (zeta, lifted) = (best.answer.zeta, best.lifted);
+        let size = |zeta: &Vector5<f64>| zeta.component_div(&self.units).norm();
+        let ratio = size(&zeta) / size(&lifted);
+        (0..25)
+            .map(|i| zeta + ratio * 0.25_f64.powi(i) * 4.0 * lifted)
+            .map(|zeta| (gain(&zeta), zeta))
+            .filter(|(gain, _)| *gain > best.answer.mu)
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, zeta)| zeta)
+    }
+
+    fn counted(&self, answer: Slipping) -> Slipping {
+        Slipping { evaluations: self.evaluations.get(), ..answer }
+    }
+}
+
+/// A candidate: the body rolls on one face.
+#[derive(Debug, Clone, Copy)]
+struct Rolling {
+    answer: Slipping,
+    /// Friction that the face at rest needs for its share.
+    alone: f64,
+    /// How that face would move for it.
+    lifted: Vector5<f64>,
 }
