@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
-use crate::contact::field::{Gap, Piece, Surfaces};
+use crate::contact::surface::{Gap, Piece, Surfaces};
 use crate::error::{Error, ErrorKind, Result};
 use crate::file;
 use crate::model::{Contact, Patch, Ring, Wrench};
@@ -121,7 +121,7 @@ impl Body {
 const SHAPE: &str = r#"a case is {"A_I":[{"outer":[[x,y],..],"holes":[..]}],"A_II":[..],"d":..,"Fn":..,"F":[f1,f2,f3],"M":[m1,m2,m3]} in m, N, N m"#;
 
 /// The same for faces that are not plane.
-const CURVED: &str = r#"a case with curved faces gives each piece a "gap" and the pads' stiffness "k":[kI,kII] in Pa/m, or "kind", "R", "L" and "k" instead of the pieces: docs/formats.md"#;
+const CURVED: &str = r#"a case with curved faces gives each piece a "gap" and the pads' stiffness "k":[kI,kII] in Pa/m, or "kind", "R", "L" and "k" instead of the pieces: docs/curved.md"#;
 
 /// Reads all cases of a file, or of standard input for `-`, in order.
 ///

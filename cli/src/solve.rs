@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Args as ClapArgs, ValueEnum};
 use gripfast::case::{self, Case};
-use gripfast::contact::field::Surfaces;
+use gripfast::contact::surface::Surfaces;
 use gripfast::lab::{earlier, paper};
 use gripfast::mechanics::{self, Options, Pads, curved, inverse};
 use gripfast::model::{Score, Slip, Status};
@@ -18,7 +18,8 @@ use gripfast::request::{Refiner, Separation};
 #[command(
     after_help = "EXAMPLES:\n  gripfast solve case.json\n  gripfast solve case.json --json\n  gripfast solve case.json --explain --pad-friction 0.5\n  gripfast solve case.json --plot case.svg\n  gripfast solve case.json --method paper --explain\n\n\
 A case is {\"A_I\":[{\"outer\":[[x,y],..],\"holes\":[]}],\"A_II\":[..],\"d\":..,\"Fn\":..,\"F\":[..],\"M\":[..]} in metres and newtons,\n\
-the load on the body about the point midway between the faces. A file may hold one case, a list, {\"cases\":[..]} or JSON Lines."
+the load on the body about the point midway between the faces. A file may hold one case, a list, {\"cases\":[..]} or JSON Lines.\n\
+Faces that are curved, drafted or stepped: docs/curved.md."
 )]
 pub(crate) struct Args {
     /// Case file; `-` for standard input.

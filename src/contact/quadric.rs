@@ -662,7 +662,7 @@ mod tests {
     /// The planar integrals of this library, for the special case of a plane.
     #[test]
     fn a_plane_agrees_with_the_planar_closed_forms() {
-        use crate::contact::{Loops, friction};
+        use crate::contact::{Field, Loops, Twist, friction};
         use crate::model::Polygon;
         let ring = rectangle(DVec2::new(2.0, 1.5));
         let area = Loops::new(&[Polygon { outer: ring.clone(), holes: Vec::new() }]);
@@ -672,7 +672,7 @@ mod tests {
         for i in 0..60 {
             let c = 0.1 * f64::from(i) * DVec2::from_angle(f64::from(i));
             let twist = [c.y, -c.x, 1.0];
-            let wanted = friction(&area, twist, p);
+            let wanted = friction(Field { area: &area, p }, Twist::about(c));
             let gradient = wanted.gradient(p);
             let got = region.dissipation(twist);
             for j in 0..3 {

@@ -3,7 +3,7 @@
 
 use glam::{DVec2, DVec3};
 use gripfast::case::{self, Case};
-use gripfast::contact::field::{Gap, Piece, Surfaces};
+use gripfast::contact::surface::{Gap, Piece, Surfaces};
 use gripfast::mechanics::curved::{Answer, Note, solve};
 use gripfast::mechanics::{self, Options};
 use gripfast::model::{Contact, Face, Slip, Status, Wrench};

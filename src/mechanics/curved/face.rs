@@ -3,7 +3,7 @@
 use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::contact::field::{Field, Piece};
+use crate::contact::surface::{Field, Piece};
 use crate::contact::quadric::Region;
 
 /// A face made ready.

@@ -15,7 +15,7 @@ use glam::DVec2;
 use nalgebra::Vector5;
 use serde::Serialize;
 
-use crate::contact::field::{Piece, Surfaces};
+use crate::contact::surface::{Piece, Surfaces};
 use crate::error::{Error, Result};
 use crate::model::{Face as Side, Score, Slip, Status, Wrench};
 
