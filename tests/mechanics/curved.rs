@@ -263,13 +263,6 @@ fn the_flat_limit_is_the_planar_solver() {
             close(area, planar, 1e-7, &got);
         }
     }
-    // A very round cylinder on narrow pads is a plane: off by the gap over the compression.
-    let load = ([8.0, 4.0, 0.0], [0.0, 0.1, 0.12]);
-    let flat = mu(&json!({"kind": "flat", "L": 0.04, "b": 0.006, "d": 0.02, "k": [6e9, 6e9],
-                          "Fn": 50.0, "F": load.0, "M": load.1}));
-    let round = mu(&json!({"kind": "cylinder", "R": 1e5, "L": 0.04, "b": 0.006, "d": 0.02,
-                           "k": [6e9, 6e9], "Fn": 50.0, "F": load.0, "M": load.1}));
-    close(round, flat, 1e-4, &"a flat cylinder");
 }
 
 /// Any units, the faces exchanged, mirrored, turned about the closing axis, another stiffness with
