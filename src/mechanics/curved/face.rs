@@ -3,8 +3,8 @@
 use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::contact::surface::{Field, Piece};
 use crate::contact::quadric::Region;
+use crate::contact::surface::{Field, Piece};
 
 /// A face made ready.
 #[derive(Debug, Clone)]
