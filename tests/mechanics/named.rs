@@ -149,7 +149,7 @@ fn slip_centres_in_every_awkward_place() {
                         "{name}: {direction:?}"
                     );
                 }
-                Slip::None => panic!("{name}"),
+                Slip::Spin { .. } | Slip::None => panic!("{name}"),
             }
             let q = score.pressure.unwrap();
             for (got, want) in [(q.a_i0, 1.3), (q.a_ii0, 0.9), (q.a1, 0.4), (q.a2, -0.7)] {

@@ -31,6 +31,8 @@ pub(crate) fn check(case: &Case, score: &Score) -> Option<Check> {
             [f64::from(sense) * c[1], -f64::from(sense) * c[0], f64::from(sense)]
         }
         Slip::Translation { direction } => [direction[0], direction[1], 0.0],
+        // Planes do not spin.
+        Slip::Spin { .. } => return None,
         Slip::None => [0.0; 3],
     };
     let planes = [[p.a_i0, p.a1, p.a2], [p.a_ii0, -p.a1, -p.a2]];
