@@ -53,14 +53,20 @@ export GRIPFAST_PYTHON="$PWD/target/readers/bin/python"
 # With the software Vulkan driver there is always an adapter: a test that needs one fails instead of skipping.
 export GRIPFAST_GPU=require GRIPFAST_READERS=require
 
-cargo fmt --check
-cargo clippy --workspace --all-targets --features full --quiet -- -D warnings
+# Formatting, lints, licences and sources of the dependencies, documentation, and a build without a
+# graphics processor.
 features=full
-if [ -f /usr/include/opencascade/Standard_Version.hxx ] && command -v c++ >/dev/null; then
+if [ -f /usr/include/opencascade/Standard_Version.hxx ] && have c++; then
     features=full,step
 else
-    echo "SKIPPED: STEP files: install libocct-data-exchange-dev, libocct-modeling-algorithms-dev and g++ (cargo test --workspace --features step)"
+    echo "SKIPPED: STEP files: install libocct-data-exchange-dev, libocct-modeling-algorithms-dev and g++ (cargo test --features step)"
 fi
+cargo fmt --check
+target/readers/bin/cargo-deny --log-level error check bans licenses sources
+cargo clippy --workspace --all-targets --features "$features" --quiet -- -D warnings
+cargo clippy --workspace --no-default-features --quiet -- -D warnings
+RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --features "$features" --quiet
+# Unit tests, suites, examples (built) and the documentation's examples (run).
 cargo test --workspace --features "$features" --no-fail-fast
 for example in plan_a_part own_contacts own_loads own_gripper; do
     cargo run --quiet -p gripfast --features "$features" --example "$example" >/dev/null
