@@ -335,12 +335,13 @@ impl Plan {
     }
 
     fn provenance(&self, backend: String, complete: bool) -> Provenance {
-        let mut resolved = Resolved::default();
-        resolved.force = Force(self.settings.force);
-        resolved.spacing = Length(self.propose.spacing(&self.gripper));
-        resolved.pad_friction = self.settings.pad_friction;
-        resolved.seeds = self.seeds.len();
-        resolved.keep = self.request.kept();
+        let resolved = Resolved {
+            force: Force(self.settings.force),
+            spacing: Length(self.propose.spacing(&self.gripper)),
+            pad_friction: self.settings.pad_friction,
+            seeds: self.seeds.len(),
+            keep: self.request.kept(),
+        };
         let mut provenance = Provenance::new(self.request.clone(), resolved);
         provenance.command.clone_from(&self.command);
         provenance.backend = backend;

@@ -248,7 +248,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 /// Loads and seconds of one grip that was measured before on the same place, with the same twists
 /// and kind of contact: its seeds, and its scoring.
 #[derive(Default)]
-struct History(HashMap<(&'static str, usize, &'static str), [Option<(usize, f64)>; 2]>);
+struct History(HashMap<Measured, [Option<(usize, f64)>; 2]>);
+
+/// Place, twists and kind of contact of a measurement.
+type Measured = (&'static str, usize, &'static str);
 
 struct Cell<'a> {
     set: &'a SeedSet,

@@ -82,7 +82,8 @@ impl Workload {
         let contacts = match kind {
             Contacts::Shared => {
                 let face = vec![pad(DVec2::ZERO, 0.0)];
-                vec![Arc::new(Contact { face_i: face.clone(), face_ii: face }); grips]
+                let shared = Arc::new(Contact { face_i: face.clone(), face_ii: face });
+                std::iter::repeat_n(shared, grips).collect()
             }
             Contacts::Own => own(true),
             Contacts::Different => own(false),

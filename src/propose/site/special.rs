@@ -181,6 +181,6 @@ pub(super) fn bounds(places: &[Vec<DVec2>]) -> Option<Bounds2> {
     places
         .iter()
         .filter(|places| !places.is_empty())
-        .map(|places| Bounds2::of(places))
+        .map(Bounds2::of)
         .reduce(|sum, next| sum.union(next))
 }
