@@ -65,7 +65,7 @@ cargo fmt --check
 target/readers/bin/cargo-deny --log-level error check bans licenses sources
 cargo clippy --workspace --all-targets --features "$features" --quiet -- -D warnings
 cargo clippy --workspace --no-default-features --quiet -- -D warnings
-RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --features "$features" --quiet
+RUSTDOCFLAGS="-D warnings" cargo doc -p gripfast --no-deps --features "$features" --quiet
 # Unit tests, suites, examples (built) and the documentation's examples (run).
 cargo test --workspace --features "$features" --no-fail-fast
 for example in plan_a_part own_contacts own_loads own_gripper; do
