@@ -1,6 +1,7 @@
 //! `gripfast bench check`: whether an adapter gives right answers, and how far its single precision
 //! is from double precision.
 
+#[cfg(feature = "gpu")]
 use std::fmt::Write as _;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -28,6 +29,7 @@ pub(crate) struct Args {
 }
 
 /// One thing that was tried.
+#[cfg(feature = "gpu")]
 #[derive(Debug, serde::Serialize)]
 struct Item {
     name: String,

@@ -155,6 +155,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let start = Instant::now();
     let selection = select(args.backend, args.adapter.as_deref())?;
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    #[cfg_attr(not(feature = "gpu"), expect(unused_mut, reason = "an adapter may join"))]
     let mut places = vec![
         Place { name: "one core", backend: Backend::Cpu, pool: Some(one) },
         Place { name: "all cores", backend: Backend::Cpu, pool: None },
