@@ -59,13 +59,16 @@ impl Backend {
     }
 
     /// Notes on a running clock ([`Gpu::start_clock`]) how long exact answers took.
+    #[cfg(feature = "gpu")]
     pub(super) fn solved_since(&self, start: std::time::Instant) {
-        match self {
-            Self::Cpu => {}
-            #[cfg(feature = "gpu")]
-            Self::Gpu(gpu) => gpu.polished_since(start),
+        if let Self::Gpu(gpu) = self {
+            gpu.polished_since(start);
         }
     }
+
+    /// Without a graphics processor there is no clock.
+    #[cfg(not(feature = "gpu"))]
+    pub(super) fn solved_since(&self, _: std::time::Instant) {}
 
     /// Seeds of all loads of all problems, in order. Equal input gives equal output on one backend,
     /// whatever the number of threads, and however the batch is cut or permuted.
