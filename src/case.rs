@@ -9,7 +9,7 @@ use serde::Deserialize;
 use crate::contact::surface::{Gap, Piece, Surfaces};
 use crate::error::{Error, ErrorKind, Result};
 use crate::file;
-use crate::model::{Contact, Patch, Ring, Wrench};
+use crate::model::{Contact, LARGEST_LENGTH, Patch, Ring, Wrench};
 
 /// One contact pair under one wrench.
 #[derive(Debug, Clone, PartialEq)]
@@ -188,7 +188,8 @@ fn check_keys(place: &str, value: &serde_json::Value) -> Result<()> {
     Ok(())
 }
 
-/// Refuses a distance in another unit than the areas: `"d": 20` for 20 mm.
+/// Refuses lengths that no part has, and a distance in another unit than the areas: `"d": 20` for
+/// 20 mm.
 fn check_distance(place: &str, contact: &Contact, distance: f64) -> Result<()> {
     let points = || {
         let polygons = contact.face_i.iter().chain(&contact.face_ii);
@@ -196,6 +197,15 @@ fn check_distance(place: &str, contact: &Contact, distance: f64) -> Result<()> {
     };
     let (low, high) = points()
         .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let largest = low.abs().max(high.abs()).max_element().max(distance.abs());
+    if largest.is_finite() && largest > LARGEST_LENGTH {
+        return Err(Error::new(
+            ErrorKind::Value,
+            place,
+            format!("a length is {largest:.3e} m; the largest is {LARGEST_LENGTH:.0e} m"),
+            "give lengths in metres",
+        ));
+    }
     let width = (high - low).max_element();
     if width > 0.0 && distance.abs() > MOST_SLENDER * width {
         return Err(Error::new(

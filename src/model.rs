@@ -41,9 +41,12 @@ pub struct Contact {
     pub face_ii: Patch,
 }
 
-/// Largest coordinate or distance that is taken [m]. Lengths enter in the fourth power, and to
-/// rounding a millimetre is lost beyond.
+/// Largest coordinate or length of a file or an option [m]: to rounding a tenth of a micrometre is
+/// lost beyond.
 pub(crate) const LARGEST_LENGTH: f64 = 1e9;
+/// Largest coordinate or distance that the mechanics take [m], whose equations know no scale:
+/// lengths enter in the fourth power, and that must stay a number.
+pub(crate) const LARGEST_SCALE: f64 = 1e60;
 /// Smallest extent of a contact area that is taken [m]: its fourth power leaves room above the
 /// smallest of numbers.
 const SMALLEST_EXTENT: f64 = 1e-30;
@@ -60,10 +63,10 @@ impl Contact {
             };
             let mut extent = 0.0_f64;
             for point in rings().flatten() {
-                if !point.is_finite() || point.abs().max_element() > LARGEST_LENGTH {
+                if !point.is_finite() || point.abs().max_element() > LARGEST_SCALE {
                     return bad(
                         format!("has the point ({:?}, {:?})", point.x, point.y),
-                        "give finite coordinates of at most 1e9 m",
+                        "give finite coordinates of at most 1e60 m",
                     );
                 }
             }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::contact::Twist;
 use crate::error::{Error, Result};
-use crate::model::{Contact, LARGEST_LENGTH, Wrench};
+use crate::model::{Contact, LARGEST_SCALE, Wrench};
 
 /// Relative widening of both bounds. The largest error of the 32-bit kernels seen so far is 1.6e-6
 /// with 81 twists and 9.5e-6 with 321, both of an upper bound (`gripfast bench check` on 450 random
@@ -79,11 +79,11 @@ pub(crate) fn check(problem: &Problem<'_>, index: usize) -> Result<()> {
             "give a positive force",
         ));
     }
-    if problem.distance.is_nan() || problem.distance.abs() > LARGEST_LENGTH {
+    if problem.distance.is_nan() || problem.distance.abs() > LARGEST_SCALE {
         return Err(Error::input(
             place(),
             format!("distance between the faces {} m", problem.distance),
-            "give a distance of at most 1e9 m",
+            "give a distance of at most 1e60 m",
         ));
     }
     for (load, wrench) in problem.wrenches.iter().enumerate() {

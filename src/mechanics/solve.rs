@@ -10,7 +10,7 @@ use super::pressure::{self, face_pressure};
 use super::slip;
 use crate::contact::{Loops, Twist};
 use crate::error::{Error, Result};
-use crate::model::{Bounds, Contact, LARGEST_LENGTH, Score, Slip, Status, Wrench};
+use crate::model::{Bounds, Contact, LARGEST_SCALE, Score, Slip, Status, Wrench};
 use crate::request::{Refiner, Separation};
 
 /// Whether to look for further solutions where several are possible.
@@ -99,11 +99,11 @@ pub(crate) fn check(contact: &Contact, distance: f64, force: f64, wrench: &Wrenc
     let bad = |what: &str, value: String, allowed: &str| {
         Err(Error::input(what, format!("is {value}"), format!("give {allowed}")))
     };
-    if distance.is_nan() || distance.abs() > LARGEST_LENGTH {
+    if distance.is_nan() || distance.abs() > LARGEST_SCALE {
         return bad(
             "d",
             distance.to_string(),
-            "a distance of at most 1e9 m, negative for a grip from inside",
+            "a distance of at most 1e60 m, negative for a grip from inside",
         );
     }
     if !(force.is_finite() && force > 0.0) {
