@@ -519,8 +519,12 @@ impl Gpu {
         let outcome = self.device.poll(wait);
         let ready = Instant::now();
         self.check_lost()?;
-        outcome.map_err(|error| {
-            Failure::Fault(format!("waiting for the graphics processor: {error}"))
+        outcome.map_err(|error| match error {
+            // A device that is gone takes no submission; its own word of that may come later.
+            wgpu::PollError::WrongSubmissionIndex(..) => {
+                Failure::Lost("it did not take the work".to_owned())
+            }
+            error => Failure::Fault(format!("waiting for the graphics processor: {error}")),
         })?;
         match ticket.mapped.try_recv() {
             Ok(Ok(())) => {}
