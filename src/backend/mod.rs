@@ -10,7 +10,9 @@
 //! Where the bounds hold: congruent faces in full contact, whose summed pressure is constant, so
 //! that neither `M1, M2, F3` nor the distance of the faces matters; and different faces in full
 //! contact whose friction coupling is weak, the bounds being widened by all that it can do.
-//! Elsewhere the seeds come from the pressure without friction coupling, and there are no bounds.
+//! Elsewhere the seeds come from the pressure without friction coupling, and there are no bounds;
+//! which of those loads can be the worst is told by a few of Newton's steps on the seven equations,
+//! whose contraction bounds what they leave.
 
 mod choice;
 mod cpu;

@@ -14,7 +14,9 @@ use crate::contact::{Field, PlaneWrench, Twist};
 use crate::error::Result;
 use crate::mechanics::slip;
 use crate::mechanics::twist_out::TwistOut;
-use crate::mechanics::{Options, Pads, Search, Start, refused, solve_next, solve_pads};
+use crate::mechanics::{
+    Comparison, Load, Neighbour, Options, Pads, Search, below, refused, solve_next, solve_pads,
+};
 use crate::model::{Score, Status};
 use crate::request::{Polish, Refiner, Separation};
 
@@ -49,7 +51,8 @@ pub struct Scored {
     pub all: Vec<Score>,
     /// Loads for which the seven equations were solved.
     pub solved: usize,
-    /// Loads for which the slip problem alone was solved, to tell which is the worst.
+    /// Loads that were only compared with the worst: their slip problem alone was solved, or the
+    /// equations to an error bound that kept them below it.
     pub compared: usize,
     /// Not solved to the end: it cannot be among the best ([`Backend::score_best`]).
     pub outranked: bool,
@@ -199,7 +202,8 @@ impl Case<'_> {
             let worst = self.settle(self.worst(&answers));
             return Scored { worst, solved: all.len(), compared: 0, all, outranked: false };
         }
-        let mut work = Work { case: self, solved: Vec::new(), compared: 0, states: Vec::new() };
+        let mut work =
+            Work { case: self, solved: Vec::new(), compared: 0, neighbours: Neighbours::default() };
         let out = |mu: f64| beaten.is_some_and(|beaten| beaten(mu));
         if beaten.is_some() && out(self.lower()) {
             return work.outranked();
@@ -209,9 +213,9 @@ impl Case<'_> {
         };
         let (mut bounded, mut open): (Vec<usize>, Vec<usize>) =
             (0..self.seeds.len()).partition(has_bounds);
-        // Loads without bounds are solved. One that has no limit state is the worst, whatever the
-        // others are (a load with bounds has one): the nearest to twisting out comes first. In a
-        // race the most demanding does.
+        // Loads without bounds are compared one by one. One that has no limit state is the worst,
+        // whatever the others are (a load with bounds has one): the nearest to twisting out comes
+        // first. In a race the most demanding does.
         let urgency: Vec<f64> = if beaten.is_some() {
             open.iter().map(|&load| -self.seeds[load].estimate).collect()
         } else {
@@ -221,14 +225,36 @@ impl Case<'_> {
         order.sort_by(|&a, &b| urgency[a].total_cmp(&urgency[b]).then(a.cmp(&b)));
         open = order.into_iter().map(|place| open[place]).collect();
         let mut largest: f64 = 0.0;
-        for load in open {
-            match usable(&work.solve_like(load)) {
-                Some(mu) => largest = largest.max(mu),
-                None => return work.refused(),
+        let mut floor = bounded.iter().map(|&load| self.seeds[load].lower).fold(0.0, f64::max);
+        // The one that seems to ask for most comes before them all: few of the others reach it.
+        let estimate = |load: usize| self.seeds[load].estimate;
+        let leader = open.iter().copied().max_by(|&a, &b| estimate(a).total_cmp(&estimate(b)));
+        let leader = leader.filter(|&load| match work.compare(load, 0.0) {
+            Compared::Solved(mu) => {
+                largest = mu;
+                true
             }
+            // Its turn comes.
+            _ => {
+                work.solved.clear();
+                false
+            }
+        });
+        for load in open {
             if out(largest) {
                 return work.outranked();
             }
+            floor = floor.max(largest);
+            if leader != Some(load) {
+                match work.compare(load, floor * (1.0 - 2.0 * TIE)) {
+                    Compared::Below => {}
+                    Compared::Solved(mu) => largest = largest.max(mu),
+                    Compared::Refused => return work.refused(),
+                }
+            }
+        }
+        if out(largest) {
+            return work.outranked();
         }
         // Then the others by falling upper bound, until none can reach the largest found. For
         // congruent faces the slip problem alone decides `mu_s`: the seven equations are solved for
@@ -251,10 +277,14 @@ impl Case<'_> {
                 largest = largest.max(mu);
                 slips.push((load, mu));
             } else {
-                largest = largest.max(usable(&work.solve(load)).unwrap_or(f64::INFINITY));
+                match work.compare(load, largest * (1.0 - 2.0 * TIE)) {
+                    Compared::Below => {}
+                    Compared::Solved(mu) => largest = largest.max(mu),
+                    Compared::Refused => largest = f64::INFINITY,
+                }
             }
         }
-        work.compared = slips.len();
+        work.compared += slips.len();
         if out(largest * (1.0 - margin)) {
             return work.outranked();
         }
@@ -358,52 +388,111 @@ struct Work<'a> {
     case: &'a Case<'a>,
     solved: Vec<(usize, Score)>,
     compared: usize,
-    /// Loads, scaled, and the limit states found for them.
-    states: Vec<([f64; 6], Start)>,
+    neighbours: Neighbours,
 }
 
-/// Loads farther apart than this, in units of the gripping force, do not help each other.
-const LIKE: f64 = 0.5;
+/// What one more load came to.
+enum Compared {
+    /// Its `mu_s` is less than the value asked about.
+    Below,
+    /// Its `mu_s`.
+    Solved(f64),
+    /// It is not held.
+    Refused,
+}
+
+/// States found of some loads, for the next ones to begin at. No more than [`MOST`] and none much
+/// like another, so that finding the nearest does not grow with the number of loads.
+#[derive(Default)]
+struct Neighbours {
+    /// Per coordinate of a load's place, the loads'.
+    places: [Vec<f32>; 6],
+    states: Vec<Neighbour>,
+    /// Squares of distances, while the nearest is looked for.
+    apart: Vec<f32>,
+}
+
+/// States kept of one grip.
+const MOST: usize = 256;
+/// Square of the distance in units of the gripping force from which on a load's state is kept.
+const UNLIKE: f32 = 0.05 * 0.05;
+/// Square of the distance up to which a state helps.
+const LIKE: f32 = 0.5 * 0.5;
+
+impl Neighbours {
+    /// The nearest state, with the square of its distance.
+    fn nearest(&mut self, place: &[f32; 6]) -> Option<(f32, &Neighbour)> {
+        self.apart.clear();
+        self.apart.resize(self.states.len(), 0.0);
+        for (all, x) in self.places.iter().zip(place) {
+            for (apart, other) in self.apart.iter_mut().zip(all) {
+                *apart += (x - other) * (x - other);
+            }
+        }
+        let least = self.apart.iter().fold(f32::INFINITY, |least, &apart| least.min(apart));
+        let index = self.apart.iter().position(|&apart| apart == least)?;
+        Some((least, &self.states[index]))
+    }
+
+    fn add(&mut self, place: [f32; 6], state: Neighbour) {
+        for (all, x) in self.places.iter_mut().zip(place) {
+            all.push(x);
+        }
+        self.states.push(state);
+    }
+}
+
+/// Where a load is among others.
+fn place(load: &Load) -> [f32; 6] {
+    let PlaneWrench { f1, f2, m3 } = load.direction;
+    [f1, f2, m3, load.moment[0], load.moment[1], load.normal[0]].map(|x| x as f32)
+}
 
 impl Work<'_> {
-    /// As [`Self::solve`], beginning at the limit state of the load most like this one.
-    fn solve_like(&mut self, load: usize) -> Score {
-        let (problem, Some(pads), Refiner::Newton) =
-            (self.case.problem, self.case.pads, self.case.options.refiner)
-        else {
-            return self.solve(load);
+    /// Whether a load's `mu_s` is below a value, or what it is.
+    fn compare(&mut self, load: usize, value: f64) -> Compared {
+        let case = self.case;
+        let (Some(pads), Refiner::Newton) = (case.pads, case.options.refiner) else {
+            return self.answer(load, case.solve(load));
         };
-        let wrench = &problem.wrenches[load];
-        let scaled = pads.load(problem.distance, problem.force, wrench);
-        let place = [
-            scaled.direction.f1,
-            scaled.direction.f2,
-            scaled.direction.m3,
-            scaled.moment[0],
-            scaled.moment[1],
-            scaled.normal[0],
-        ];
-        let apart = |other: &[f64; 6]| (0..6).map(|i| (place[i] - other[i]).powi(2)).sum::<f64>();
-        let nearest = self
-            .states
-            .iter()
-            .map(|(other, start)| (apart(other), start))
-            .min_by(|a, b| a.0.total_cmp(&b.0));
-        let mut near = nearest.filter(|(apart, _)| *apart < LIKE * LIKE).map(|(_, start)| *start);
-        let score = solve_next(
-            pads,
-            problem.distance,
-            problem.force,
-            wrench,
-            &self.case.options(load, Search::Off),
-            &mut near,
-        );
-        if usable(&score).is_none() {
-            return self.solve(load);
+        let (problem, options) = (case.problem, case.options(load, Search::Off));
+        let scaled = pads.load(problem.distance, problem.force, &problem.wrenches[load]);
+        let here = place(&scaled);
+        let nearest = self.neighbours.nearest(&here);
+        let apart = nearest.map_or(f32::INFINITY, |(apart, _)| apart);
+        let near = nearest.map(|(_, state)| state).filter(|_| apart < LIKE);
+        let keep = |neighbours: &mut Neighbours, state: Neighbour| {
+            if apart > UNLIKE && neighbours.states.len() < MOST {
+                neighbours.add(here, state);
+            }
+        };
+        match below(pads, problem.force, &scaled, &options, near, value) {
+            Some(Comparison::Below(state)) => {
+                self.compared += 1;
+                keep(&mut self.neighbours, state);
+                return Compared::Below;
+            }
+            Some(Comparison::Solved(score, state)) if usable(&score).is_some() => {
+                keep(&mut self.neighbours, state);
+                return self.answer(load, score);
+            }
+            _ => {}
         }
-        self.states.extend(near.map(|start| (place, start)));
+        let mut start = near.map(Neighbour::start);
+        let wrench = &problem.wrenches[load];
+        let score = solve_next(pads, problem.distance, problem.force, wrench, &options, &mut start);
+        if usable(&score).is_none() {
+            return self.answer(load, case.solve(load));
+        }
+        if let Some(start) = start {
+            keep(&mut self.neighbours, Neighbour::at(pads, &scaled, start));
+        }
+        self.answer(load, score)
+    }
+
+    fn answer(&mut self, load: usize, score: Score) -> Compared {
         self.solved.push((load, score));
-        score
+        usable(&score).map_or(Compared::Refused, Compared::Solved)
     }
 
     fn solve(&mut self, load: usize) -> Score {

@@ -7,7 +7,7 @@
 //! the pressure is zero there.
 
 use glam::{DMat2, DVec2};
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use crate::contact::{Field, Loops, Twist, friction, moments};
 use crate::request::Refiner;
@@ -69,6 +69,19 @@ pub(super) struct Node {
     pub(super) z: Vector7,
 }
 
+/// The friction and pressure integrals at a state: what the equations of any load on the contact
+/// are made of.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Integrals {
+    pub(super) z: Vector7,
+    /// Of the dissipation, per face.
+    gradients: [Vector3<f64>; 2],
+    hessians: [Matrix3<f64>; 2],
+    /// `d gradient_k / d q_j` for `j` = own offset, a1, a2.
+    by_pressure: [[Vector3<f64>; 3]; 2],
+    moments: [[f64; 6]; 2],
+}
+
 /// Solves one contact pair under one load; keeps its scratch memory and counts its work.
 pub struct Solver<'a> {
     pub(super) pads: &'a Pads,
@@ -105,35 +118,54 @@ impl<'a> Solver<'a> {
         coupling: f64,
         jacobian: Option<&mut Matrix7>,
     ) -> State {
+        let integrals = self.integrate(z);
+        self.equations(&integrals, coupling, jacobian)
+    }
+
+    pub(super) fn integrate(&mut self, z: &Vector7) -> Integrals {
         self.evaluations += 1;
-        let v = Vector3::new(z[0], z[1], z[2]);
         let q = [z[3], z[4], z[5], z[6]];
-        let mut gradients = [Vector3::zeros(); 2];
-        let mut hessians = [nalgebra::Matrix3::zeros(); 2];
-        // d gradient_k / d q_j for j = own offset, a1, a2
-        let mut by_pressure = [[Vector3::zeros(); 3]; 2];
-        let mut m = [[0.0; 6]; 2];
+        let mut at = Integrals {
+            z: *z,
+            gradients: [Vector3::zeros(); 2],
+            hessians: [Matrix3::zeros(); 2],
+            by_pressure: [[Vector3::zeros(); 3]; 2],
+            moments: [[0.0; 6]; 2],
+        };
         for k in 0..2 {
             let p = face_pressure(&q, k);
             let area = if separates(&self.pads.areas[k], p) {
                 self.pads.areas[k].clip_into(p, &mut self.scratch[k]);
-                m[k] = moments(&self.scratch[k]);
+                at.moments[k] = moments(&self.scratch[k]);
                 &self.scratch[k]
             } else {
-                m[k] = self.pads.moments[k];
+                at.moments[k] = self.pads.moments[k];
                 &self.pads.areas[k]
             };
-            let f = friction(Field { area, p }, v.into());
+            let f = friction(Field { area, p }, twist_of(z));
             let sign = if k == 0 { 1.0 } else { -1.0 };
-            by_pressure[k] =
+            at.by_pressure[k] =
                 [Vector3::from(f.g[0]), sign * Vector3::from(f.g[1]), sign * Vector3::from(f.g[2])];
-            gradients[k] = Vector3::from(f.gradient(p));
-            hessians[k] = nalgebra::Matrix3::from_fn(|i, j| f.hessian[i][j]);
+            at.gradients[k] = Vector3::from(f.gradient(p));
+            at.hessians[k] = Matrix3::from_fn(|i, j| f.hessian[i][j]);
         }
+        at
+    }
+
+    /// [`Solver::evaluate`] from the integrals, which may be those of another load's state.
+    pub(super) fn equations(
+        &self,
+        at: &Integrals,
+        coupling: f64,
+        jacobian: Option<&mut Matrix7>,
+    ) -> State {
+        let Integrals { z, gradients, hessians, by_pressure, moments: m } = at;
+        let v = Vector3::new(z[0], z[1], z[2]);
+        let q = [z[3], z[4], z[5], z[6]];
         let g = gradients[0] + gradients[1];
         let d = g.dot(&v);
         let lever = coupling * self.load.half_distance * self.load.size;
-        let k = pressure::stiffness(&m);
+        let k = pressure::stiffness(m);
         let carried = k * nalgebra::Vector4::new(q[0], q[1], q[2], q[3]);
         let difference = gradients[0] - gradients[1];
         let slip = Vector3::from(self.load.direction) - d * g;
@@ -188,7 +220,7 @@ impl<'a> Solver<'a> {
         let normal = carried[0] + carried[1];
         let friction =
             Support { gradient: g.into(), normal, centre: (first_i + first_ii) / normal };
-        State { z: *z, residual, mu_over_size: d, moments: m, friction }
+        State { z: *z, residual, mu_over_size: d, moments: *m, friction }
     }
 
     /// Damped semi-smooth Newton from `z`; `None` when it does not come below [`TOLERANCE`] in
@@ -351,7 +383,7 @@ const ROUNDING: f64 = 1e-14;
 /// Solves `jacobian x = rhs`; `None` where it is singular. The rows of the normal forces know the
 /// pressure alone and give the offsets from its slopes, so that five unknowns are left for
 /// elimination with pivoting.
-fn solve_newton(jacobian: &Matrix7, rhs: &Vector7) -> Option<Vector7> {
+pub(super) fn solve_newton(jacobian: &Matrix7, rhs: &Vector7) -> Option<Vector7> {
     let j = |row: usize, column: usize| jacobian[(row, column)];
     // offset_k = base_k + slope_k . (a1, a2)
     let offset = [(3, 3), (4, 4)].map(|(row, column)| {

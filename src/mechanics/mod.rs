@@ -3,6 +3,7 @@
 //! [`solve`] answers one case; [`Pads`] keeps what a contact determines for many loads.
 
 mod branch;
+mod compare;
 pub mod curved;
 pub(crate) mod equilibrium;
 pub mod inverse;
@@ -17,6 +18,7 @@ pub mod twist_out;
 
 pub use crate::request::{Refiner, Separation};
 pub use branch::COUPLING_SEARCH;
+pub(crate) use compare::{Comparison, Neighbour, below};
 pub use pads::{Load, Pads};
 pub(crate) use solve::check;
 pub use solve::{Options, Search, Start, limit_states, refused, solve, solve_next, solve_pads};

@@ -180,7 +180,7 @@ fn at_once(pads: &Pads, force: f64, load: &Load, options: &Options) -> Option<Sc
 
 /// The limit state of a load, from which that of another one like it is found sooner.
 #[derive(Debug, Clone, Copy)]
-pub struct Start(Vector7);
+pub struct Start(pub(super) Vector7);
 
 /// [`solve_pads`] with [`Search::Off`] from the limit state `near` of a load like this one;
 /// afterwards `near` is this load's, if it has one.
@@ -210,7 +210,7 @@ pub fn solve_next(
 }
 
 /// Turns a solved state into an answer with its certificate.
-fn finish(
+pub(super) fn finish(
     pads: &Pads,
     force: f64,
     load: &Load,

@@ -5,3 +5,4 @@
 mod suite;
 #[path = "../support/mod.rs"]
 mod support;
+mod worst;
