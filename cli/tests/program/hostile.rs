@@ -161,3 +161,19 @@ fn a_full_disk_and_a_closed_pipe_are_no_panic() {
     }
     assert!(Path::new("/dev/full").exists());
 }
+
+#[cfg(feature = "step")]
+#[test]
+fn a_crash_of_the_cad_kernel_is_an_error_that_names_file_and_stage() {
+    let Some(path) = sample("segv.step") else { return };
+    refused(&["part", &path], &["segv.step", "the CAD kernel crashed while"]);
+    let Some(good) = reference("parts/gen") else { return };
+    let good = std::fs::read_dir(good).unwrap().map(|entry| entry.unwrap().path());
+    let good =
+        good.into_iter().find(|path| path.extension().is_some_and(|suffix| suffix == "step"));
+    let good = good.unwrap().display().to_string();
+    let answer = run(&["part", &good]);
+    assert!(matches!(answer.code, Some(0 | 1)), "{}", answer.errors);
+    assert!(answer.output.contains("planar faces"), "{}", answer.output);
+    refused(&["part", &good, "--max-memory", "1MB"], &["remedy"]);
+}

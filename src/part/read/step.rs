@@ -270,7 +270,7 @@ fn answer(
     stage: &mut String,
 ) -> Result<Option<i32>> {
     let mut mark = [0];
-    let mut text = |output: &mut dyn Read| -> std::io::Result<String> {
+    let text = |output: &mut dyn Read| -> std::io::Result<String> {
         let mut length = [0];
         output.read_exact(&mut length)?;
         let mut bytes = vec![0; usize::from(length[0])];
