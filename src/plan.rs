@@ -120,6 +120,9 @@ pub struct Outcome {
     pub shown: Vec<u64>,
     /// The file from which the run can be resumed, where it was interrupted.
     pub checkpoint: Option<PathBuf>,
+    /// The files written. An interrupted run writes under names of their own
+    /// (`grips.interrupted.json` for `grips.json`): an older result stays.
+    pub written: Vec<PathBuf>,
 }
 
 impl Outcome {
@@ -209,6 +212,8 @@ impl Plan {
         observer.note(&format!("backend {}", selection.reason));
         let assessor = self.assessor(&selection.backend);
         let mut proposer = Proposer::new(&self.part, &self.gripper, &self.propose)?;
+        let output = self.request.output.output.as_deref();
+        let _held = output.map(Lock::take).transpose()?;
         let partial = self.partial()?;
         let search = Search {
             assessor: &assessor,
@@ -220,11 +225,11 @@ impl Plan {
         let found = search.run(&mut proposer, observer, stop)?;
         let (complete, checkpoint) = (found.complete, found.checkpoint.clone());
         let (set, shown) = self.finish(&proposer, &assessor, found)?;
-        self.write(&set)?;
+        let written = self.write(&set, complete)?;
         if let Some(partial) = partial.filter(|_| complete) {
             partial.remove()?;
         }
-        Ok(Outcome { set, shown, checkpoint })
+        Ok(Outcome { set, shown, checkpoint, written })
     }
 
     fn assessor<'a>(&'a self, backend: &'a Backend) -> Assessor<'a> {

@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::error::{Error, Result};
-use crate::units::{Acceleration, Angle, Density, Force, Length, Mass, Time, Unit};
+use crate::units::{Acceleration, Angle, Density, Force, Length, Mass, Memory, Time, Unit};
 
 pub use text::{Cone, EarlierWeights, Ground, PoseError, Region};
 pub use words::{Choice, Polish, Refiner, Separation, Side};
@@ -42,6 +42,9 @@ pub struct Request {
     /// Unit of the part file's numbers; absent: the file's own, else millimetres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Unit>,
+    /// Most memory that reading the part may take; absent: half of the machine's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_memory: Option<Memory>,
     /// Gripper of the catalogue, or a gripper file.
     pub gripper: String,
     /// Mass of the part.

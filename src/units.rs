@@ -87,10 +87,10 @@ impl Quantity {
             ],
             Self::Time => &[("s", 1.0), ("ms", 1e-3), ("min", 60.0), ("h", 3600.0)],
             Self::Memory => &[
-                ("GB", 1e9),
-                ("MB", 1e6),
-                ("kB", 1e3),
                 ("B", 1.0),
+                ("kB", 1e3),
+                ("MB", 1e6),
+                ("GB", 1e9),
                 ("GiB", 1073741824.0),
                 ("MiB", 1048576.0),
                 ("KiB", 1024.0),
@@ -246,6 +246,8 @@ quantities! {
     Density, "kg/m3";
     /// A time [s]; `30s` as a text.
     Time, "s";
+    /// A size in memory [B]; `2GB` as a text.
+    Memory, "MB";
 }
 
 /// Unit of the numbers in a mesh file.

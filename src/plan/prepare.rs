@@ -142,7 +142,8 @@ fn read_part(request: &Request, threads: &ThreadPool) -> Result<Part> {
     if request.part.as_os_str().is_empty() {
         return Err(Error::input("part", "none is named", "give a part file"));
     }
-    let options = ReadOptions { unit: request.unit, ..ReadOptions::default() };
+    let max_memory = request.max_memory.map(|memory| memory.0 as u64);
+    let options = ReadOptions { unit: request.unit, max_memory, ..ReadOptions::default() };
     threads.install(|| Part::read(Path::new(&request.part), &options))
 }
 

@@ -8,6 +8,7 @@ fn full() -> Request {
     let text = r#"
 part = "a/b c.stl"
 unit = "in"
+max_memory = "2GB"
 gripper = "my.toml"
 density = "2.7 g/cm3"
 force = "18lbf"

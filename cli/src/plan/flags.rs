@@ -8,7 +8,7 @@ use gripfast::request::{
     Choice, Cone, EarlierWeights, Ground, Polish, PoseError, Refiner, Region, Request, Separation,
     Side,
 };
-use gripfast::units::{Acceleration, Angle, Density, Force, Length, Mass, Time, Unit};
+use gripfast::units::{Acceleration, Angle, Density, Force, Length, Mass, Memory, Time, Unit};
 use serde_json::{Map, Value};
 
 /// Finds and ranks the grips (grasps) on a part.
@@ -44,6 +44,9 @@ pub(crate) struct Args {
     /// Unit of the part file's numbers [default: the file's own, else mm].
     #[arg(long)]
     unit: Option<Unit>,
+    /// Most memory that reading the part may take, e.g. 2GB [default: half of the machine's].
+    #[arg(long, value_name = "SIZE")]
+    max_memory: Option<Memory>,
     /// Acceleration in any direction on top of gravity, e.g. 2g.
     #[arg(long)]
     accel: Option<Acceleration>,
@@ -267,7 +270,7 @@ impl Args {
         if let Some(loads) = &self.loads {
             request.loads = loads.split(',').map(|source| source.trim().to_owned()).collect();
         }
-        give!(self => request; part, gripper, mass, density, force, unit, accel);
+        give!(self => request; part, gripper, mass, density, force, unit, max_memory, accel);
         let (flags, group) = (self.candidates, &mut request.candidates);
         give!(flags => group;
             spacing, angle_step, edge_angles, min_contact, min_pad_share, max_offset, approach,
@@ -348,7 +351,7 @@ mod tests {
 
     /// Every flag that is a field, with a value that is not its default.
     const LINE: &str = "gripfast plan part.stl --gripper my.toml --mass 350g --force 40N --unit in \
-        --accel 2g --loads gravity,ball:3 --spacing 2mm --angle-step 7deg --edge-angles false \
+        --max-memory 2GB --accel 2g --loads gravity,ball:3 --spacing 2mm --angle-step 7deg --edge-angles false \
         --min-contact 0.3 --min-pad-share 0.1 --max-offset 9mm --approach -z:45deg --ground +z:1mm \
         --keep-out 0mm,0mm,0mm:1mm,1mm,1mm --faces 0,2 --faces-in 0mm,0mm,0mm:1mm,1mm,1mm \
         --grips both --flips --opening 4mm --min-opening 1mm --clearance 1mm \
