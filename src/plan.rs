@@ -40,6 +40,7 @@ use rayon::ThreadPool;
 use crate::backend::{Backend, SeedSet, select};
 use crate::error::Result;
 use crate::export::Format;
+use crate::file::Lock;
 use crate::gripper::{Gripper, Jaws};
 use crate::lab::compare;
 use crate::part::{MassProperties, Part};

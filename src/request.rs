@@ -212,6 +212,7 @@ impl Default for Request {
         Self {
             part: PathBuf::new(),
             unit: None,
+            max_memory: None,
             gripper: String::new(),
             mass: None,
             density: None,
