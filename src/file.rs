@@ -1,10 +1,11 @@
 //! Files written whole or not at all, and read within the memory allowed.
 
 use std::fs::File;
+use std::hash::{Hash, Hasher};
 use std::io::{BufWriter, Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::memory::{self, Budget};
 
 /// Writes a file so that its name never stands for a part of it: the content goes to a temporary
@@ -45,6 +46,53 @@ pub fn write(
     #[cfg(unix)]
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
     Ok(())
+}
+
+/// Held while a run works on an output: a second run on it is refused. The system frees it when
+/// the process ends, however it ends.
+#[derive(Debug)]
+pub struct Lock {
+    _file: Option<File>,
+}
+
+impl Lock {
+    /// Takes the lock of `output`; of a pipe or device there is none. It lies in the user's folder
+    /// of run-time files, or in the one for temporary files, and holds on this machine.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Busy`] when another process holds it.
+    pub fn take(output: &Path) -> Result<Self> {
+        if std::fs::metadata(output).is_ok_and(|metadata| !metadata.is_file()) {
+            return Ok(Self { _file: None });
+        }
+        let folder = match output.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        let target = std::fs::canonicalize(output).or_else(|_| {
+            let name = output.file_name().unwrap_or_default();
+            std::fs::canonicalize(folder).map(|folder| folder.join(name))
+        });
+        let target = target.unwrap_or_else(|_| output.to_path_buf());
+        let mut hasher = rustc_hash::FxHasher::default();
+        target.hash(&mut hasher);
+        let place = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
+        let place = place.filter(|place| place.is_dir()).unwrap_or_else(std::env::temp_dir);
+        let path = place.join(format!("gripfast-{:016x}.lock", hasher.finish()));
+        // Where no lock can be made the run goes on without.
+        let file = File::options().create(true).truncate(false).write(true).open(path);
+        let Ok(file) = file else { return Ok(Self { _file: None }) };
+        match file.try_lock() {
+            Err(std::fs::TryLockError::WouldBlock) => Err(Error::new(
+                ErrorKind::Busy,
+                output.display().to_string(),
+                "another run is writing it",
+                "wait for that run, or name another file",
+            )
+            .with_options(&["output"])),
+            _ => Ok(Self { _file: Some(file) }),
+        }
+    }
 }
 
 /// Share of the memory that a text may take by default: what is made of it takes a few times as
@@ -153,6 +201,18 @@ mod tests {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
         write(&path, |writer| writer.write_all(b"new")).unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
+    }
+
+    #[test]
+    fn an_output_is_held_by_one_run() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.json");
+        let held = Lock::take(&path).unwrap();
+        let same = folder.path().join(".").join("out.json");
+        assert_eq!(Lock::take(&same).unwrap_err().kind(), ErrorKind::Busy);
+        Lock::take(&folder.path().join("other.json")).unwrap();
+        drop(held);
+        Lock::take(&path).unwrap();
     }
 
     #[test]

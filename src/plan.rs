@@ -40,6 +40,7 @@ use rayon::ThreadPool;
 use crate::backend::{Backend, SeedSet, select};
 use crate::error::Result;
 use crate::export::Format;
+use crate::file::Lock;
 use crate::gripper::{Gripper, Jaws};
 use crate::lab::compare;
 use crate::part::{MassProperties, Part};
@@ -120,6 +121,9 @@ pub struct Outcome {
     pub shown: Vec<u64>,
     /// The file from which the run can be resumed, where it was interrupted.
     pub checkpoint: Option<PathBuf>,
+    /// The files written. An interrupted run writes under names of their own
+    /// (`grips.interrupted.json` for `grips.json`): an older result stays.
+    pub written: Vec<PathBuf>,
 }
 
 impl Outcome {
@@ -209,6 +213,8 @@ impl Plan {
         observer.note(&format!("backend {}", selection.reason));
         let assessor = self.assessor(&selection.backend);
         let mut proposer = Proposer::new(&self.part, &self.gripper, &self.propose)?;
+        let output = self.request.output.output.as_deref();
+        let _held = output.map(Lock::take).transpose()?;
         let partial = self.partial()?;
         let search = Search {
             assessor: &assessor,
@@ -223,11 +229,11 @@ impl Plan {
         }
         let (complete, checkpoint) = (found.complete, found.checkpoint.clone());
         let (set, shown) = self.finish(&proposer, &assessor, found)?;
-        self.write(&set)?;
+        let written = self.write(&set, complete)?;
         if let Some(partial) = partial.filter(|_| complete) {
             partial.remove()?;
         }
-        Ok(Outcome { set, shown, checkpoint })
+        Ok(Outcome { set, shown, checkpoint, written })
     }
 
     fn assessor<'a>(&'a self, backend: &'a Backend) -> Assessor<'a> {

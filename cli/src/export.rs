@@ -127,7 +127,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     } else {
         export::write(&set, format, &args.output, &options, mesh)?;
         let count = options.top.unwrap_or(usize::MAX).min(set.grips.len());
-        eprintln!("{}: {count} grips", args.output.display());
+        crate::terminal::say(&format!("{}: {count} grips", args.output.display()));
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -10,6 +10,7 @@ use std::process::ExitCode;
 use gripfast::plan::{Observer, Outcome, Plan};
 
 use super::why;
+use crate::terminal;
 use watch::Watch;
 
 pub(crate) use flags::{Args, with_defaults};
@@ -18,7 +19,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (why, print) = (args.why(), args.print_request);
     let request = args.request()?;
     if print {
-        write!(std::io::stdout(), "{}", request.to_toml())?;
+        write!(terminal::output(), "{}", request.to_toml())?;
         return Ok(ExitCode::SUCCESS);
     }
     let mut watch = Watch::new(request.output.quiet);
@@ -27,12 +28,17 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         plan.warnings().iter().for_each(|text| watch.warning(text));
         return explain(&plan, text);
     }
-    let outcome = plan.run(&mut watch, &watch::stop_on_interrupt());
+    let interrupt = watch::Interrupt::watched()?;
+    let outcome = plan.run(&mut watch, &interrupt.stop);
     watch.end();
     let outcome = outcome?;
     print_answer(&plan, &outcome)?;
     notes(&plan, &outcome);
-    Ok(if outcome.set.grips.is_empty() { ExitCode::from(1) } else { ExitCode::SUCCESS })
+    Ok(match interrupt.code() {
+        Some(code) if !outcome.set.provenance.complete => ExitCode::from(code),
+        _ if outcome.set.grips.is_empty() => ExitCode::from(1),
+        _ => ExitCode::SUCCESS,
+    })
 }
 
 /// Why the pose of `--why` is a grip, or is not.
@@ -50,7 +56,8 @@ fn print_answer(plan: &Plan, outcome: &Outcome) -> anyhow::Result<()> {
         writeln!(out)?;
         return Ok(());
     }
-    table::print(&mut out, &outcome.set, &outcome.shown(), plan.gripper())
+    drop(out);
+    table::print(&mut terminal::output(), &outcome.set, &outcome.shown(), plan.gripper())
 }
 
 /// What became of the files, and of an interrupted run.
@@ -60,12 +67,13 @@ fn notes(plan: &Plan, outcome: &Outcome) {
         return;
     }
     if !outcome.set.provenance.complete {
-        eprintln!("interrupted: the ranking covers the candidates looked at so far");
+        terminal::say("interrupted: the ranking covers the candidates looked at so far");
     }
     if let Some(file) = &outcome.checkpoint {
-        eprintln!("wrote {}: the same command with --resume resumes the run", file.display());
+        let file = file.display();
+        terminal::say(&format!("wrote {file}: the same command with --resume resumes the run"));
     }
-    for path in output.output.iter().chain(&output.report) {
-        eprintln!("wrote {}", path.display());
+    for path in &outcome.written {
+        terminal::say(&format!("wrote {}", path.display()));
     }
 }

@@ -49,13 +49,18 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         None => recorded_part(&args.grips, &set.part),
     };
     if let Err(error) = solve_every_load(&mut set, WHOLE) {
-        eprintln!("warning: {error}\n  the page shows the worst loads only");
+        crate::terminal::say(&format!("warning: {error}\n  the page shows the worst loads only"));
     }
     report::write(&set, part.as_ref().map(|part| &part.mesh), &output)?;
     let size = std::fs::metadata(&output)
         .with_context(|| format!("cannot read back {}", output.display()))?
         .len();
-    eprintln!("{}: {} grips, {:.1} MB", output.display(), set.grips.len(), size as f64 / 1e6);
+    crate::terminal::say(&format!(
+        "{}: {} grips, {:.1} MB",
+        output.display(),
+        set.grips.len(),
+        size as f64 / 1e6
+    ));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -66,14 +71,18 @@ fn recorded_part(grips: &Path, summary: &PartSummary) -> Option<Part> {
     let Some(path) =
         [Some(recorded.to_path_buf()), beside].into_iter().flatten().find(|path| path.is_file())
     else {
-        eprintln!(
+        crate::terminal::say(&format!(
             "warning: {}: not found; the part is drawn as its bounding box (--part FILE names it)",
             summary.file
-        );
+        ));
         return None;
     };
     read_part(&path, summary)
-        .inspect_err(|error| eprintln!("warning: {error}\n  the part is drawn as its bounding box"))
+        .inspect_err(|error| {
+            crate::terminal::say(&format!(
+                "warning: {error}\n  the part is drawn as its bounding box"
+            ))
+        })
         .ok()
 }
 

@@ -155,7 +155,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         name: &name,
     };
     if !args.quiet {
-        eprintln!("backend {}", selection.reason);
+        crate::terminal::say(&format!("backend {}", selection.reason));
     }
     let started = Instant::now();
     let mut counts = Counts::default();
@@ -183,7 +183,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if !args.quiet {
         let seconds = started.elapsed().as_secs_f64();
-        eprintln!(
+        crate::terminal::say(&format!(
             "{} grips, {} loads, {} slip problems and {} equilibria solved, {} held; {seconds:.2} s, {:.0} grips/s",
             counts.grips,
             counts.loads,
@@ -191,7 +191,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             counts.solved,
             counts.held,
             counts.grips as f64 / seconds
-        );
+        ));
     }
     Ok(if counts.held > 0 { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

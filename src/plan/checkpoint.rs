@@ -19,7 +19,7 @@ use crate::results::LoadCase;
 /// Marks the file of an unfinished run.
 const FORMAT: &str = "gripfast-unfinished";
 /// Version of the layout of [`Checkpoint`].
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// All that a run has found after some chunk, and what it was asked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -59,9 +59,11 @@ impl<'a> Checkpoint<'a> {
     /// # Errors
     /// When the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
+        let state = serde_json::to_vec(self)
+            .map_err(|error| Error::io(path, "write", std::io::Error::other(error)))?;
         crate::file::write(path, |writer| {
-            serde_json::to_writer(&mut *writer, self)?;
-            writer.write_all(b"\n")
+            writer.write_all(&state)?;
+            writeln!(writer, "\n{}", checksum(&state))
         })
     }
 
@@ -72,7 +74,7 @@ impl<'a> Checkpoint<'a> {
     /// message names those that do.
     pub fn read(path: &Path, inputs: &BTreeMap<String, Value>) -> Result<Checkpoint<'static>> {
         let place = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
+        let bytes = crate::file::read(path)?;
         let remedy = "start from the beginning, without resuming";
         let wrong =
             |problem: String| Error::format(&place, problem, remedy).with_options(&["resume"]);
@@ -81,7 +83,10 @@ impl<'a> Checkpoint<'a> {
             format: String,
             version: u32,
         }
-        let marks: Marks = serde_json::from_slice(&bytes)
+        // The state on the first line, its checksum on the second.
+        let mut lines = bytes.splitn(2, |&byte| byte == b'\n');
+        let (state, sum) = (lines.next().unwrap_or_default(), lines.next());
+        let marks: Marks = serde_json::from_slice(state)
             .map_err(|error| wrong(format!("is no unfinished run: {error}")))?;
         if (marks.format.as_str(), marks.version) != (FORMAT, VERSION) {
             return Err(wrong(format!(
@@ -89,7 +94,11 @@ impl<'a> Checkpoint<'a> {
                 marks.format, marks.version
             )));
         }
-        let read: Checkpoint<'static> = serde_json::from_slice(&bytes)
+        let sum = sum.and_then(|line| std::str::from_utf8(line).ok()).map(str::trim);
+        if sum != Some(checksum(state).as_str()) {
+            return Err(wrong("was changed or cut off: its checksum is another".to_owned()));
+        }
+        let read: Checkpoint<'static> = serde_json::from_slice(state)
             .map_err(|error| wrong(format!("cannot be read: {error}")))?;
         let differences = differences(&read.inputs, inputs);
         if differences.is_empty() {
@@ -105,6 +114,13 @@ impl<'a> Checkpoint<'a> {
         )
         .with_options(&["resume"]))
     }
+}
+
+/// Checksum of a state: an edit or a torn copy is found by it.
+fn checksum(state: &[u8]) -> String {
+    let mut sum = Crc::new();
+    sum.update(state);
+    format!("checksum {:08x} of {} bytes", sum.sum(), state.len())
 }
 
 /// Everything that decides which grips are found and how they are ranked, by name. `settings` are

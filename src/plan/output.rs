@@ -1,6 +1,6 @@
 //! Where the answer goes: result file, page, and the loads that a page shows.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -21,10 +21,14 @@ pub const WHOLE: usize = 20;
 pub const GLB_TOP: usize = 10;
 
 impl Plan {
-    /// Writes result file and page where the request names them.
-    pub(super) fn write(&self, set: &GripSet) -> Result<()> {
+    /// Writes result file and page where the request names them, or beside these names when the
+    /// run is not complete; the names.
+    pub(super) fn write(&self, set: &GripSet, complete: bool) -> Result<Vec<PathBuf>> {
+        let name = |path: &PathBuf| if complete { path.clone() } else { interrupted(path) };
+        let output = self.request.output.output.as_ref().map(name);
+        let page = self.request.output.report.as_ref().map(name);
         let mesh = Some(&self.part.mesh);
-        if let (Some(path), Some(format)) = (&self.request.output.output, self.format) {
+        if let (Some(path), Some(format)) = (&output, self.format) {
             match format {
                 Format::Json => set.write(path)?,
                 Format::JsonLines => set.write_lines(path)?,
@@ -38,11 +42,25 @@ impl Plan {
                 }
             }
         }
-        match &self.request.output.report {
-            Some(path) => report::write(set, mesh, path),
-            None => Ok(()),
+        if let Some(path) = &page {
+            report::write(set, mesh, path)?;
         }
+        Ok(output.into_iter().chain(page).collect())
     }
+}
+
+/// Where an interrupted run writes what belongs under `path`: `grips.interrupted.json` for
+/// `grips.json`. A pipe or device keeps its name.
+fn interrupted(path: &Path) -> PathBuf {
+    if std::fs::metadata(path).is_ok_and(|metadata| !metadata.is_file()) {
+        return path.to_path_buf();
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let (stem, ending) = match name.split_once('.') {
+        Some((stem, ending)) if !stem.is_empty() => (stem, format!(".{ending}")),
+        _ => (name.as_ref(), String::new()),
+    };
+    path.with_file_name(format!("{stem}.interrupted{ending}"))
 }
 
 /// The format of a result file by its ending, refused now rather than after the search.

@@ -40,7 +40,7 @@ impl GripSet {
     /// a grip that cannot be (a pose that is no rotation, a load that is not in the list), naming
     /// line or grip.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
+        let bytes = crate::file::read(path)?;
         Self::parse(&path.display().to_string(), &bytes)
     }
 
@@ -96,6 +96,7 @@ impl GripSet {
     /// Refuses what no run writes.
     fn check(&self, place: &str) -> Result<()> {
         check_marks(place, Some(&self.format), Some(self.version.into()))?;
+        let mut ids = std::collections::HashSet::new();
         for (index, ranked) in self.grips.iter().enumerate() {
             let wrong = |problem: String| {
                 Error::input(
@@ -115,6 +116,13 @@ impl GripSet {
             if !(ranked.grip.width.is_finite() && ranked.grip.width >= 0.0) {
                 return Err(wrong(format!("a width of {} m", ranked.grip.width)));
             }
+            if !ids.insert(ranked.grip.id) {
+                return Err(wrong("another grip has this id".into()));
+            }
+            if let Some(mu) = ranked.worst.mu_s.filter(|mu| !(0.0..=f64::MAX).contains(mu)) {
+                return Err(wrong(format!("a friction coefficient of {mu}")));
+            }
+            ranked.grip.contact.check(&format!("{place}, grips[{index}], contact "))?;
             if ranked.worst.load as usize >= self.loads.len() {
                 return Err(wrong(format!(
                     "its worst load is number {}, but the file has {} loads",

@@ -2,12 +2,12 @@
 
 use std::io::IsTerminal;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use gripfast::plan::{Observer, Progress};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::flags;
+use crate::{flags, terminal};
 
 /// Notes and progress to standard error unless quiet; warnings always.
 pub(super) struct Watch {
@@ -30,8 +30,8 @@ impl Watch {
     /// A line above the bar.
     fn line(&self, text: &str) {
         match &self.bar {
-            Some(bar) => bar.suspend(|| eprintln!("{text}")),
-            None => eprintln!("{text}"),
+            Some(bar) => bar.suspend(|| terminal::say(text)),
+            None => terminal::say(text),
         }
     }
 }
@@ -73,16 +73,33 @@ fn progress_bar(total: u64, quiet: bool) -> ProgressBar {
     bar
 }
 
-/// Set when the user asks to stop: the run ends after the chunk in flight with what it has.
-pub(super) fn stop_on_interrupt() -> Arc<AtomicBool> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    // A second handler in one process is refused; then an interrupt just ends the program, which is
-    // all right too.
-    let _ = ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
+/// A request to stop from outside: the run ends after the chunk in flight with what it has; a
+/// second one ends the program at once.
+pub(super) struct Interrupt {
+    /// Set by the first one.
+    pub(super) stop: Arc<AtomicBool>,
+    /// The exit code that it asks for, 0 without one.
+    code: Arc<AtomicUsize>,
+}
+
+impl Interrupt {
+    /// From now on interrupts are taken.
+    pub(super) fn watched() -> std::io::Result<Self> {
+        use signal_hook::consts::{SIGINT, SIGTERM};
+        use signal_hook::flag;
+        let (stop, code) = (Arc::<AtomicBool>::default(), Arc::<AtomicUsize>::default());
+        for signal in [SIGINT, SIGTERM] {
+            // As shells number them: 130 and 143.
+            let ends = 128 + signal;
+            flag::register_conditional_shutdown(signal, ends, Arc::clone(&stop))?;
+            flag::register_usize(signal, Arc::clone(&code), ends as usize)?;
+            flag::register(signal, Arc::clone(&stop))?;
         }
-    });
-    stop
+        Ok(Self { stop, code })
+    }
+
+    /// The exit code of an interrupted program.
+    pub(super) fn code(&self) -> Option<u8> {
+        u8::try_from(self.code.load(Ordering::Relaxed)).ok().filter(|&code| code > 0)
+    }
 }

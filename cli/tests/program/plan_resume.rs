@@ -147,14 +147,27 @@ fn an_interrupted_run_ranks_what_it_has_and_goes_on_later() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("grips.json");
     let child = started(&file);
+    let second = run(&file, &[]);
+    assert_eq!(second.status.code(), Some(2));
+    assert!(text(&second.stderr).contains("another run is writing it"));
     assert!(
         Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success()
     );
     let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-    let some = GripSet::read(&file).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
+    assert!(!file.exists());
+    let beside = folder.path().join("grips.interrupted.json");
+    let some = GripSet::read(&beside).unwrap();
     assert!(!some.provenance.complete);
     assert!(partial(&file).exists());
+    let state = std::fs::read_to_string(partial(&file)).unwrap();
+    let edited = state.replacen("\"mu_s\":0.", "\"mu_s\":0.000001", 1);
+    assert_ne!(state, edited);
+    std::fs::write(partial(&file), edited).unwrap();
+    let output = run(&file, &["--resume"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("checksum"), "{}", text(&output.stderr));
+    std::fs::write(partial(&file), state).unwrap();
     let output = run(&file, &["--resume"]);
     let err = text(&output.stderr);
     assert_eq!(output.status.code(), Some(0), "{err}");
@@ -166,6 +179,19 @@ fn an_interrupted_run_ranks_what_it_has_and_goes_on_later() {
             && all.summary.ranked >= some.summary.ranked
     );
     assert!(!partial(&file).exists());
+}
+
+#[test]
+fn a_terminated_run_leaves_an_older_result() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("grips.json");
+    std::fs::write(&file, "older").unwrap();
+    let child = started(&file);
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args(["-TERM", &id]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(143), "{}", text(&output.stderr));
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "older");
 }
 
 #[test]
