@@ -50,7 +50,7 @@ impl Solver<'_> {
 
     /// The solution on the branch that starts at `d = 0` without coupling; `None` when that branch
     /// does not exist, or ends before the real `d`.
-    pub fn branch(&mut self, seed: Option<Twist>) -> Option<State> {
+    pub(crate) fn branch(&mut self, seed: Option<Twist>) -> Option<State> {
         if self.refiner == Refiner::Newton {
             // None at the rim, where [`Solver::state_at`] knows the way.
             let q = pressure::solve(
@@ -97,7 +97,7 @@ impl Solver<'_> {
     /// Follows the branch from coupling 0 to 1, in the plane of contact moments where even the last
     /// of a contact has room: along its tangent, then Newton's method, in steps short enough that
     /// each ends close to where the tangent led. `None` where the branch turns back or ends.
-    pub fn follow(&mut self, start: Vector7) -> Option<State> {
+    pub(crate) fn follow(&mut self, start: Vector7) -> Option<State> {
         let mut at = self.newton(start, 0.0, 25)?;
         let (mut reached, mut step) = (if self.load.half_distance == 0.0 { 1.0 } else { 0.0 }, 1.0);
         for _ in 0..FOLLOW_MOST {

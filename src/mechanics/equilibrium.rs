@@ -22,7 +22,7 @@ pub(super) type Matrix7 = SMatrix<f64, 7, 7>;
 
 /// A state of the seven unknowns and what the equations say of it.
 #[derive(Debug, Clone, Copy)]
-pub struct State {
+pub(crate) struct State {
     /// Twist, then pressure coefficients.
     pub z: Vector7,
     /// Residuals of the seven equations, forces in units of `Fn`, moments of `Fn` times the pads'
@@ -38,12 +38,12 @@ pub struct State {
 
 impl State {
     /// Pressure coefficients.
-    pub fn q(&self) -> [f64; 4] {
+    pub(crate) fn q(&self) -> [f64; 4] {
         [self.z[3], self.z[4], self.z[5], self.z[6]]
     }
 
     /// Twist.
-    pub fn twist(&self) -> Twist {
+    pub(crate) fn twist(&self) -> Twist {
         twist_of(&self.z)
     }
 }
@@ -83,7 +83,7 @@ pub(super) struct Integrals {
 }
 
 /// Solves one contact pair under one load; keeps its scratch memory and counts its work.
-pub struct Solver<'a> {
+pub(crate) struct Solver<'a> {
     pub(super) pads: &'a Pads,
     pub(super) load: Load,
     pub(super) refiner: Refiner,
@@ -95,11 +95,11 @@ pub struct Solver<'a> {
 }
 
 /// Residual at which a state counts as a solution, but for rounding.
-pub const TOLERANCE: f64 = 1e-11;
+pub(crate) const TOLERANCE: f64 = 1e-11;
 
 impl<'a> Solver<'a> {
     /// A solver for `load` with a non-zero in-plane part.
-    pub fn new(pads: &'a Pads, load: Load, refiner: Refiner) -> Self {
+    pub(crate) fn new(pads: &'a Pads, load: Load, refiner: Refiner) -> Self {
         Self {
             pads,
             load,
@@ -309,7 +309,7 @@ impl<'a> Solver<'a> {
 
     /// A state from the contact moment `target` (see [`pressure::reach`]): its pressure, and the
     /// slip under it.
-    pub fn state_at(&mut self, target: DVec2, seed: Option<Twist>) -> Option<Vector7> {
+    pub(crate) fn state_at(&mut self, target: DVec2, seed: Option<Twist>) -> Option<Vector7> {
         self.state_from(target, seed, None).or_else(|| {
             let q = pressure::solve_near_rim(
                 self.pads,
@@ -322,7 +322,7 @@ impl<'a> Solver<'a> {
     }
 
     /// As [`Solver::state_at`], from the pressure and slip of the state `near`.
-    pub fn state_near(&mut self, target: DVec2, near: Option<&Vector7>) -> Option<Vector7> {
+    pub(crate) fn state_near(&mut self, target: DVec2, near: Option<&Vector7>) -> Option<Vector7> {
         self.state_from(target, near.map(twist_of), near.map(|z| [z[3], z[4], z[5], z[6]]))
     }
 
@@ -430,7 +430,7 @@ pub(super) fn solve_newton(jacobian: &Matrix7, rhs: &Vector7) -> Option<Vector7>
 const CONJUGATE_ROUNDS: u32 = 8;
 
 /// Whether two states are the same solution.
-pub fn same(a: &State, b: &State) -> bool {
+pub(crate) fn same(a: &State, b: &State) -> bool {
     let tilt = (a.z.fixed_rows::<4>(3) - b.z.fixed_rows::<4>(3)).norm();
     (a.mu_over_size / b.mu_over_size - 1.0).abs() < 1e-6
         && tilt < 1e-5 * (1.0 + a.z.fixed_rows::<4>(3).norm())

@@ -10,17 +10,17 @@ use crate::model::Ring;
 use super::pads::Pads;
 
 /// Pressure coefficients of face `k` (0: I, 1: II) from `q = (a_i0, a_ii0, a1, a2)`.
-pub fn face_pressure(q: &[f64; 4], k: usize) -> [f64; 3] {
+pub(crate) fn face_pressure(q: &[f64; 4], k: usize) -> [f64; 3] {
     if k == 0 { [q[0], q[2], q[3]] } else { [q[1], -q[2], -q[3]] }
 }
 
 /// Whether the pressure plane is negative at a point of the area.
-pub fn separates(area: &Loops, p: [f64; 3]) -> bool {
+pub(crate) fn separates(area: &Loops, p: [f64; 3]) -> bool {
     area.points().iter().any(|x| p[0] + p[1] * x.x + p[2] * x.y < 0.0)
 }
 
 /// Moments of the pressed parts of both areas, using `scratch` where an area must be cut.
-pub fn pressed_moments(pads: &Pads, q: &[f64; 4], scratch: &mut Loops) -> [[f64; 6]; 2] {
+pub(crate) fn pressed_moments(pads: &Pads, q: &[f64; 4], scratch: &mut Loops) -> [[f64; 6]; 2] {
     std::array::from_fn(|k| {
         let p = face_pressure(q, k);
         if separates(&pads.areas[k], p) {
@@ -33,17 +33,17 @@ pub fn pressed_moments(pads: &Pads, q: &[f64; 4], scratch: &mut Loops) -> [[f64;
 }
 
 /// The contact moment `(X1, X2)` that the pressure `q` carries on pressed areas with these moments.
-pub fn carried([one, two]: &[[f64; 6]; 2], q: &[f64; 4]) -> DVec2 {
+pub(crate) fn carried([one, two]: &[[f64; 6]; 2], q: &[f64; 4]) -> DVec2 {
     first_moment(one, face_pressure(q, 0)) - first_moment(two, face_pressure(q, 1))
 }
 
 /// `int p x` over an area with these moments.
-pub fn first_moment(m: &[f64; 6], p: [f64; 3]) -> DVec2 {
+pub(crate) fn first_moment(m: &[f64; 6], p: [f64; 3]) -> DVec2 {
     DVec2::new(p[0] * m[1] + p[1] * m[3] + p[2] * m[4], p[0] * m[2] + p[1] * m[4] + p[2] * m[5])
 }
 
 /// Stiffness: `(N_I, N_II, X1, X2) = K q` with `X = int_I x p_I - int_II x p_II`.
-pub fn stiffness(m: &[[f64; 6]; 2]) -> Matrix4<f64> {
+pub(crate) fn stiffness(m: &[[f64; 6]; 2]) -> Matrix4<f64> {
     let [a, b] = m;
     Matrix4::new(
         a[0],
@@ -68,7 +68,7 @@ pub fn stiffness(m: &[[f64; 6]; 2]) -> Matrix4<f64> {
 /// Distance of the contact moment `target = (X1, X2)` inside the region `N_I conv A_I - N_II conv
 /// A_II` that pressing pads can carry, in units of force times length; not positive: the contact
 /// twists out.
-pub fn reach(pads: &Pads, normal: [f64; 2], target: DVec2) -> f64 {
+pub(crate) fn reach(pads: &Pads, normal: [f64; 2], target: DVec2) -> f64 {
     region_edges(pads, normal)
         .map(|(e, support)| support - e.dot(target))
         .fold(f64::INFINITY, f64::min)
@@ -76,7 +76,7 @@ pub fn reach(pads: &Pads, normal: [f64; 2], target: DVec2) -> f64 {
 
 /// Corners of the region of [`reach`], counter-clockwise: the hulls' edges one after the other by
 /// their direction.
-pub fn region(pads: &Pads, normal: [f64; 2]) -> Ring {
+pub(crate) fn region(pads: &Pads, normal: [f64; 2]) -> Ring {
     let scaled =
         |k: usize, factor: f64| -> Ring { pads.hulls[k].iter().map(|x| factor * *x).collect() };
     let rings = [scaled(0, normal[0]), scaled(1, -normal[1])];
@@ -140,7 +140,7 @@ fn solve_stiffness(m: &[[f64; 6]; 2], load: &Vector4<f64>, lift: f64) -> Option<
 ///
 /// It minimises the convex `1/2 sum int p^2 - f . q` by Newton's method; each step is one solve on
 /// the areas cut at the current zero-pressure lines (paper 3.6), damped so that the function falls.
-pub fn solve(
+pub(crate) fn solve(
     pads: &Pads,
     normal: [f64; 2],
     target: DVec2,
@@ -209,7 +209,7 @@ pub fn solve(
 /// [`solve`] for a contact moment close to the rim, where Newton's method from afar gets lost: from
 /// the middle of the region towards it in steps that leave a quarter of the way each, every one
 /// from the pressure before.
-pub fn solve_near_rim(
+pub(crate) fn solve_near_rim(
     pads: &Pads,
     normal: [f64; 2],
     target: DVec2,

@@ -23,7 +23,7 @@ const LINE_TRIALS: u32 = 40;
 
 /// When to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub(crate) struct Options {
     /// Stop when `|g| <= gradient_tolerance * max(1, |x|)`; 0 asks for as much as the arithmetic
     /// gives.
     pub gradient_tolerance: f64,
@@ -58,7 +58,7 @@ pub enum StopReason {
 
 /// Where the iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Minimum<const N: usize> {
+pub(crate) struct Minimum<const N: usize> {
     /// The best point.
     pub x: [f64; N],
     /// Value there.
@@ -162,7 +162,7 @@ fn next_step(before: Trial, now: Trial) -> f64 {
 ///
 /// A point whose value or gradient is not finite is stepped back from, so `evaluate` may answer NaN
 /// outside its domain.
-pub fn minimise<const N: usize>(
+pub(crate) fn minimise<const N: usize>(
     start: [f64; N],
     options: &Options,
     evaluate: impl FnMut(&[f64; N]) -> (f64, [f64; N]),
@@ -171,7 +171,7 @@ pub fn minimise<const N: usize>(
 }
 
 /// As [`minimise`], ending also when `stop` holds at the point that a line search arrives at.
-pub fn minimise_until<const N: usize>(
+pub(crate) fn minimise_until<const N: usize>(
     start: [f64; N],
     options: &Options,
     mut evaluate: impl FnMut(&[f64; N]) -> (f64, [f64; N]),

@@ -16,7 +16,7 @@ use super::pressure;
 
 /// What [`Solver::limit_states`] found.
 #[derive(Debug, Clone, Default)]
-pub struct LimitStates {
+pub(crate) struct LimitStates {
     /// Distinct limit states by rising `mu`.
     pub states: Vec<State>,
     /// Whether the signs of the states add up to the map's turns along the rim; if not, there is
@@ -77,7 +77,7 @@ struct Map<'s, 'a> {
 
 impl Solver<'_> {
     /// Looks for every limit state, `known` ones among them.
-    pub fn limit_states(&mut self, known: &[State]) -> LimitStates {
+    pub(crate) fn limit_states(&mut self, known: &[State]) -> LimitStates {
         let mut states = known.to_vec();
         let complete = match Map::new(self) {
             Some(mut map) => map.search(&mut states),
