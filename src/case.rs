@@ -16,13 +16,13 @@ use crate::model::{Contact, LARGEST_LENGTH, Patch, Ring, Wrench};
 pub struct Case {
     /// The case's own name, if it has one.
     pub id: Option<String>,
-    /// Both contact areas [m]: of curved faces their outlines.
+    /// Both contact areas \[m\]: of curved faces their outlines.
     pub contact: Contact,
     /// The faces as they are and the pads' stiffness, where the case gives them.
     pub surfaces: Option<Surfaces>,
-    /// Height of face I over face II [m], negative for a grip from inside.
+    /// Height of face I over face II \[m\], negative for a grip from inside.
     pub distance: f64,
-    /// Gripping force [N].
+    /// Gripping force \[N\].
     pub force: f64,
     /// External wrench about the origin midway between the faces.
     pub wrench: Wrench,
@@ -53,7 +53,7 @@ struct Pieces {
     face_ii: Vec<Piece>,
 }
 
-/// A body between wide pads, its axis along `x1` [m].
+/// A body between wide pads, its axis along `x1` \[m\].
 #[derive(Deserialize)]
 struct Body {
     kind: Kind,

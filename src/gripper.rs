@@ -26,20 +26,20 @@ pub use travel::{Travel, TravelRow};
 pub struct Gripper {
     /// Display name.
     pub name: String,
-    /// Smallest and largest distance of the pads [m].
+    /// Smallest and largest distance of the pads \[m\].
     pub stroke: [f64; 2],
-    /// Smallest and largest gripping force [N].
+    /// Smallest and largest gripping force \[N\].
     pub force: [f64; 2],
-    /// Pad outline in `(x1, x2)`, counter-clockwise, convex [m]; the same on both jaws.
+    /// Pad outline in `(x1, x2)`, counter-clockwise, convex \[m\]; the same on both jaws.
     pub pad: Ring,
     /// Friction coefficient of the pad material, where stated.
     pub pad_friction: Option<f64>,
-    /// Rubber thickness [m], where stated.
+    /// Rubber thickness \[m\], where stated.
     pub pad_thickness: Option<f64>,
-    /// Young's modulus of the rubber [Pa], where stated.
+    /// Young's modulus of the rubber \[Pa\], where stated.
     #[serde(default)]
     pub pad_modulus: Option<f64>,
-    /// Distance from the pad face to the finger's outer gripping face [m], where the gripper can
+    /// Distance from the pad face to the finger's outer gripping face \[m\], where the gripper can
     /// grip from inside, opening into a slot; that face has the pad's outline.
     #[serde(default)]
     pub outer_pad: Option<f64>,
@@ -90,21 +90,21 @@ pub struct Body {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "lowercase")]
 pub enum Shape {
-    /// Box with these half sizes [m].
+    /// Box with these half sizes \[m\].
     Box {
-        /// Half sizes along the body axes [m].
+        /// Half sizes along the body axes \[m\].
         half: DVec3,
     },
     /// Cylinder about the body's z axis.
     Cylinder {
-        /// Radius [m].
+        /// Radius \[m\].
         radius: f64,
-        /// Half height [m].
+        /// Half height \[m\].
         half_height: f64,
     },
     /// Convex hull of points.
     Hull {
-        /// At least four points, not in one plane [m].
+        /// At least four points, not in one plane \[m\].
         points: Vec<DVec3>,
     },
 }
@@ -134,7 +134,7 @@ impl Body {
         self.grip_from_body.point(self.shape.support_point(direction))
     }
 
-    /// Smallest and largest coordinates in the grip frame [m].
+    /// Smallest and largest coordinates in the grip frame \[m\].
     pub fn bounds(&self) -> [DVec3; 2] {
         let reach = |sign: f64| {
             DVec3::from_array(DVec3::AXES.map(|axis| self.support_point(axis * sign).dot(axis)))
@@ -191,7 +191,7 @@ impl Jaw {
         }
     }
 
-    /// The jaw's frame in the grip frame with its pad face `offset` [m] from the middle plane.
+    /// The jaw's frame in the grip frame with its pad face `offset` \[m\] from the middle plane.
     pub fn at(self, offset: f64) -> Frame {
         let rotation = match self {
             Self::I => DMat3::IDENTITY,
@@ -225,39 +225,39 @@ impl Jaws {
 }
 
 impl Gripper {
-    /// The bodies of a finger, with the pads `width` apart [m].
+    /// The bodies of a finger, with the pads `width` apart \[m\].
     pub fn finger(&self, jaw: Jaw, width: f64) -> Vec<Body> {
         let map = jaw.at(width / 2.0);
         self.fingers.iter().map(|body| body.moved(&map)).collect()
     }
 
     /// Where the palm, and what is fixed to it, stands in the grip frame with the pads `gap` apart
-    /// [m], seen from where the gripper file places it.
+    /// \[m\], seen from where the gripper file places it.
     pub fn palm_place(&self, gap: f64) -> Frame {
         Frame { rotation: DMat3::IDENTITY, origin: DVec3::NEG_X * self.travel.advance(gap) }
     }
 
-    /// The bodies of the palm in the grip frame with the pads `gap` apart [m].
+    /// The bodies of the palm in the grip frame with the pads `gap` apart \[m\].
     pub fn palm_at(&self, gap: f64) -> Vec<Body> {
         let place = self.palm_place(gap);
         self.palm.iter().map(|body| body.moved(&place)).collect()
     }
 
-    /// A jaw's frame in the frame of a grip with the pads `gap` apart [m], with its own pad at
-    /// `offset` from the middle plane [m]: before it has closed, say.
+    /// A jaw's frame in the frame of a grip with the pads `gap` apart \[m\], with its own pad at
+    /// `offset` from the middle plane \[m\]: before it has closed, say.
     pub fn jaw_at(&self, jaw: Jaw, gap: f64, offset: f64) -> Frame {
         let mut place = jaw.at(offset);
         place.origin.x = self.travel.advance(2.0 * offset) - self.travel.advance(gap);
         place
     }
 
-    /// Distance of the pads in a grip [m]: the faces' own, or less by the fingers where these
+    /// Distance of the pads in a grip \[m\]: the faces' own, or less by the fingers where these
     /// spread into a slot.
     pub fn jaw_gap(&self, grip: &Grip) -> f64 {
         if grip.inside { grip.width - 2.0 * self.outer_pad.unwrap_or(0.0) } else { grip.width }
     }
 
-    /// Distance of the pads before they close on a grip [m], each jaw having `opening` to go or as
+    /// Distance of the pads before they close on a grip \[m\], each jaw having `opening` to go or as
     /// much as the stroke leaves.
     pub fn opened_gap(&self, grip: &Grip, opening: f64) -> f64 {
         let (gap, [least, most]) = (self.jaw_gap(grip), self.stroke);

@@ -4,16 +4,16 @@ use std::cell::Cell;
 
 use crate::error::{Error, ErrorKind, Result};
 
-/// The limit where the machine does not say how much memory it has [bytes].
+/// The limit where the machine does not say how much memory it has \[bytes\].
 const UNKNOWN: u64 = 4 << 30;
 
-/// The default limit [bytes]: half of the machine's memory, or of what the system's control group
+/// The default limit \[bytes\]: half of the machine's memory, or of what the system's control group
 /// grants; 4 GiB where neither is known.
 pub fn default_limit() -> u64 {
     machine().map_or(UNKNOWN, |bytes| bytes / 2)
 }
 
-/// Memory of the machine or of the control group, the smaller one [bytes].
+/// Memory of the machine or of the control group, the smaller one \[bytes\].
 fn machine() -> Option<u64> {
     let information = std::fs::read_to_string("/proc/meminfo").ok();
     let total = information.as_deref().and_then(|text| {
@@ -40,7 +40,7 @@ impl Budget {
         Self { limit: limit.unwrap_or_else(default_limit), held: Cell::new(0) }
     }
 
-    /// The limit [bytes].
+    /// The limit \[bytes\].
     pub(crate) fn limit(&self) -> u64 {
         self.limit
     }

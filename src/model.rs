@@ -12,10 +12,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, ErrorKind, Result};
 
-/// A closed loop of points [m]; the last point joins the first.
+/// A closed loop of points \[m\]; the last point joins the first.
 pub type Ring = Vec<DVec2>;
 
-/// A plane polygon with holes [m]. Outer ring counter-clockwise, holes clockwise once normalised
+/// A plane polygon with holes \[m\]. Outer ring counter-clockwise, holes clockwise once normalised
 /// ([`crate::geometry::polygon`]); readers accept either sense.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -27,7 +27,7 @@ pub struct Polygon {
     pub holes: Vec<Ring>,
 }
 
-/// One contact area: disjoint polygons in the pad plane `(x1, x2)` [m].
+/// One contact area: disjoint polygons in the pad plane `(x1, x2)` \[m\].
 pub type Patch = Vec<Polygon>;
 
 /// The two contact areas of a grip, both in the grip frame's `(x1, x2)`.
@@ -41,13 +41,13 @@ pub struct Contact {
     pub face_ii: Patch,
 }
 
-/// Largest coordinate or length of a file or an option [m]: to rounding a tenth of a micrometre is
+/// Largest coordinate or length of a file or an option \[m\]: to rounding a tenth of a micrometre is
 /// lost beyond.
 pub(crate) const LARGEST_LENGTH: f64 = 1e9;
-/// Largest coordinate or distance that the mechanics take [m], whose equations know no scale:
+/// Largest coordinate or distance that the mechanics take \[m\], whose equations know no scale:
 /// lengths enter in the fourth power, and that must stay a number.
 pub(crate) const LARGEST_SCALE: f64 = 1e60;
-/// Smallest extent of a contact area that is taken [m]: its fourth power leaves room above the
+/// Smallest extent of a contact area that is taken \[m\]: its fourth power leaves room above the
 /// smallest of numbers.
 const SMALLEST_EXTENT: f64 = 1e-30;
 
@@ -86,11 +86,11 @@ impl Contact {
     }
 }
 
-/// A force [N] and a moment [N m] ON the body. The frame and the point of the moment are the
+/// A force \[N\] and a moment [N m] ON the body. The frame and the point of the moment are the
 /// holder's to state; in mechanics it is the grip frame and its origin.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Wrench {
-    /// Force [N].
+    /// Force \[N\].
     pub force: DVec3,
     /// Moment [N m].
     pub moment: DVec3,
@@ -109,10 +109,10 @@ pub struct LoadCase {
 /// x2`, both `max(0, .)` where a pad separates (19)(20).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pressure {
-    /// Value of `p_I` at the origin [Pa].
+    /// Value of `p_I` at the origin \[Pa\].
     #[serde(rename = "aI0")]
     pub a_i0: f64,
-    /// Value of `p_II` at the origin [Pa].
+    /// Value of `p_II` at the origin \[Pa\].
     #[serde(rename = "aII0")]
     pub a_ii0: f64,
     /// Slope along `x1` [Pa/m].
@@ -125,10 +125,10 @@ pub struct Pressure {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "lowercase")]
 pub enum Slip {
-    /// Rotation about `x3` through `c` [m]; `sense` is +1 (the paper's) or -1 (there a negative
+    /// Rotation about `x3` through `c` \[m\]; `sense` is +1 (the paper's) or -1 (there a negative
     /// mu).
     Rotation {
-        /// Slip centre in `(x1, x2)` [m].
+        /// Slip centre in `(x1, x2)` \[m\].
         c: [f64; 2],
         /// Sense of rotation about `+x3`.
         sense: i8,
@@ -235,7 +235,7 @@ pub struct Score {
 pub struct Frame {
     /// Orthonormal, right-handed.
     pub rotation: DMat3,
-    /// Origin of the inner frame in the outer one [m].
+    /// Origin of the inner frame in the outer one \[m\].
     pub origin: DVec3,
 }
 
@@ -274,14 +274,14 @@ pub struct Grip {
     pub id: u64,
     /// Grip frame in the part frame.
     pub part_from_grip: Frame,
-    /// Distance between the two faces, `d` [m].
+    /// Distance between the two faces, `d` \[m\].
     pub width: f64,
     /// Planar face of the part under pad I ([`crate::part::PlanarFace::id`]).
     pub face_i: u32,
     /// Planar face of the part under pad II.
     pub face_ii: u32,
     /// Angle of the approach axis about the closing axis, from the face pair's reference direction
-    /// [rad].
+    /// \[rad\].
     pub angle: f64,
     /// Contact areas in the grip frame; shared by grips whose areas are the same in the pad frame.
     pub contact: Arc<Contact>,
@@ -313,7 +313,7 @@ pub(crate) mod null_is_infinite {
 }
 
 impl Grip {
-    /// Height of face I over face II along `x3`, the `d` of the mechanics [m]: the width, negative
+    /// Height of face I over face II along `x3`, the `d` of the mechanics \[m\]: the width, negative
     /// for an inside grip.
     pub fn distance(&self) -> f64 {
         if self.inside { -self.width } else { self.width }

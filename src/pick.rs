@@ -27,12 +27,12 @@ const PIECE: usize = 64;
 /// Why a grip was passed over.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reason {
-    /// Its approach lies outside the cone, by its angle to the axis [rad].
+    /// Its approach lies outside the cone, by its angle to the axis \[rad\].
     Cone(f64),
-    /// The flange (or, without one, the grip) is this far from the robot's base [m].
+    /// The flange (or, without one, the grip) is this far from the robot's base \[m\].
     Reach(f64),
     /// It needs jaws opened this far, less than the smallest or more than the largest distance of
-    /// the pads [m].
+    /// the pads \[m\].
     Stroke(f64),
     /// A body of the gripper meets an obstacle.
     Collision {
@@ -320,7 +320,7 @@ impl<'a> Picker<'a> {
         }
     }
 
-    /// Distance of the pads before closing on a grip [m].
+    /// Distance of the pads before closing on a grip \[m\].
     pub fn opened(&self, grip: &Grip) -> f64 {
         let opening = match self.scene.opening {
             Opening::Full => f64::INFINITY,

@@ -177,7 +177,7 @@ impl Plan {
         &self.warnings
     }
 
-    /// Why a pose is a grip, or is not: `position` [m] and approach angle [rad] in the plane of the
+    /// Why a pose is a grip, or is not: `position` \[m\] and approach angle \[rad\] in the plane of the
     /// face pair of this number.
     ///
     /// # Errors

@@ -14,7 +14,7 @@ use crate::results::RankedGrip;
 /// of them ran.
 pub const TIE: f64 = 1e-9;
 
-/// Two lengths [m] (or areas, by their square roots) count as equal for
+/// Two lengths \[m\] (or areas, by their square roots) count as equal for
 /// [`Options::merge_duplicates`]: part files have coordinates of single precision.
 const SAME_LENGTH: f64 = 1e-7;
 /// Scores that such lengths can make differ by no more than this share.
@@ -79,7 +79,7 @@ pub struct Ranking {
 }
 
 /// Scores and orders `grips`; their `rank` and `score` are set here. `centre_of_mass` and `size`
-/// (the diagonal of the bounding box) are the part's [m], in the part frame.
+/// (the diagonal of the bounding box) are the part's \[m\], in the part frame.
 ///
 /// The order is that of falling score. Among scores within [`TIE`] of each other the grip nearest to
 /// the centre of mass comes first, then the one whose contacts are more symmetric about the plane in
@@ -198,7 +198,7 @@ fn geometry(grip: &RankedGrip, centre_of_mass: DVec3) -> [f64; 8] {
     [width, centre.x, centre.y.abs(), centre.z.abs(), one[0], one[1], two[0], two[1]]
 }
 
-/// Root of the area and radius of gyration about the grip axis [m].
+/// Root of the area and radius of gyration about the grip axis \[m\].
 fn size_and_spread(patch: &Patch) -> [f64; 2] {
     let moments = crate::geometry::patch_moments(patch);
     if moments.area <= 0.0 {
@@ -238,7 +238,7 @@ fn merge(grips: Vec<(f64, RankedGrip)>, centre_of_mass: DVec3) -> Vec<(f64, Rank
 }
 
 /// At most `top` of the ranked `grips` that differ in place, approach and face pair, best first.
-/// `size`: diagonal of the part's bounding box [m].
+/// `size`: diagonal of the part's bounding box \[m\].
 pub fn choose_diverse(grips: &[RankedGrip], top: usize, size: f64) -> Vec<&RankedGrip> {
     grips
         .iter()

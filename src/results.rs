@@ -106,9 +106,9 @@ pub struct PartSummary {
     pub unit_m: f64,
     /// Triangles after repair.
     pub triangles: usize,
-    /// Smallest corner of the bounding box [m].
+    /// Smallest corner of the bounding box \[m\].
     pub bbox_min: DVec3,
-    /// Largest corner of the bounding box [m].
+    /// Largest corner of the bounding box \[m\].
     pub bbox_max: DVec3,
     /// Mass, centre of mass, inertia.
     pub mass: MassProperties,
@@ -142,7 +142,7 @@ pub struct Comparison {
     pub k2: f64,
     /// Weight of alpha [1/rad].
     pub k3: f64,
-    /// Added to the distance from the centre of mass [m].
+    /// Added to the distance from the centre of mass \[m\].
     pub epsilon_m: f64,
     /// Spearman's rank correlation; `None` where one of the orders has no two different places.
     pub spearman: Option<f64>,
@@ -165,9 +165,9 @@ pub struct EarlierScore {
     pub place: f64,
     /// Its friction coefficient under [`RankedGrip::worst`]'s load.
     pub mu_s: f64,
-    /// Its slip centre, the centroid of the contact, in `(x1, x2)` [m].
+    /// Its slip centre, the centroid of the contact, in `(x1, x2)` \[m\].
     pub slip_centre: [f64; 2],
-    /// Distance of the slip centre from the centre of mass in the pad plane [m], the function's
+    /// Distance of the slip centre from the centre of mass in the pad plane \[m\], the function's
     /// `D`.
     pub distance: f64,
 }
@@ -197,9 +197,9 @@ pub struct RankedGrip {
     pub score: Option<f64>,
     /// Answer under the worst load.
     pub worst: LoadScore,
-    /// Angle by which the part may be tilted before the closing jaws no longer right it [rad].
+    /// Angle by which the part may be tilted before the closing jaws no longer right it \[rad\].
     pub alpha: f64,
-    /// Opening of the jaws needed to twist the part out [m].
+    /// Opening of the jaws needed to twist the part out \[m\].
     pub delta_d: f64,
     /// Smaller of the two contact areas left over its nominal area, at the worst load (0..1).
     pub contact_share: f64,
@@ -207,7 +207,7 @@ pub struct RankedGrip {
     pub twist_margin: f64,
     /// Pad friction over `mu_s`; `None` when the gripper states no pad friction or `mu_s = 0`.
     pub safety: Option<f64>,
-    /// Gripping force at which `mu_s` of the worst load equals the pad friction [N].
+    /// Gripping force at which `mu_s` of the worst load equals the pad friction \[N\].
     pub force_needed: Option<f64>,
     /// Ids of the grips left out because a symmetry of the part maps them to this one, where they
     /// were merged.

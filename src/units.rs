@@ -233,21 +233,21 @@ macro_rules! quantities {
 }
 
 quantities! {
-    /// A length [m]; `2mm` as a text.
+    /// A length \[m\]; `2mm` as a text.
     Length, "mm";
-    /// A mass [kg]; `350g` as a text.
+    /// A mass \[kg\]; `350g` as a text.
     Mass, "g";
-    /// A force [N]; `80N` as a text.
+    /// A force \[N\]; `80N` as a text.
     Force, "N";
-    /// An angle [rad]; `15deg` as a text.
+    /// An angle \[rad\]; `15deg` as a text.
     Angle, "deg";
     /// An acceleration [m/s^2]; `2g` as a text.
     Acceleration, "g";
     /// A density [kg/m^3]; `2700kg/m3` as a text.
     Density, "kg/m3";
-    /// A time [s]; `30s` as a text.
+    /// A time \[s\]; `30s` as a text.
     Time, "s";
-    /// A size in memory [bytes]; `2GB` as a text.
+    /// A size in memory \[bytes\]; `2GB` as a text.
     Memory, "GB";
 }
 
@@ -279,7 +279,7 @@ impl Unit {
     pub const ALL: [Self; 6] =
         [Self::Millimetre, Self::Metre, Self::Inch, Self::Centimetre, Self::Micrometre, Self::Foot];
 
-    /// Length of the unit [m].
+    /// Length of the unit \[m\].
     pub fn metres(self) -> f64 {
         match self {
             Self::Metre => 1.0,

@@ -133,7 +133,7 @@ fn run() -> ExitCode {
 /// STEP files are read in a process of their own: a fault of the CAD kernel is an error there.
 #[cfg(feature = "step")]
 fn step_apart() {
-    /// Processor time for one file [s]; the largest files of our collection take some ten.
+    /// Processor time for one file \[s\]; the largest files of our collection take some ten.
     const SECONDS: u64 = 600;
     if let Ok(program) = std::env::current_exe() {
         let arguments = vec![STEP_KERNEL.to_string()];

@@ -41,7 +41,7 @@ pub const COUPLING_MARGIN: f32 = 0.25;
 pub const COUPLED_SHARE: f32 = 0.25;
 
 /// Least value of the integral of the faces' difference in pressure, in gripping forces: above the
-/// rounding of [`ContactHeader::variation`].
+/// rounding of [`ContactHeader::variation_first`].
 pub const LEAST_VARIATION: f32 = 4e-3;
 
 /// Share by which a tilt that would lift a pad is shortened beyond the point of first separation

@@ -93,9 +93,9 @@ pub(crate) struct Records {
     /// Header whose edge and basis indices are relative to this contact.
     pub(crate) header: ContactHeader,
     pub(crate) edges: Vec<EdgeRecord>,
-    /// The pads' middle [m], origin of the scaled frame.
+    /// The pads' middle \[m\], origin of the scaled frame.
     pub(crate) origin: DVec2,
-    /// Radius of gyration about it [m], unit of length.
+    /// Radius of gyration about it \[m\], unit of length.
     pub(crate) unit: f64,
 }
 

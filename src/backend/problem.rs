@@ -17,10 +17,10 @@ pub struct Problem<'a> {
     /// Contact areas in the grip frame. Problems that share the `Arc` share the work that depends
     /// on it alone.
     pub contact: &'a Arc<Contact>,
-    /// Height of face I over face II [m], the `d` of the mechanics: negative for grips from inside
+    /// Height of face I over face II \[m\], the `d` of the mechanics: negative for grips from inside
     /// ([`crate::model::Grip::distance`]).
     pub distance: f64,
-    /// Gripping force [N].
+    /// Gripping force \[N\].
     pub force: f64,
     /// Wrenches on the body in the grip frame, moments about its origin.
     pub wrenches: &'a [Wrench],

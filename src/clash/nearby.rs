@@ -152,7 +152,7 @@ impl Nearby {
         (seed, Vec3A::from_array(seed.point))
     }
 
-    /// Size of a cell [m].
+    /// Size of a cell \[m\].
     pub(crate) fn fineness(&self) -> f32 {
         self.scale.recip()
     }

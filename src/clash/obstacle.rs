@@ -30,15 +30,15 @@ const RAY: DVec3 =
 /// How a gripper moves on to a grip and away from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Course {
-    /// Distance of the pads in the grip [m].
+    /// Distance of the pads in the grip \[m\].
     pub(crate) gap: f64,
-    /// Way of each jaw from contact to the opening for the approach [m], outwards positive.
+    /// Way of each jaw from contact to the opening for the approach \[m\], outwards positive.
     pub(crate) opening: f64,
-    /// Length of the approach along `x1` [m].
+    /// Length of the approach along `x1` \[m\].
     pub(crate) approach: f64,
-    /// Way of the retreat with closed jaws, grip frame [m].
+    /// Way of the retreat with closed jaws, grip frame \[m\].
     pub(crate) retreat: DVec3,
-    /// Distance kept from obstacles [m].
+    /// Distance kept from obstacles \[m\].
     pub(crate) clearance: f64,
 }
 

@@ -49,17 +49,17 @@ struct Convex {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Motion {
     pub(crate) kind: PairKind,
-    /// Distance of the gripped faces [m].
+    /// Distance of the gripped faces \[m\].
     pub(crate) width: f64,
-    /// Way of each jaw from the approach opening to contact [m].
+    /// Way of each jaw from the approach opening to contact \[m\].
     pub(crate) opening: f64,
-    /// Fingers may lie this deep in the planes that they grip [m].
+    /// Fingers may lie this deep in the planes that they grip \[m\].
     pub(crate) touch: f64,
-    /// Bodies may lie this deep in any other surface [m]: being flush with one is no collision.
+    /// Bodies may lie this deep in any other surface \[m\]: being flush with one is no collision.
     pub(crate) flush: f64,
-    /// Distance kept elsewhere [m].
+    /// Distance kept elsewhere \[m\].
     pub(crate) clearance: f64,
-    /// Length of the approach [m].
+    /// Length of the approach \[m\].
     pub(crate) approach: f64,
     /// Which way round the gripper is put.
     pub(crate) jaws: Jaws,

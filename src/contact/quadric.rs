@@ -29,7 +29,7 @@ const OUTSIDE: f64 = 0.5;
 /// polygon that lies exactly where the pressure ends is no tie. What it adds is of the order of
 /// the square.
 const CUT: f64 = 1e-9;
-/// Turn of an arc's tangent up to which it is one element [rad].
+/// Turn of an arc's tangent up to which it is one element \[rad\].
 const TURN: f64 = 0.4;
 
 /// `c + g . x + (l1 x1^2 + l2 x2^2) / 2`: no mixed term, the axes are the surface's own.

@@ -13,7 +13,7 @@ use crate::model::{Polygon, Ring};
 pub enum Gap {
     /// `height + slope . x`: the pad plane itself, a step behind it, a drafted plane, a facet.
     Plane {
-        /// Gap at the origin [m].
+        /// Gap at the origin \[m\].
         #[serde(default)]
         height: f64,
         /// Slope along `x1`, `x2`.
@@ -22,43 +22,43 @@ pub enum Gap {
     },
     /// `height + y^2 / (2 radius)`, `y` the distance from the line through `at` along `axis`.
     Cylinder {
-        /// Radius [m], negative for a bore.
+        /// Radius \[m\], negative for a bore.
         radius: f64,
         /// Direction of the axis in the pad plane, of any length; along `x1` if not given.
         #[serde(default = "along_x1")]
         axis: DVec2,
-        /// A point of the crest in the pad plane [m].
+        /// A point of the crest in the pad plane \[m\].
         #[serde(default)]
         at: DVec2,
-        /// Gap at the crest [m].
+        /// Gap at the crest \[m\].
         #[serde(default)]
         height: f64,
     },
     /// `height + r^2 / (2 radius)`, `r` the distance from `at`.
     Sphere {
-        /// Radius [m], negative for a hollow.
+        /// Radius \[m\], negative for a hollow.
         radius: f64,
-        /// Where the sphere is highest [m].
+        /// Where the sphere is highest \[m\].
         #[serde(default)]
         at: DVec2,
-        /// Gap there [m].
+        /// Gap there \[m\].
         #[serde(default)]
         height: f64,
     },
     /// A surface of revolution about an axis along `axis` with a round meridian: `height + x^2 / (2
     /// meridian) + y^2 / (2 radius)`, `x` along the axis from `at`, `y` across it.
     Barrel {
-        /// Radius about the axis [m].
+        /// Radius about the axis \[m\].
         radius: f64,
-        /// Radius of the meridian [m], negative for a waist.
+        /// Radius of the meridian \[m\], negative for a waist.
         meridian: f64,
         /// Direction of the axis in the pad plane, of any length; along `x1` if not given.
         #[serde(default = "along_x1")]
         axis: DVec2,
-        /// Where the barrel is highest [m].
+        /// Where the barrel is highest \[m\].
         #[serde(default)]
         at: DVec2,
-        /// Gap there [m].
+        /// Gap there \[m\].
         #[serde(default)]
         height: f64,
     },
@@ -100,7 +100,7 @@ impl Gap {
         }
     }
 
-    /// Radius across the axis, of a surface that has one [m].
+    /// Radius across the axis, of a surface that has one \[m\].
     pub fn radius(&self) -> Option<f64> {
         match *self {
             Self::Plane { .. } => None,
@@ -115,9 +115,9 @@ impl Gap {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Piece {
-    /// Outer boundary [m].
+    /// Outer boundary \[m\].
     pub outer: Ring,
-    /// Boundaries of the holes [m].
+    /// Boundaries of the holes \[m\].
     #[serde(default)]
     pub holes: Vec<Ring>,
     /// The gap; none is the pad plane itself.
@@ -145,7 +145,7 @@ pub struct Surfaces {
     /// thickness.
     #[serde(rename = "k")]
     pub stiffness: [f64; 2],
-    /// Thickness of the layers [m], for notes only.
+    /// Thickness of the layers \[m\], for notes only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layer: Option<f64>,
 }

@@ -15,7 +15,7 @@ use crate::part::Mesh;
 
 /// Sides of a drawn cylinder.
 const SIDES: u32 = 32;
-/// Thickness of a drawn pad [m].
+/// Thickness of a drawn pad \[m\].
 const PAD_THICKNESS: f64 = 1e-3;
 
 /// Indices into the list of materials in [`write`].

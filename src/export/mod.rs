@@ -135,13 +135,13 @@ pub struct Options {
     pub origin: Origin,
     /// Writes only this many, best first.
     pub top: Option<usize>,
-    /// Distance of the opened pads [m]; as planned, or as far as the stroke allows, when absent.
+    /// Distance of the opened pads \[m\]; as planned, or as far as the stroke allows, when absent.
     pub opening: Option<f64>,
     /// Joints of the gripper as functions of the pads' distance.
     pub joints: Vec<Joint>,
     /// Pad friction for formats that hold pass or fail; the gripper's when absent.
     pub pad_friction: Option<f64>,
-    /// Straight way of the approach and the retreat [m].
+    /// Straight way of the approach and the retreat \[m\].
     pub approach: f64,
     /// Name of the part frame (moveit, isaac_grasp).
     pub part_frame: String,
@@ -222,12 +222,12 @@ impl<'a> View<'a> {
         grip.grip.part_from_grip.compose(&self.grip_from_tool(grip))
     }
 
-    /// Distance of the pads in the grip [m].
+    /// Distance of the pads in the grip \[m\].
     fn gap(&self, grip: &RankedGrip) -> f64 {
         self.gripper.as_ref().map_or(grip.grip.width, |gripper| gripper.jaw_gap(&grip.grip))
     }
 
-    /// Distance of the pads before closing [m]: as asked for, as planned, or as far as the stroke
+    /// Distance of the pads before closing \[m\]: as asked for, as planned, or as far as the stroke
     /// allows.
     fn opened(&self, grip: &RankedGrip) -> f64 {
         let gap = self.gap(grip);

@@ -138,7 +138,7 @@ pub enum Origin {
     Pads,
     /// At that of a frame that the gripper file states.
     Stated(Stated),
-    /// This far behind the pads, against the approach [m].
+    /// This far behind the pads, against the approach \[m\].
     Behind(f64),
 }
 
@@ -174,7 +174,7 @@ impl fmt::Display for Origin {
     }
 }
 
-/// A joint of the gripper: `position = scale * width + offset`, width the distance of the pads [m].
+/// A joint of the gripper: `position = scale * width + offset`, width the distance of the pads \[m\].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
     /// Its name in the robot model.
@@ -233,7 +233,7 @@ impl Joint {
         Ok(Self { name, scale, offset, by_motion: false })
     }
 
-    /// Position at this distance of the pads [m] of a gripper.
+    /// Position at this distance of the pads \[m\] of a gripper.
     pub fn position(&self, width: f64, gripper: Option<&Gripper>) -> f64 {
         let stated = gripper
             .filter(|_| self.by_motion)

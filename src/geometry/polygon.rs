@@ -10,7 +10,7 @@ use crate::model::{Polygon, Ring};
 pub struct Moments {
     /// Area [m^2].
     pub area: f64,
-    /// Centroid [m]; zero when the area is zero.
+    /// Centroid \[m\]; zero when the area is zero.
     pub centroid: DVec2,
     /// Second moments about the centroid, `int (x - c)(x - c)^T dA` [m^4].
     pub second: DMat2,
@@ -19,9 +19,9 @@ pub struct Moments {
 /// An axis-parallel rectangle. Empty (`min > max`) until a point is added.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds2 {
-    /// Smallest coordinates [m].
+    /// Smallest coordinates \[m\].
     pub min: DVec2,
-    /// Largest coordinates [m].
+    /// Largest coordinates \[m\].
     pub max: DVec2,
 }
 
@@ -43,7 +43,7 @@ impl Bounds2 {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// Grown by `margin` on every side [m].
+    /// Grown by `margin` on every side \[m\].
     #[must_use]
     pub fn grown(self, margin: f64) -> Self {
         Self { min: self.min - margin, max: self.max + margin }
@@ -59,12 +59,12 @@ impl Bounds2 {
         !self.min.cmple(self.max).all()
     }
 
-    /// Side lengths [m].
+    /// Side lengths \[m\].
     pub fn size(self) -> DVec2 {
         self.max - self.min
     }
 
-    /// Middle [m].
+    /// Middle \[m\].
     pub fn centre(self) -> DVec2 {
         (self.min + self.max) / 2.0
     }

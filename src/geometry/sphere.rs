@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
-/// Largest angle between neighbouring directions of [`cone`] [rad].
+/// Largest angle between neighbouring directions of [`cone`] \[rad\].
 pub const CONE_STEP: f64 = 10.0 * PI / 180.0;
 
 /// The six axis directions, `-z` first.

@@ -65,7 +65,7 @@ pub fn check(gripper: &Gripper) -> Vec<String> {
     warnings
 }
 
-/// Free length from the foremost palm face to the rear edge of the pads [m]; `None` without a palm.
+/// Free length from the foremost palm face to the rear edge of the pads \[m\]; `None` without a palm.
 pub fn throat(gripper: &Gripper) -> Option<f64> {
     let top = gripper.palm.iter().map(|body| body.bounds()[1].x).fold(f64::NEG_INFINITY, f64::max);
     top.is_finite().then(|| Bounds2::of(&gripper.pad).min.x - top)

@@ -19,7 +19,7 @@ const SLICES: usize = 16;
 /// Space that joining two slices may add, as a share of the joined hull.
 const FILLED: f64 = 2e-3;
 
-/// Points of convex bodies that together contain the mesh in `path` [m].
+/// Points of convex bodies that together contain the mesh in `path` \[m\].
 ///
 /// # Errors
 /// As [`Part::read`].

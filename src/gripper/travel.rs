@@ -16,11 +16,11 @@ pub enum Travel {
     Parallel,
     /// Each pad is carried by a crank and stays parallel to the other.
     Arc {
-        /// Length of the crank [m].
+        /// Length of the crank \[m\].
         crank: f64,
-        /// Angle of the crank from the approach axis when the pads touch, outwards positive [rad].
+        /// Angle of the crank from the approach axis when the pads touch, outwards positive \[rad\].
         angle: f64,
-        /// The robot model's joint at the smallest and the largest distance of the pads [rad],
+        /// The robot model's joint at the smallest and the largest distance of the pads \[rad\],
         /// where stated; it turns as the crank does.
         joint: Option<[f64; 2]>,
     },
@@ -34,16 +34,16 @@ pub enum Travel {
 /// A row of a [`Travel::Table`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TravelRow {
-    /// Distance of the pads [m].
+    /// Distance of the pads \[m\].
     pub width: f64,
-    /// Advance of the pads [m].
+    /// Advance of the pads \[m\].
     pub advance: f64,
     /// The robot model's joint [rad or m], where stated.
     pub joint: Option<f64>,
 }
 
 impl Travel {
-    /// Advance of the pads when they are `width` apart [m].
+    /// Advance of the pads when they are `width` apart \[m\].
     pub fn advance(&self, width: f64) -> f64 {
         match self {
             Self::Parallel => 0.0,
@@ -71,7 +71,7 @@ impl Travel {
     }
 
     /// How far the pads leave the straight line between two of their positions along the approach,
-    /// at most [m].
+    /// at most \[m\].
     pub fn bulge(&self, from: f64, to: f64) -> f64 {
         let (start, end) = (self.advance(from), self.advance(to));
         match self {

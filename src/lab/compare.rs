@@ -13,7 +13,7 @@ use crate::results::{Comparison, EarlierScore, RankedGrip};
 const NAMED: usize = 5;
 
 /// Fills in [`RankedGrip::earlier`] of an ordered list and compares the two orders.
-/// `centre_of_mass` [m] is the part's, in the part frame; `force` is the gripping force [N]. Grips
+/// `centre_of_mass` \[m\] is the part's, in the part frame; `force` is the gripping force \[N\]. Grips
 /// without an area on both faces, which no ranking holds, are left out.
 pub fn compare(
     grips: &mut [RankedGrip],

@@ -1,4 +1,4 @@
-//! The earlier method that the paper improves on (its section 2 and reference [4]: Wolter, Volz and
+//! The earlier method that the paper improves on (its section 2 and reference \[4\]: Wolter, Volz and
 //! Woo, 1984): slip centre at the centroid of the contact, uniform pressure, moments in the pad
 //! plane only.
 //!
@@ -18,15 +18,15 @@ use crate::request::EarlierWeights;
 /// What the earlier method knows about a contact pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Centroid {
-    /// Where it puts the slip centre [m].
+    /// Where it puts the slip centre \[m\].
     pub slip_centre: DVec2,
-    /// `tau_s/(mu_s N)` [m]: mean distance of the contact from the slip centre.
+    /// `tau_s/(mu_s N)` \[m\]: mean distance of the contact from the slip centre.
     pub mean_radius: f64,
 }
 
 /// Slip centre and mean radius under uniform pressure; `None` unless both areas are positive.
 ///
-/// DEVIATION: reference [4] speaks of one contact polygon. Where the two faces' areas differ, each
+/// DEVIATION: reference \[4\] speaks of one contact polygon. Where the two faces' areas differ, each
 /// carries the gripping force at its own uniform pressure, and centroid and mean radius are the
 /// means of the faces'.
 pub fn centroid(contact: &Contact) -> Option<Centroid> {
@@ -57,7 +57,7 @@ pub fn centroid(contact: &Contact) -> Option<Centroid> {
 impl Centroid {
     /// The method's friction coefficient under a wrench in the grip frame: the moment about the
     /// centroid's axis over `2 Fn` times the mean radius. It sees neither the in-plane force as
-    /// such nor anything out of the plane. `grip_force` is `Fn` [N] of each pad, positive.
+    /// such nor anything out of the plane. `grip_force` is `Fn` \[N\] of each pad, positive.
     pub fn mu_s(&self, grip_force: f64, load: &Wrench) -> f64 {
         let c = self.slip_centre;
         let moment = load.moment.z + load.force.x * c.y - load.force.y * c.x;
@@ -105,7 +105,7 @@ pub fn solve(contact: &Contact, distance: f64, force: f64, load: &Wrench) -> Res
 /// The earlier evaluation function, larger is better: `(k1 Delta_d + k2 tau_s/(mu_s N))/(D +
 /// epsilon) + k3 alpha`.
 ///
-/// `d`: distance of the faces [m]; `centre_of_mass`: in the pad plane, grip frame [m]; `D` is its
+/// `d`: distance of the faces \[m\]; `centre_of_mass`: in the pad plane, grip frame \[m\]; `D` is its
 /// distance from the slip centre. `None` without contact on both faces.
 pub fn evaluation(
     contact: &Contact,

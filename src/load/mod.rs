@@ -51,11 +51,11 @@ pub enum LoadSource {
     Gravity(DVec3),
     /// The part's weight in this many directions spread over the sphere.
     GravitySphere(usize),
-    /// The part's weight in directions within `half_angle` [rad] of `axis`, part frame.
+    /// The part's weight in directions within `half_angle` \[rad\] of `axis`, part frame.
     GravityCone {
         /// Middle of the cone.
         axis: DVec3,
-        /// Half its opening, 0 to pi [rad].
+        /// Half its opening, 0 to pi \[rad\].
         half_angle: f64,
     },
     /// The paper's ball: forces normal to the facets of a sphere about the centre of mass, directed
@@ -63,7 +63,7 @@ pub enum LoadSource {
     Ball {
         /// Number of directions.
         directions: usize,
-        /// Size of each force [N].
+        /// Size of each force \[N\].
         force: f64,
         /// Size of the moments about the same directions, each a case of its own [N m].
         moment: Option<f64>,

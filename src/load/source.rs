@@ -6,7 +6,7 @@ use super::{LoadSource, MAX_CASES};
 use crate::error::{Error, Result};
 use crate::units::{Quantity, direction};
 
-/// Size of the ball's forces when none is stated [N].
+/// Size of the ball's forces when none is stated \[N\].
 const UNIT_FORCE: f64 = 1.0;
 /// Size of the ball's moments when none is stated [N m].
 const UNIT_MOMENT: f64 = 1.0;

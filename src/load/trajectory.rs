@@ -16,7 +16,7 @@ use crate::part::MassProperties;
 
 /// Rows that a derivative is taken from; fewer at hand, fewer used.
 const WINDOW: usize = 5;
-/// Largest turn between two rows of poses [rad]: five rows then stay below half a turn, where the
+/// Largest turn between two rows of poses \[rad\]: five rows then stay below half a turn, where the
 /// rotation vector is unique.
 const LARGEST_TURN: f64 = std::f64::consts::FRAC_PI_4;
 

@@ -17,7 +17,7 @@ use super::branch::COUPLING_SEARCH;
 use super::pads::Pads;
 use super::solve::{Options, Search, solve_next, solve_pads};
 
-/// The gripping force [N] needed to hold `wrench` with the pad friction `friction`: every larger
+/// The gripping force \[N\] needed to hold `wrench` with the pad friction `friction`: every larger
 /// force holds it too, and just below it the load slips (`mu_s` equals `friction`, to 1e-9), twists
 /// out or pulls a pad off (to 1e-4). `None` when no force up to `1e9` times the load's size holds
 /// it (or `friction` is not positive).
@@ -59,7 +59,7 @@ pub fn force_needed(
     Some(size / limit)
 }
 
-/// The largest multiple of `wrench` that `friction` holds at the gripping force `force` [N]
+/// The largest multiple of `wrench` that `friction` holds at the gripping force `force` \[N\]
 /// together with every smaller multiple; infinite for no load, 0 when not even a small one is held.
 ///
 /// The whole wrench grows, moments and normal force with it. It is one load's answer: of several

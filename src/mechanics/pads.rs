@@ -22,9 +22,9 @@ pub struct Pads {
     pub supports: Vec<(DVec2, [f64; 2])>,
     /// Whether the areas are the same to [`ROUNDING`].
     pub congruent: bool,
-    /// Middle of the areas in the grip frame [m]: the scaled frame's origin.
+    /// Middle of the areas in the grip frame \[m\]: the scaled frame's origin.
     pub origin: DVec2,
-    /// Square root of the mean area [m]: the scaled frame's unit.
+    /// Square root of the mean area \[m\]: the scaled frame's unit.
     pub length: f64,
 }
 
@@ -55,8 +55,8 @@ impl Pads {
         Some(Self { areas, moments, hulls, supports, congruent, origin, length })
     }
 
-    /// The load in units of `force` [N] and of this contact's length, its moment about the scaled
-    /// frame's origin; `distance` [m] is negative for a grip from inside.
+    /// The load in units of `force` \[N\] and of this contact's length, its moment about the scaled
+    /// frame's origin; `distance` \[m\] is negative for a grip from inside.
     pub fn load(&self, distance: f64, force: f64, wrench: &Wrench) -> Load {
         let origin = DVec3::new(self.origin.x, self.origin.y, 0.0);
         let f = wrench.force / force;

@@ -1,5 +1,5 @@
 //! Shanno's conjugate-direction minimiser with Beale-Powell restarts: the optimiser the paper names
-//! as its reference [17].
+//! as its reference \[17\].
 //!
 //! D. F. Shanno, "Conjugate gradient methods with inexact searches", Mathematics of Operations
 //! Research 3 (1978); the algorithm is the one known as CONMIN. It keeps two pairs of vectors (the

@@ -17,7 +17,7 @@ use crate::request::{Refiner, Separation};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Search {
     /// Where the coupling is strong ([`super::COUPLING_SEARCH`]) or the branch from `d = 0` does not reach
-    /// the load: the whole region of contact moments is looked over ([`super::states`]).
+    /// the load: the whole region of contact moments is looked over (`states`).
     #[default]
     WhereNeeded,
     /// Never: only the branch from `d = 0` counts, and a load that it does not reach is refused; no
@@ -40,9 +40,9 @@ pub struct Options {
 }
 
 /// Smallest friction coefficient that holds `wrench` (about the grip origin) in a grip with the two
-/// contact areas of `contact`, squeezed with `force` [N] on each pad on average (equation (9)).
+/// contact areas of `contact`, squeezed with `force` \[N\] on each pad on average (equation (9)).
 ///
-/// `distance` [m] is the height of face I over face II along `x3`, the `d` of (6)(7): positive for
+/// `distance` \[m\] is the height of face I over face II along `x3`, the `d` of (6)(7): positive for
 /// a part between the jaws, negative where the jaws press outwards against the walls of a slot.
 /// There face I lies at `x3 = -width/2`, still pushed along `-x3`, and `d = -width`. Reversing `d`
 /// and the in-plane load `(F1, F2, M3)` together changes no answer.

@@ -7,7 +7,7 @@
 //! tilted by `phi` between flat jaws holds them `d cos phi + w sin phi` apart, and the jaws' force
 //! rights it with the couple `N (w cos phi - d sin phi)`, up to the barrier `tan phi = w/d`.
 //! `Delta_d` is the height of that well, `alpha` its half-width, both in the weakest direction.
-//! They read the two measures that the paper takes from its reference [4] (Wolter, Volz and Woo,
+//! They read the two measures that the paper takes from its reference \[4\] (Wolter, Volz and Woo,
 //! 1984).
 
 use glam::DVec2;
@@ -27,7 +27,7 @@ pub struct TwistOut {
 /// The weakest lever of a grip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lever {
-    /// `w_min` [m]; negative when no pressure on the areas can balance the jaws.
+    /// `w_min` \[m\]; negative when no pressure on the areas can balance the jaws.
     pub width: f64,
     /// Direction in the pad plane in which the resultants are displaced; the part twists out about
     /// the axis across it.
@@ -58,13 +58,13 @@ impl TwistOut {
         Self { hull_i, hull_ii, normals }
     }
 
-    /// `w(e) = max over A_I of e.x - min over A_II of e.x` [m] for a unit vector `e`.
+    /// `w(e) = max over A_I of e.x - min over A_II of e.x` \[m\] for a unit vector `e`.
     pub fn lever(&self, e: DVec2) -> f64 {
         self.limit_moment(e, 1.0, 1.0)
     }
 
     /// `N_I h_I(e) + N_II h_II(-e)` [N m]: the largest component along `e` of `int_I p x dA -
-    /// int_II p x dA` that pads with the normal forces `n_i` and `n_ii` [N] can take.
+    /// int_II p x dA` that pads with the normal forces `n_i` and `n_ii` \[N\] can take.
     pub fn limit_moment(&self, e: DVec2, n_i: f64, n_ii: f64) -> f64 {
         n_i * support(&self.hull_i, e) + n_ii * support(&self.hull_ii, -e)
     }
@@ -109,7 +109,7 @@ impl TwistOut {
     }
 }
 
-/// `Delta_d = sqrt(d^2 + w^2) - d` [m]: how far the jaws must be forced open to twist the part out,
+/// `Delta_d = sqrt(d^2 + w^2) - d` \[m\]: how far the jaws must be forced open to twist the part out,
 /// for faces `d` apart and the least lever `w`. Zero for a lever that is not positive. For a grip
 /// from inside (`d` negative) it is how far the jaws must be pressed together.
 pub fn delta_d(d: f64, w: f64) -> f64 {
@@ -121,8 +121,8 @@ pub fn delta_d(d: f64, w: f64) -> f64 {
     }
 }
 
-/// `alpha = max(0, atan((w - 2 delta)/d) - atan mu_c)` [rad]: the tilt up to which closing jaws
-/// right the part. `delta`: uncertainty of the part's position along the pads [m]; `mu_c`: friction
+/// `alpha = max(0, atan((w - 2 delta)/d) - atan mu_c)` \[rad\]: the tilt up to which closing jaws
+/// right the part. `delta`: uncertainty of the part's position along the pads \[m\]; `mu_c`: friction
 /// of the pads while closing.
 pub fn alpha(d: f64, w: f64, delta: f64, mu_c: f64) -> f64 {
     ((w - 2.0 * delta).atan2(d) - mu_c.atan()).max(0.0)

@@ -9,7 +9,7 @@ use crate::geometry::polygon::{ring_area, ring_contains};
 use crate::model::{Frame, Polygon, Ring};
 
 /// Boundary of the region's triangles (`inside` says whether a triangle belongs to it) in the
-/// frame's `(x, y)`, points within `tolerance` [m] of the line between their neighbours left out.
+/// frame's `(x, y)`, points within `tolerance` \[m\] of the line between their neighbours left out.
 pub(super) fn polygons(
     mesh: &Mesh,
     twin: &[u32],

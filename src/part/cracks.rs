@@ -23,7 +23,7 @@ fn open_vertices(mesh: &Mesh, open: &[u32]) -> Vec<u32> {
     vertices
 }
 
-/// Joins vertices of open edges that lie within `tolerance` [m] of each other. Returns how many
+/// Joins vertices of open edges that lie within `tolerance` \[m\] of each other. Returns how many
 /// vertices went; triangles that lose their area by it go too.
 pub(super) fn join_vertices(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usize {
     let cell = |point: DVec3| (point / tolerance).floor().to_array().map(|x| x as i64);
@@ -56,7 +56,7 @@ pub(super) fn join_vertices(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> u
     joined.len()
 }
 
-/// Cuts open edges at the open vertices that lie on them within `tolerance` [m]. Returns how many
+/// Cuts open edges at the open vertices that lie on them within `tolerance` \[m\]. Returns how many
 /// edges were cut. A triangle with several such edges has one cut at a call.
 pub(super) fn split_edges(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usize {
     let spans: Vec<(DVec3, DVec3)> = edges
@@ -120,7 +120,7 @@ pub(super) fn split_edges(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usi
     count
 }
 
-/// Removes triangles narrower than `tolerance` [m] that have an open or tangled edge: needles laid
+/// Removes triangles narrower than `tolerance` \[m\] that have an open or tangled edge: needles laid
 /// along an edge. Returns how many went.
 pub(super) fn remove_needles(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usize {
     let mut tangled = std::collections::BTreeSet::new();

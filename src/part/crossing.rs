@@ -19,13 +19,13 @@ const LIMIT: usize = 300_000;
 pub(super) enum Crossing {
     /// No two shells cross.
     None,
-    /// This many pairs of shells cross; the place of one crossing [m].
+    /// This many pairs of shells cross; the place of one crossing \[m\].
     Found(usize, DVec3),
     /// Too many triangles to compare.
     Unchecked,
 }
 
-/// Looks for shells that cross by more than `tolerance` [m]. A shell that crosses itself is not
+/// Looks for shells that cross by more than `tolerance` \[m\]. A shell that crosses itself is not
 /// looked for.
 pub(super) fn crossing(
     mesh: &Mesh,

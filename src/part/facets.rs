@@ -21,7 +21,7 @@ const SMALL: f64 = 0.02;
 /// A neighbour under a small angle.
 struct Smooth {
     region: usize,
-    /// Length of the common boundary [m].
+    /// Length of the common boundary \[m\].
     shared: f64,
     /// Not 4 times smaller.
     comparable: bool,
@@ -29,7 +29,7 @@ struct Smooth {
 
 /// Boundaries between regions and what follows from them.
 pub(super) struct Facets {
-    /// Length of each region's boundary [m].
+    /// Length of each region's boundary \[m\].
     pub perimeter: Vec<f64>,
     /// Whether each region is a facet of a curved surface.
     pub is_facet: Vec<bool>,
@@ -113,7 +113,7 @@ impl Facets {
     }
 
     /// Whether flat faces have crumbled because the mesh is rougher than the growth allowed for:
-    /// next to them lie fragments that a distance `within` [m] would take in, and these stick out
+    /// next to them lie fragments that a distance `within` \[m\] would take in, and these stick out
     /// on both sides. The first strips of a finely tessellated fillet lie on one side, and so do
     /// not count.
     pub(super) fn are_rough(&self, part: &Repaired, regions: &Regions, within: f64) -> bool {

@@ -30,17 +30,17 @@ pub struct Health {
     pub embedded: usize,
     /// Edges left with a triangle on one side only.
     pub open_edges: usize,
-    /// Middle of the longest open edge [m].
+    /// Middle of the longest open edge \[m\].
     pub open_edge_at: Option<DVec3>,
     /// Edges that more than two triangles share.
     pub tangled_edges: usize,
-    /// Middle of the longest such edge [m].
+    /// Middle of the longest such edge \[m\].
     pub tangled_edge_at: Option<DVec3>,
     /// Edges at which no choice of windings agrees (a one-sided surface).
     pub one_sided_edges: usize,
     /// Pairs of shells that pass through each other: their common volume is counted twice.
     pub crossing_shells: usize,
-    /// Where two of them do [m].
+    /// Where two of them do \[m\].
     pub crossing_at: Option<DVec3>,
     /// The surface bounds material everywhere: no open edge, windings agree. Otherwise mass
     /// properties are estimates.

@@ -35,22 +35,22 @@ pub use health::Health;
 #[cfg(feature = "step")]
 pub use read::{StepProcess, serve_step};
 
-/// A triangle mesh [m], welded, outward-oriented.
+/// A triangle mesh \[m\], welded, outward-oriented.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
-    /// Vertex positions in the part frame [m].
+    /// Vertex positions in the part frame \[m\].
     pub vertices: Vec<DVec3>,
     /// Counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl Mesh {
-    /// The three corners of triangle `index` [m].
+    /// The three corners of triangle `index` \[m\].
     pub fn corners(&self, index: u32) -> [DVec3; 3] {
         self.triangles[index as usize].map(|vertex| self.vertices[vertex as usize])
     }
 
-    /// Smallest and largest corner of the bounding box [m]; zeros for an empty mesh.
+    /// Smallest and largest corner of the bounding box \[m\]; zeros for an empty mesh.
     pub fn bounding_box(&self) -> (DVec3, DVec3) {
         let Some(&first) = self.vertices.first() else { return (DVec3::ZERO, DVec3::ZERO) };
         self.vertices
@@ -64,9 +64,9 @@ impl Mesh {
 pub struct MassProperties {
     /// Volume [m^3].
     pub volume: f64,
-    /// Mass [kg].
+    /// Mass \[kg\].
     pub mass: f64,
-    /// Centre of mass in the part frame [m].
+    /// Centre of mass in the part frame \[m\].
     pub centre_of_mass: DVec3,
     /// Inertia about the centre of mass, part axes [kg m^2].
     pub inertia: DMat3,
@@ -80,15 +80,15 @@ pub struct PlanarFace {
     pub id: u32,
     /// Unit normal pointing out of the material, part frame.
     pub normal: DVec3,
-    /// `normal . x` for points of the face [m].
+    /// `normal . x` for points of the face \[m\].
     pub offset: f64,
     /// Area [m^2].
     pub area: f64,
-    /// Area centroid, part frame [m].
+    /// Area centroid, part frame \[m\].
     pub centroid: DVec3,
     /// Face frame: `z` is the normal, the origin is the centroid.
     pub part_from_face: Frame,
-    /// The face in its own `(x, y)` [m]: disjoint polygons, outer rings counter-clockwise seen from
+    /// The face in its own `(x, y)` \[m\]: disjoint polygons, outer rings counter-clockwise seen from
     /// outside.
     pub polygons: Vec<Polygon>,
     /// Indices of its triangles in the mesh.
@@ -117,7 +117,7 @@ pub struct FacePair {
     pub face_i: u32,
     /// [`PlanarFace::id`] of the face under pad II.
     pub face_ii: u32,
-    /// Distance of the planes [m].
+    /// Distance of the planes \[m\].
     pub width: f64,
     /// Area in which the faces' projections overlap [m^2].
     pub overlap_area: f64,
@@ -131,7 +131,7 @@ pub struct ReadOptions {
     /// Unit of the file's numbers. `None`: the file's own where it states one (3MF, glTF),
     /// otherwise millimetres.
     pub unit: Option<Unit>,
-    /// Most memory that reading may take [bytes]; a file that needs more is refused before it is
+    /// Most memory that reading may take \[bytes\]; a file that needs more is refused before it is
     /// taken. `None`: [`crate::memory::default_limit`].
     pub max_memory: Option<u64>,
     /// Whether a glTF file may name buffers outside of its own folder.
@@ -145,7 +145,7 @@ pub struct Part {
     pub name: String,
     /// The file it was read from (empty for a part made in memory).
     pub file: PathBuf,
-    /// Unit of the file's numbers [m].
+    /// Unit of the file's numbers \[m\].
     pub unit_m: f64,
     /// The surface: welded, repaired, outward-oriented.
     pub mesh: Mesh,
@@ -157,7 +157,7 @@ pub struct Part {
     unit_mass: MassProperties,
 }
 
-/// Smallest extent of a part [m]: below it products of lengths leave the range of numbers.
+/// Smallest extent of a part \[m\]: below it products of lengths leave the range of numbers.
 const SMALLEST_EXTENT: f64 = 1e-9;
 
 /// Refuses sizes with which nothing can be computed.
@@ -206,7 +206,7 @@ impl Part {
         Ok(part)
     }
 
-    /// A part from triangles in memory [m]; the same repairs as for a file.
+    /// A part from triangles in memory \[m\]; the same repairs as for a file.
     ///
     /// # Errors
     /// When a coordinate is not finite, an index points nowhere, or no triangle with an area is
@@ -266,7 +266,7 @@ impl Part {
     }
 
     /// All reachable antiparallel face pairs that the jaws can close on, with widths in
-    /// `min_width..=max_width` [m], by falling overlap area. `face_i < face_ii`.
+    /// `min_width..=max_width` \[m\], by falling overlap area. `face_i < face_ii`.
     pub fn pairs(&self, min_width: f64, max_width: f64) -> Vec<FacePair> {
         pairs::pairs(
             &self.faces,

@@ -23,7 +23,7 @@ const BEND: f64 = 2.0 * std::f64::consts::PI / 180.0;
 pub(super) struct Noise {
     /// Share of the surface that lies in broken planes.
     pub share: f64,
-    /// Root mean square distance of the surface's corners from those planes [m], the median over
+    /// Root mean square distance of the surface's corners from those planes \[m\], the median over
     /// the area.
     pub distance: f64,
 }

@@ -27,7 +27,7 @@ pub(super) struct Shell {
     pub role: Role,
     /// Volume integrals about the apex given to [`orient`].
     pub integrals: Integrals,
-    /// Bounding box [m].
+    /// Bounding box \[m\].
     pub low: DVec3,
     pub high: DVec3,
 }

@@ -19,9 +19,9 @@ const ANGLE: f64 = 0.2 * std::f64::consts::PI / 180.0;
 /// How exactly a triangle must lie in a region's plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Flatness {
-    /// Distance of a corner from the plane [m].
+    /// Distance of a corner from the plane \[m\].
     pub distance: f64,
-    /// Uncertainty of a corner [m]; it widens the angle allowed to narrow triangles.
+    /// Uncertainty of a corner \[m\]; it widens the angle allowed to narrow triangles.
     pub uncertainty: f64,
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Flatness {
 pub(super) struct Plane {
     pub normal: DVec3,
     pub offset: f64,
-    /// How far the normal may be tilted by the uncertainty of the corners it was made of [rad].
+    /// How far the normal may be tilted by the uncertainty of the corners it was made of \[rad\].
     tilt: f64,
 }
 

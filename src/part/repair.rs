@@ -28,9 +28,9 @@ pub(super) struct Repaired {
     pub edges: Edges,
     pub shell_of: Vec<u32>,
     pub shells: Vec<Shell>,
-    /// Diagonal of the bounding box [m].
+    /// Diagonal of the bounding box \[m\].
     pub diagonal: f64,
-    /// Rounding of the coordinates to 32-bit floats [m].
+    /// Rounding of the coordinates to 32-bit floats \[m\].
     pub noise: f64,
     apex: DVec3,
 }

@@ -4,10 +4,10 @@ use glam::DVec3;
 
 use crate::units::Unit;
 
-/// Largest extents [m] between which a part is taken for what a two-finger gripper might handle.
+/// Largest extents \[m\] between which a part is taken for what a two-finger gripper might handle.
 const PLAUSIBLE: (f64, f64) = (1e-3, 5.0);
 
-/// A warning when the largest of `extents` [m], read in `unit`, is implausible, with the unit that
+/// A warning when the largest of `extents` \[m\], read in `unit`, is implausible, with the unit that
 /// would fit.
 pub(super) fn implausible_size(extents: DVec3, unit: Unit, stated: bool) -> Option<String> {
     let largest = extents.max_element();

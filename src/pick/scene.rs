@@ -20,15 +20,15 @@ pub struct Scene {
     pub obstacles: Vec<Obstacle>,
     /// How far the jaws open for the approach.
     pub opening: Opening,
-    /// Length of the straight approach [m].
+    /// Length of the straight approach \[m\].
     pub approach: f64,
     /// The way back with closed jaws.
     pub retreat: Retreat,
-    /// Unit axis and half angle [rad] that the approach must keep to.
+    /// Unit axis and half angle \[rad\] that the approach must keep to.
     pub cone: Option<(DVec3, f64)>,
     /// How far the robot reaches.
     pub reach: Option<Reach>,
-    /// Distance kept from obstacles [m].
+    /// Distance kept from obstacles \[m\].
     pub clearance: f64,
 }
 
@@ -46,7 +46,7 @@ pub struct Obstacle {
 /// Shapes of obstacles.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Solid {
-    /// A surface of triangles [m].
+    /// A surface of triangles \[m\].
     Mesh {
         /// The surface.
         mesh: Mesh,
@@ -55,7 +55,7 @@ pub enum Solid {
     },
     /// A box about the origin.
     Box {
-        /// Half sizes [m].
+        /// Half sizes \[m\].
         half: DVec3,
     },
     /// Everything below the plane `z = 0` of its own frame.
@@ -69,27 +69,27 @@ pub enum Opening {
     Planned,
     /// As far as the stroke allows.
     Full,
-    /// Each jaw this far from contact [m].
+    /// Each jaw this far from contact \[m\].
     Jaw(f64),
 }
 
 /// The way back.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Retreat {
-    /// Against the approach, this far [m].
+    /// Against the approach, this far \[m\].
     Back(f64),
-    /// Along this way in the world [m].
+    /// Along this way in the world \[m\].
     Along(DVec3),
 }
 
 /// Distances from the robot's base at which the flange may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reach {
-    /// Position of the base [m].
+    /// Position of the base \[m\].
     pub base: DVec3,
-    /// Smallest distance [m].
+    /// Smallest distance \[m\].
     pub least: f64,
-    /// Largest distance [m].
+    /// Largest distance \[m\].
     pub most: f64,
 }
 

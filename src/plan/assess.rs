@@ -18,11 +18,11 @@ use crate::results::{LoadCase, LoadScore, RankedGrip};
 /// What decides the answer, beside part, gripper and loads.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Gripping force [N].
+    /// Gripping force \[N\].
     pub force: f64,
     /// Weights of the score.
     pub weights: Weights,
-    /// Position uncertainty of the part along the pads while closing [m], for alpha.
+    /// Position uncertainty of the part along the pads while closing \[m\], for alpha.
     pub delta: f64,
     /// Pad friction while closing, for alpha.
     pub mu_c: f64,
@@ -55,7 +55,7 @@ impl Settings {
     }
 }
 
-/// The gripping force [N]: the one asked for, or the gripper's largest.
+/// The gripping force \[N\]: the one asked for, or the gripper's largest.
 fn force(request: &Request, gripper: &Gripper) -> Result<f64> {
     let [least, most] = gripper.force;
     let Some(force) = request.force.map(|force| force.0) else { return Ok(most) };
@@ -175,7 +175,7 @@ impl Assessor<'_> {
         }
     }
 
-    /// Alpha [rad] and the least lever [m].
+    /// Alpha \[rad\] and the least lever \[m\].
     ///
     /// The width counts for grips from inside too: jaws that push outwards right a part up to `asin
     /// w/d`, which is more than `atan w/d`.

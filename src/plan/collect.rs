@@ -71,7 +71,7 @@ impl Collector {
         self.ranked
     }
 
-    /// The final order with counts; `size` is the diagonal of the part's bounding box [m].
+    /// The final order with counts; `size` is the diagonal of the part's bounding box \[m\].
     pub fn finish(self, centre_of_mass: DVec3, size: f64, options: &rank::Options) -> Ranking {
         let mut ranking = rank::rank(self.kept, centre_of_mass, size, options);
         for (reason, count) in self.rejections {

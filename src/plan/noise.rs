@@ -17,9 +17,9 @@ use crate::results::{PoseNoise, RankedGrip};
 /// How far the pose may be off.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
-    /// Largest shift along each of the pad plane's axes, either way [m].
+    /// Largest shift along each of the pad plane's axes, either way \[m\].
     pub shift: f64,
-    /// Largest turn about the closing axis, either way [rad].
+    /// Largest turn about the closing axis, either way \[rad\].
     pub turn: f64,
     /// Displaced poses per grip, at least one.
     pub samples: u32,

@@ -12,9 +12,9 @@ use crate::model::{Frame, Grip};
 /// By how much a grip stands off its pose.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Displacement {
-    /// Shift of the grip origin along its `x1` and `x2` [m].
+    /// Shift of the grip origin along its `x1` and `x2` \[m\].
     pub shift: DVec2,
-    /// Turn about its closing axis [rad].
+    /// Turn about its closing axis \[rad\].
     pub turn: f64,
 }
 

@@ -14,7 +14,7 @@ use crate::model::Frame;
 pub(super) struct Border {
     /// Unit vector in the site's `(x, y)`.
     pub(super) normal: DVec2,
-    /// [m].
+    /// \[m\].
     pub(super) offset: f64,
 }
 
@@ -50,7 +50,7 @@ impl Environment {
         self.cone.is_none_or(|cone| cone.axis.angle_between(approach) <= cone.half_angle + 1e-9)
     }
 
-    /// Smallest angle between the cone's axis and the approaches of all sites [rad].
+    /// Smallest angle between the cone's axis and the approaches of all sites \[rad\].
     pub(super) fn nearest_approach(&self, sites: &[Site]) -> Option<f64> {
         let cone = self.cone?;
         let approaches = sites.iter().flat_map(|site| {

@@ -24,19 +24,19 @@ pub struct SiteInfo {
     pub faces_i: Vec<u32>,
     /// Gripped faces on side II.
     pub faces_ii: Vec<u32>,
-    /// Distance of the planes [m].
+    /// Distance of the planes \[m\].
     pub width: f64,
     /// Gripped from outside or from inside.
     pub kind: PairKind,
-    /// How deep finger bodies may lie in the gripped planes without counting as interference [m]:
+    /// How deep finger bodies may lie in the gripped planes without counting as interference \[m\]:
     /// what the planes' tilt and roughness take, which the pads take up.
     pub touch: f64,
     /// Site frame in the part frame: `z` is the closing axis, positions lie in `(x, y)`, angles
     /// count from `x`.
     pub part_from_site: Frame,
-    /// Grip origins tried at every angle, in the site's `(x, y)` [m].
+    /// Grip origins tried at every angle, in the site's `(x, y)` \[m\].
     pub positions: Vec<DVec2>,
-    /// Approach angles [rad].
+    /// Approach angles \[rad\].
     pub angles: Vec<f64>,
     /// Grip origins tried at one angle only: pads flush with an edge, just clear of the ground, ...
     pub special: Vec<Vec<DVec2>>,
@@ -62,7 +62,7 @@ pub struct Explanation {
     pub site: usize,
     /// Grip frame in the part frame.
     pub part_from_grip: Frame,
-    /// Distance of the faces [m].
+    /// Distance of the faces \[m\].
     pub width: f64,
     /// Contact areas in the grip frame.
     pub contact: Contact,
@@ -70,7 +70,7 @@ pub struct Explanation {
     pub checks: Vec<Check>,
     /// The reason that counts: that of the first failed test.
     pub rejection: Option<Rejection>,
-    /// Where a body meets the part, part frame [m].
+    /// Where a body meets the part, part frame \[m\].
     pub place: Option<DVec3>,
 }
 
@@ -151,7 +151,7 @@ impl Proposer<'_> {
         Ok((index, site_from_grip))
     }
 
-    /// Explains the pose at `position` [m] of a site's plane, approaching at `angle` [rad].
+    /// Explains the pose at `position` \[m\] of a site's plane, approaching at `angle` \[rad\].
     ///
     /// # Errors
     /// When there is no such site or the numbers are not finite.

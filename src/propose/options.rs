@@ -13,9 +13,9 @@ pub use crate::request::{Cone, Ground};
 /// What to propose.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ProposeOptions {
-    /// Step of the position grid [m]; `None`: a fifth of the pad's shorter side.
+    /// Step of the position grid \[m\]; `None`: a fifth of the pad's shorter side.
     pub spacing: Option<f64>,
-    /// Step of the approach angle [rad].
+    /// Step of the approach angle \[rad\].
     pub angle_step: f64,
     /// Approach along and across the edges of the gripped faces as well.
     pub edge_angles: bool,
@@ -25,18 +25,18 @@ pub struct ProposeOptions {
     pub min_contact: f64,
     /// Smallest contact area on either face, as a share of the pad's area.
     pub min_pad_share: f64,
-    /// Largest distance of the grip origin from the centre of mass [m].
+    /// Largest distance of the grip origin from the centre of mass \[m\].
     pub max_offset: Option<f64>,
     /// Only approaches within a cone.
     pub approach_cone: Option<Cone>,
-    /// Boxes in the part frame that the gripper must not enter: smallest and largest corner [m].
+    /// Boxes in the part frame that the gripper must not enter: smallest and largest corner \[m\].
     pub keep_out: Vec<[DVec3; 2]>,
     /// The gripper must stay above this plane.
     pub ground: Option<Ground>,
     /// Only these planar faces may be touched, and those of `faces_in`.
     pub faces: Option<Vec<u32>>,
     /// Only planar faces that lie wholly in one of these boxes may be touched (part frame, smallest
-    /// and largest corner [m]), and those of `faces`; no box: no such limit.
+    /// and largest corner \[m\]), and those of `faces`; no box: no such limit.
     pub faces_in: Vec<[DVec3; 2]>,
     /// Propose grips that close on faces from outside.
     pub outside: bool,
@@ -45,14 +45,14 @@ pub struct ProposeOptions {
     /// List the same pose with exchanged jaws as a grip of its own, marked with what it is a flip
     /// of.
     pub flips: bool,
-    /// Way by which each jaw is opened for the approach beyond contact [m]; less where the stroke
+    /// Way by which each jaw is opened for the approach beyond contact \[m\]; less where the stroke
     /// ends.
     pub opening: f64,
-    /// Way by which each jaw must at least be openable beyond contact [m].
+    /// Way by which each jaw must at least be openable beyond contact \[m\].
     pub min_opening: f64,
-    /// Distance kept between gripper and part, but for the pads [m].
+    /// Distance kept between gripper and part, but for the pads \[m\].
     pub clearance: f64,
-    /// Length of the straight approach that must be clear of ground and keep-out boxes [m]; of the
+    /// Length of the straight approach that must be clear of ground and keep-out boxes \[m\]; of the
     /// part it must be clear all the way.
     pub approach: f64,
     /// Candidates per chunk, about.
@@ -96,7 +96,7 @@ impl From<&Candidates> for ProposeOptions {
 }
 
 impl ProposeOptions {
-    /// Step of the position grid [m].
+    /// Step of the position grid \[m\].
     pub fn spacing(&self, gripper: &Gripper) -> f64 {
         self.spacing.unwrap_or_else(|| Bounds2::of(&gripper.pad).size().min_element() / 5.0)
     }

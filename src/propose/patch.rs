@@ -117,7 +117,7 @@ impl Grid {
 }
 
 impl PatchIndex {
-    /// Indexes normalised `polygons` for queries within `region`, with cells of about `cell` [m].
+    /// Indexes normalised `polygons` for queries within `region`, with cells of about `cell` \[m\].
     pub(super) fn new(polygons: Patch, region: Bounds2, cell: f64) -> Self {
         let (mut start, mut next) = (Vec::new(), Vec::new());
         for ring in polygons.iter().flat_map(rings) {

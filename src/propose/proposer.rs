@@ -30,9 +30,9 @@ const ITEM: usize = 2048;
 /// finely tessellated outlines, chunks have fewer candidates.
 const MOST_CORNERS: usize = 4_000_000;
 
-/// Rounding of a width against the stroke [m].
+/// Rounding of a width against the stroke \[m\].
 const STROKE: f64 = 1e-9;
-/// Widths of face pairs outside the stroke that are told apart [m], and how many are kept.
+/// Widths of face pairs outside the stroke that are told apart \[m\], and how many are kept.
 const SAME_WIDTH: f64 = 1e-5;
 const MOST_WIDTHS: usize = 5;
 
@@ -47,11 +47,11 @@ pub struct Tally {
     pub grips: u64,
     /// Rejections by [`Rejection::name`].
     pub rejections: BTreeMap<String, u64>,
-    /// Widths of the face pairs outside the stroke, the nearest to it first, at most five [m].
+    /// Widths of the face pairs outside the stroke, the nearest to it first, at most five \[m\].
     #[serde(default)]
     pub widths_outside: Vec<f64>,
     /// With an approach cone: smallest angle between its axis and an approach among all candidates
-    /// [rad].
+    /// \[rad\].
     #[serde(default)]
     pub nearest_approach: Option<f64>,
 }

@@ -24,7 +24,7 @@ use crate::gripper::{Gripper, Jaws};
 use crate::model::{Frame, Patch, Polygon};
 use crate::part::{FacePair, PairKind, Part, PlanarFace};
 
-/// Planes whose directions differ by less count as one direction, which saves a tree [rad]: 0.1 um
+/// Planes whose directions differ by less count as one direction, which saves a tree \[rad\]: 0.1 um
 /// on 100 mm.
 const SAME_DIRECTION: f64 = 1e-6;
 /// Faces within this distance of one plane, as a share of the part's diagonal, lie in one plane:
@@ -50,31 +50,31 @@ pub(super) struct Site {
     /// Site frame in the part frame: `z` the closing axis (outward normal of face I), the origin
     /// midway between the planes.
     pub(super) part_from_site: Frame,
-    /// Distance of the planes [m].
+    /// Distance of the planes \[m\].
     pub(super) width: f64,
     /// Index into the list of directions.
     pub(super) direction: usize,
     /// Origin in the axes of the direction.
     pub(super) origin: DVec3,
-    /// Angle of the site's `x` in the axes of the direction [rad].
+    /// Angle of the site's `x` in the axes of the direction \[rad\].
     pub(super) turn: f64,
     /// Gripped faces on side I and II.
     pub(super) faces: [Vec<u32>; 2],
-    /// How far the faces rise above the pads' planes [m]: their tilt and roughness.
+    /// How far the faces rise above the pads' planes \[m\]: their tilt and roughness.
     pub(super) rise: f64,
-    /// Roughness of a plane [m].
+    /// Roughness of a plane \[m\].
     pub(super) flush: f64,
     /// Area in which the two planes' faces overlap [m^2].
     pub(super) overlap: f64,
     /// Faces that pads may touch: the gripped ones and others in the same planes.
     pub(super) touched: [Vec<u32>; 2],
-    /// Size of the overlap along the site's `x` and `y` [m].
+    /// Size of the overlap along the site's `x` and `y` \[m\].
     pub(super) extent: DVec2,
-    /// Grip origins tried at every angle, in the site's `(x, y)` [m]: the grid and some points.
+    /// Grip origins tried at every angle, in the site's `(x, y)` \[m\]: the grid and some points.
     pub(super) positions: Vec<DVec2>,
     /// Grip origins tried at one angle besides: see [`special`].
     pub(super) special: Vec<Vec<DVec2>>,
-    /// Approach angles from the site's `x` [rad].
+    /// Approach angles from the site's `x` \[rad\].
     pub(super) angles: Vec<f64>,
     /// Bounds of all positions.
     pub(super) bounds: Bounds2,
@@ -177,9 +177,9 @@ struct Finder<'a> {
     gripper: &'a Gripper,
     options: &'a ProposeOptions,
     environment: &'a Environment,
-    /// Diagonal of the part's bounding box [m].
+    /// Diagonal of the part's bounding box \[m\].
     size: f64,
-    /// Of the part [m].
+    /// Of the part \[m\].
     centre_of_mass: DVec3,
     planes: &'a Planes,
     chosen: Option<&'a [bool]>,

@@ -16,7 +16,7 @@ const MARGIN: f64 = 56.0;
 /// Friction arrows along the longer side.
 const ARROWS: usize = 9;
 
-/// Mapping from the pad plane [m] to a panel [px].
+/// Mapping from the pad plane \[m\] to a panel [px].
 struct View {
     low: DVec2,
     scale: f64,

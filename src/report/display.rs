@@ -24,9 +24,9 @@ const DEVIATION_SAMPLES: usize = 20_000;
 /// A surface ready for the graphics processor. Position = `origin + scale * value / 65535`.
 #[derive(Debug, Default)]
 pub(super) struct Display {
-    /// Smallest corner [m].
+    /// Smallest corner \[m\].
     pub(super) origin: DVec3,
-    /// Length of the 65,535 steps [m]; the same along each axis.
+    /// Length of the 65,535 steps \[m\]; the same along each axis.
     pub(super) scale: f64,
     /// Three steps per vertex.
     pub(super) positions: Vec<u16>,
@@ -39,7 +39,7 @@ pub(super) struct Display {
     /// Triangles of the part.
     pub(super) original: usize,
     /// Largest distance of a vertex left out from the surface shown, over up to
-    /// [`DEVIATION_SAMPLES`] of them [m].
+    /// [`DEVIATION_SAMPLES`] of them \[m\].
     pub(super) deviation: f64,
 }
 

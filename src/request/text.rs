@@ -14,7 +14,7 @@ use crate::units::{Angle, Length, direction, direction_text};
 pub struct Cone {
     /// Axis in the part frame; any length.
     pub axis: DVec3,
-    /// Half the opening angle [rad].
+    /// Half the opening angle \[rad\].
     pub half_angle: f64,
 }
 
@@ -23,16 +23,16 @@ pub struct Cone {
 pub struct Ground {
     /// Points up; any length.
     pub normal: DVec3,
-    /// Height of the ground along the unit normal [m].
+    /// Height of the ground along the unit normal \[m\].
     pub offset: f64,
 }
 
 /// A box along the axes of the part frame; `0mm,0mm,0mm:10mm,20mm,5mm` as a text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Region {
-    /// Smallest coordinates [m].
+    /// Smallest coordinates \[m\].
     pub low: DVec3,
-    /// Largest coordinates [m].
+    /// Largest coordinates \[m\].
     pub high: DVec3,
 }
 
@@ -57,7 +57,7 @@ pub struct EarlierWeights {
     /// Of the tolerance to misalignment while closing, `alpha` [m per radian makes the sum a pure
     /// number].
     pub k3: f64,
-    /// Keeps the function finite at the centre of mass [m].
+    /// Keeps the function finite at the centre of mass \[m\].
     pub epsilon: f64,
 }
 

@@ -51,7 +51,7 @@ const LOADS: [usize; 4] = [80, 500, 5_000, 50_000];
 /// Most loads of one batch: what its wrenches and answers take stays below half a gigabyte.
 const MOST_LOADS: usize = 1 << 21;
 
-/// What one run of a batch took on the adapter, step by step [s]. The device works while the
+/// What one run of a batch took on the adapter, step by step \[s\]. The device works while the
 /// processor does, so that the sum is more than the whole.
 #[derive(Debug, Clone, Default, Serialize)]
 struct Steps {

@@ -306,7 +306,7 @@ fn compared(out: &mut impl Write, set: &GripSet, comparison: &Comparison) -> std
     Ok(())
 }
 
-/// How far the slip centre lies from where the earlier method puts it [m]; infinite for a
+/// How far the slip centre lies from where the earlier method puts it \[m\]; infinite for a
 /// translation.
 fn moved(grip: &RankedGrip) -> Option<f64> {
     let [x, y] = grip.earlier.as_ref()?.slip_centre;
@@ -325,7 +325,7 @@ fn rank(grip: &RankedGrip) -> String {
     }
 }
 
-/// A slip centre farther off than this [m] is no different from a translation to anybody who reads
+/// A slip centre farther off than this \[m\] is no different from a translation to anybody who reads
 /// a table.
 const SLIDES: f64 = 1e3;
 

@@ -25,15 +25,15 @@ pub struct AdapterSummary {
     pub driver: String,
     /// Whether `--backend auto` may take it.
     pub counts_as_gpu: bool,
-    /// Largest buffer a kernel can bind [bytes].
+    /// Largest buffer a kernel can bind \[bytes\].
     pub max_binding: u64,
-    /// Largest buffer [bytes].
+    /// Largest buffer \[bytes\].
     pub max_buffer: u64,
     /// Workgroups per dimension of a dispatch.
     pub max_workgroups: u32,
     /// Invocations of a workgroup.
     pub max_invocations: u32,
-    /// Memory of a workgroup [bytes].
+    /// Memory of a workgroup \[bytes\].
     pub workgroup_memory: u32,
     /// Storage buffers that a kernel can bind.
     pub max_storage_buffers: u32,
@@ -45,7 +45,7 @@ pub struct AdapterSummary {
     pub timestamps: bool,
     /// Whether it tells the time of copies too.
     pub timestamps_of_copies: bool,
-    /// Length of a timestamp's tick [ns]; `None` without timestamps, or where the device did not
+    /// Length of a timestamp's tick \[ns\]; `None` without timestamps, or where the device did not
     /// open.
     pub timestamp_period: Option<f32>,
 }

@@ -14,7 +14,7 @@ pub(super) const SEARCH: u32 = 3;
 pub(super) const READBACK: u32 = 5;
 pub(super) const QUERIES: u32 = 6;
 
-/// From when to when [s], counted from the start of the clock.
+/// From when to when \[s\], counted from the start of the clock.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
 pub struct Span {
     /// Beginning.
@@ -24,12 +24,12 @@ pub struct Span {
 }
 
 impl Span {
-    /// Its length [s].
+    /// Its length \[s\].
     pub fn seconds(self) -> f64 {
         self.to - self.from
     }
 
-    /// Time [s] that it has in common with another.
+    /// Time \[s\] that it has in common with another.
     pub fn common(self, other: Self) -> f64 {
         (self.to.min(other.to) - self.from.max(other.from)).max(0.0)
     }

@@ -111,7 +111,7 @@ struct Ticket {
 }
 
 impl Gpu {
-    /// Opens the adapter `asked` for (index or part of its name; see [`adapter::choose`]) and
+    /// Opens the adapter `asked` for (index or part of its name) and
     /// compiles the kernels. `strict`: a lost device is an error, otherwise its chunk is computed
     /// on the processor.
     ///

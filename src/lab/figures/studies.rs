@@ -12,9 +12,9 @@ use crate::mechanics::twist_out::TwistOut;
 use crate::mechanics::{self, Options, Pads};
 use crate::model::{Contact, Patch, Score, Status, Wrench};
 
-/// Side of the square that all contact shapes are inscribed in [m].
+/// Side of the square that all contact shapes are inscribed in \[m\].
 pub const SIDE: f64 = 0.02;
-/// Gripping force [N].
+/// Gripping force \[N\].
 pub const FORCE: f64 = 50.0;
 
 fn solve(contact: &Contact, distance: f64, force: [f64; 3], moment: [f64; 3]) -> Result<Score> {
@@ -72,7 +72,7 @@ pub fn figure_5() -> Result<Vec<ShapeRow>> {
 /// A horizontal bar gripped at a distance from its centre of mass (figure 6).
 #[derive(Debug, Clone, PartialEq)]
 pub struct BarRow {
-    /// Distance of the grip from the centre of mass [m].
+    /// Distance of the grip from the centre of mass \[m\].
     pub distance: f64,
     /// `mu_s` with the true slip centre.
     pub new: f64,
@@ -80,7 +80,7 @@ pub struct BarRow {
     pub old: f64,
 }
 
-/// Mass of the bar of figure 6 [kg].
+/// Mass of the bar of figure 6 \[kg\].
 pub const BAR_MASS: f64 = 0.5;
 /// Round value of gravity for figure 6 [m/s^2].
 const GRAVITY: f64 = 9.81;
@@ -110,7 +110,7 @@ pub fn figure_6() -> Result<Vec<BarRow>> {
 pub struct LineRow {
     /// Moment about the closing axis [N m].
     pub moment: f64,
-    /// Angle of face I's zero-pressure line from the axis of the out-of-plane moment [rad].
+    /// Angle of face I's zero-pressure line from the axis of the out-of-plane moment \[rad\].
     pub angle: f64,
     /// Pressure coefficients of face I, `p = a0 + a1 x1 + a2 x2` [Pa, Pa/m].
     pub pressure: [f64; 3],
@@ -180,7 +180,7 @@ pub struct DistanceSweep {
     pub residual: f64,
 }
 
-/// Loads in the pad plane of the sweeps: name, `F1`, `F2` [N], `M3` [N m].
+/// Loads in the pad plane of the sweeps: name, `F1`, `F2` \[N\], `M3` [N m].
 const IN_PLANE: [(&str, [f64; 3]); 6] = [
     ("M3", [0.0, 0.0, 0.1]),
     ("F1", [10.0, 0.0, 0.0]),
@@ -250,7 +250,7 @@ fn trend(points: &[[f64; 3]]) -> Trend {
 pub struct SeparationSweep {
     /// Contact shape.
     pub shape: &'static str,
-    /// Direction in the pad plane in which the pressure resultants are displaced [rad].
+    /// Direction in the pad plane in which the pressure resultants are displaced \[rad\].
     pub direction: f64,
     /// Moment over the one that twists the part out, share of the smaller contact, rounds of the
     /// paper's iteration.

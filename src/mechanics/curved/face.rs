@@ -20,11 +20,11 @@ pub(super) struct Face {
 #[derive(Debug, Clone)]
 pub(super) struct Pressed<'a> {
     pub(super) face: &'a Face,
-    /// Compression at the origin of the pad plane [m].
+    /// Compression at the origin of the pad plane \[m\].
     pub(super) delta: f64,
     /// The pressed part of each piece.
     pub(super) regions: Vec<Region>,
-    /// Normal force [N].
+    /// Normal force \[N\].
     pub(super) load: f64,
     /// Pressed area [m^2].
     pub(super) area: f64,
@@ -194,12 +194,12 @@ impl Pressed<'_> {
         slopes
     }
 
-    /// Greatest compression [m].
+    /// Greatest compression \[m\].
     pub(super) fn compression(&self) -> f64 {
         self.regions.iter().map(Region::greatest).fold(0.0, f64::max)
     }
 
-    /// Greatest pressure [Pa].
+    /// Greatest pressure \[Pa\].
     pub(super) fn greatest(&self) -> f64 {
         self.face.stiffness * self.compression()
     }

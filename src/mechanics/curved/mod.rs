@@ -28,19 +28,19 @@ use space::{Kind, Rotation};
 /// What one face carries at the limit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct FaceAnswer {
-    /// Normal force [N].
+    /// Normal force \[N\].
     pub load: f64,
-    /// Compression of the layer at the origin of the pad plane [m].
+    /// Compression of the layer at the origin of the pad plane \[m\].
     pub delta: f64,
     /// Pressed area [m^2].
     pub area: f64,
-    /// Mean pressure [Pa].
+    /// Mean pressure \[Pa\].
     pub mean_pressure: f64,
-    /// Greatest pressure [Pa].
+    /// Greatest pressure \[Pa\].
     pub greatest_pressure: f64,
-    /// Smallest box around what is pressed: its lower and upper corner in `(x1, x2)` [m].
+    /// Smallest box around what is pressed: its lower and upper corner in `(x1, x2)` \[m\].
     pub extent: [[f64; 2]; 2],
-    /// What the face carries by friction: force along `x1`, `x2` [N] and moment about `x3` [N m].
+    /// What the face carries by friction: force along `x1`, `x2` \[N\] and moment about `x3` [N m].
     pub share: [f64; 3],
 }
 
@@ -67,13 +67,13 @@ pub enum Note {
     },
     /// A pad ends within the contact of a part that can spin, and pushes it off sideways.
     OverEdge {
-        /// Force on the body across the axis [N].
+        /// Force on the body across the axis \[N\].
         force: f64,
     },
     /// The part turns by this angle before it stops, more than the layers give: the rotation is
     /// counted as free.
     SettlesBy {
-        /// Angle [rad].
+        /// Angle \[rad\].
         angle: f64,
     },
     /// The faces are of facets that could be meant to be round: they are taken as round.
@@ -84,15 +84,15 @@ pub enum Note {
     /// The part tilts by this angle and slips by half the distance times it before the limit is
     /// there: friction may hold a little below the limit.
     TiltsFirst {
-        /// Angle [rad].
+        /// Angle \[rad\].
         angle: f64,
-        /// Slip [m].
+        /// Slip \[m\].
         slip: f64,
     },
     /// Planes that tilt under their load push along the pads, which the theory leaves out as the
     /// paper does; with a plane opposite a round face it does not cancel.
     TiltPushes {
-        /// Force on the body along `x1`, `x2` [N].
+        /// Force on the body along `x1`, `x2` \[N\].
         force: [f64; 2],
         /// `mu_s` with it, for the same pressure.
         mu_s: f64,
@@ -129,7 +129,7 @@ pub struct Answer {
     /// Incipient motion `(u1, u2, omega3, omega1, omega2)` of the point midway between the faces,
     /// the largest part 1 in m/s and rad/s.
     pub motion: Option<[f64; 5]>,
-    /// Tilt of the body `(a1, a2)` [rad]: compression is `delta - h + a . x` on face I and `delta -
+    /// Tilt of the body `(a1, a2)` \[rad\]: compression is `delta - h + a . x` on face I and `delta -
     /// h - a . x` on face II.
     pub tilt: Option<[f64; 2]>,
     /// Both faces.
@@ -139,7 +139,7 @@ pub struct Answer {
 }
 
 /// Smallest friction coefficient that holds `wrench` (about the grip origin) in a grip on these
-/// surfaces, squeezed with `force` [N]. `distance` [m] is the height of face I's pad plane over
+/// surfaces, squeezed with `force` \[N\]. `distance` \[m\] is the height of face I's pad plane over
 /// that of face II, negative for a grip from inside.
 ///
 /// # Errors

@@ -193,10 +193,10 @@ struct Source<'a> {
     options: &'a ReadOptions,
 }
 
-/// Memory that a triangle takes until the part is made [bytes]: 140 measured at the peak with a
+/// Memory that a triangle takes until the part is made \[bytes\]: 140 measured at the peak with a
 /// million of them, and a margin.
 const TRIANGLE_BYTES: u64 = 256;
-/// Longest line of a text format [bytes].
+/// Longest line of a text format \[bytes\].
 const LONGEST_LINE: u64 = 1 << 24;
 
 impl Source<'_> {

@@ -18,7 +18,7 @@ use crate::units::Unit;
 const DEFLECTION_SHARE: f64 = 1e-4;
 /// ... at most this [mm]. Planar faces are exact but for their curved edges.
 const DEFLECTION_MOST: f64 = 0.05;
-/// Largest angle between neighbouring triangles of a curved surface [rad].
+/// Largest angle between neighbouring triangles of a curved surface \[rad\].
 const DEFLECTION_ANGLE: f64 = 0.2;
 
 const REMEDY: &str = "export the part again as STEP AP203, AP214 or AP242, or as a mesh";
@@ -31,9 +31,9 @@ static PROCESS: OnceLock<StepProcess> = OnceLock::new();
 pub struct StepProcess {
     /// Executable that ends in a call of [`serve_step`].
     pub program: PathBuf,
-    /// Its arguments; the limits of memory [bytes] and of processor time [s] follow them.
+    /// Its arguments; the limits of memory \[bytes\] and of processor time \[s\] follow them.
     pub arguments: Vec<String>,
-    /// Most processor time for one file [s].
+    /// Most processor time for one file \[s\].
     pub seconds: u64,
 }
 
@@ -46,7 +46,7 @@ impl StepProcess {
 }
 
 /// The other side of a [`StepProcess`]: the bytes of a STEP file on `input`, its triangles on
-/// `output`, within these limits of memory [bytes] and processor time [s].
+/// `output`, within these limits of memory \[bytes\] and processor time \[s\].
 ///
 /// # Errors
 /// When a limit cannot be set or a stream fails. A file that cannot be read is an answer, not an

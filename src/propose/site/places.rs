@@ -11,7 +11,7 @@ use crate::model::Polygon;
 /// Corners of the overlap that turn by less are points of a tessellated curve, not places of their
 /// own.
 const CORNER: f64 = 20.0 * std::f64::consts::PI / 180.0;
-/// Corners that turn by less are points of one line [rad].
+/// Corners that turn by less are points of one line \[rad\].
 const COLLINEAR: f64 = 1e-3;
 /// Chords of a tessellated curve turn by less than this: twelve make a circle.
 const CHORD: f64 = 31.0 * std::f64::consts::PI / 180.0;
@@ -61,9 +61,9 @@ fn edge_directions(edges: impl Iterator<Item = DVec2>) -> Vec<(f64, f64)> {
 pub(super) struct Edge {
     /// Unit outward normal.
     pub(super) normal: DVec2,
-    /// The edge lies where `normal . x = offset` [m].
+    /// The edge lies where `normal . x = offset` \[m\].
     pub(super) offset: f64,
-    /// Length [m].
+    /// Length \[m\].
     pub(super) length: f64,
 }
 
@@ -149,7 +149,7 @@ pub(super) fn angles(edges: &[Edge], options: &ProposeOptions, pad: f64) -> Vec<
 pub(super) struct Grid {
     /// Of the faces' overlap.
     pub(super) bounds: Bounds2,
-    /// Its step [m].
+    /// Its step \[m\].
     pub(super) spacing: f64,
     /// Steps to either side of the middle.
     half: DVec2,

@@ -13,15 +13,15 @@ use crate::model::Patch;
 use crate::propose::environment::Border;
 use crate::propose::patch::{PatchIndex, Scratch, Touch, TurnedPad};
 
-/// Edges of pad and face whose directions differ by less are flush [rad].
+/// Edges of pad and face whose directions differ by less are flush \[rad\].
 const FLUSH: f64 = 2e-3;
 /// At most this many lines of one kind at one angle, the longest edges first.
 const MOST_LINES: usize = 8;
 /// Lines whose directions differ by less have no crossing worth trying (sine of the angle).
 const CROSSING: f64 = 0.2;
-/// Clear of a border by this much, which rounding cannot take away [m].
+/// Clear of a border by this much, which rounding cannot take away \[m\].
 const CLEAR: f64 = 1e-6;
-/// A finger that stands out beyond the pad by more is tried by itself [m].
+/// A finger that stands out beyond the pad by more is tried by itself \[m\].
 const STANDS_OUT: f64 = 1e-6;
 
 /// What the special places of a site follow from.
