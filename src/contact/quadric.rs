@@ -604,7 +604,7 @@ mod tests {
                 // Points of the area serve at a slip centre inside too, on many panels.
                 let (mut points, mut edge) = (Dissipation::default(), EdgeSums::default());
                 for element in &region.elements {
-                    region.area_panel(element, twist, c, [0.0, 1.0], [0.0, 1.0], 26, &mut points);
+                    region.area_panel(element, twist, c, [0.0, 1.0], [0.0, 1.0], 12, &mut points);
                     region.edge_panel(element, c, [0.0, 1.0], 0, &mut edge);
                 }
                 let edges = edge.assemble(c, twist[2]);

@@ -100,7 +100,12 @@ pub(super) fn straight_edges(patch: &[Polygon]) -> Vec<Edge> {
             }
         }
     }
-    found.sort_by(|a, b| b.length.total_cmp(&a.length));
+    // Equally long ones by where they lie, not by where the file begins a ring; to a micrometre, so
+    // that rounding does not part them.
+    let key = |edge: &Edge| {
+        [-edge.length, edge.normal.x, edge.normal.y, edge.offset].map(|x| (x * 1e6).round() as i64)
+    };
+    found.sort_by_key(key);
     found
 }
 
