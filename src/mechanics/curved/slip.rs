@@ -166,19 +166,18 @@ impl Problem<'_, '_> {
             .filter(|z| z.dot(&w) > 0.0 && z.iter().all(|x| x.is_finite()))
             .unwrap_or_else(|| self.ellipsoid(&w));
         // The best length along z: D^2 = w . z.
-        let mut at = self.both(&z);
-        let along = w.dot(&z) / (at.value * at.value);
+        let found = self.both(&z);
+        let along = w.dot(&z) / (found.value * found.value);
         if !(along.is_finite() && along > 0.0) {
             return None;
         }
         z *= along;
-        let scaled = |at: Both, t: f64| Both {
-            value: at.value * t,
-            gradient: at.gradient,
-            hessian: at.hessian / t,
-            faces: at.faces,
+        let mut at = Both {
+            value: found.value * along,
+            gradient: found.gradient,
+            hessian: found.hessian / along,
+            faces: found.faces,
         };
-        at = scaled(at, along);
         let residual = |at: &Both| at.value * at.gradient - w;
         let merit = |at: &Both, z: &Vector5<f64>| 0.5 * at.value * at.value - w.dot(z);
         let mut error = residual(&at);

@@ -202,7 +202,7 @@ pub(super) fn positions(
     }
     let grid = Grid { bounds, spacing, half, count: positions.len() };
     let mut extra: Vec<DVec2> = Vec::new();
-    extra.push(nearest(overlap, centre_of_mass));
+    extra.extend(nearest(overlap, centre_of_mass));
     extra.push(polygon::patch_moments(overlap).centroid);
     if overlap.len() > 1 {
         extra.extend(overlap.iter().map(|polygon| polygon::moments(polygon).centroid));
@@ -236,22 +236,25 @@ pub(super) fn positions(
     (positions, grid)
 }
 
-/// The point of the patch nearest to `point`.
-fn nearest(patch: &[Polygon], point: DVec2) -> DVec2 {
+/// The points of the patch nearest to `point`: several, where they are equally near to a micrometre,
+/// in an order of their own.
+fn nearest(patch: &[Polygon], point: DVec2) -> Vec<DVec2> {
+    const EQUALLY: f64 = 1e-6;
     if patch.iter().any(|polygon| contains(polygon, point)) {
-        return point;
+        return vec![point];
     }
-    let mut best = (f64::INFINITY, point);
+    let mut feet = Vec::new();
     for ring in patch.iter().flat_map(rings) {
         for (&a, &b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
             let t = ((point - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
-            let foot = a + (b - a) * t;
-            if foot.distance(point) < best.0 {
-                best = (foot.distance(point), foot);
-            }
+            feet.push(a + (b - a) * t);
         }
     }
-    best.1
+    let least = feet.iter().map(|foot| foot.distance(point)).fold(f64::INFINITY, f64::min);
+    feet.retain(|foot| foot.distance(point) <= least + EQUALLY);
+    feet.sort_by_key(|foot| (foot / EQUALLY).round().to_array().map(|x| x as i64));
+    feet.dedup_by(|a, b| a.distance(*b) < EQUALLY);
+    feet
 }
 
 #[cfg(test)]
