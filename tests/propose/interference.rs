@@ -116,7 +116,7 @@ fn random_gripper(random: &mut Random) -> Gripper {
 
 /// Whether anything of the triangle is left after clipping by the six planes of the box: no
 /// separating axes, no tree.
-fn clip_leaves(low: DVec3, high: DVec3, triangle: [DVec3; 3]) -> bool {
+pub(crate) fn clip_leaves(low: DVec3, high: DVec3, triangle: [DVec3; 3]) -> bool {
     let mut ring = triangle.to_vec();
     for axis in 0..3 {
         for (sign, limit) in [(1.0, high[axis]), (-1.0, -low[axis])] {

@@ -1,6 +1,7 @@
 //! Proposals on the reference parts, which lie beside the checkout; without them these tests say
 //! SKIPPED.
 
+use crate::interference::clip_leaves;
 use glam::{DVec2, DVec3};
 use gripfast::backend::{Backend, ScoreOptions, SeedSet};
 use gripfast::geometry::{Bounds2, contains, patch_area, ring_area};
@@ -41,28 +42,6 @@ fn winding(part: &Part, point: DVec3) -> f64 {
         })
         .sum();
     angle / (4.0 * std::f64::consts::PI)
-}
-
-/// Whether anything of the triangle lies in the box, by clipping.
-fn clip_leaves(low: DVec3, high: DVec3, triangle: [DVec3; 3]) -> bool {
-    let mut ring = triangle.to_vec();
-    for axis in 0..3 {
-        for (sign, limit) in [(1.0, high[axis]), (-1.0, -low[axis])] {
-            let value = |point: DVec3| limit - sign * point[axis];
-            let mut next = Vec::new();
-            for (k, &a) in ring.iter().enumerate() {
-                let b = ring[(k + 1) % ring.len()];
-                if value(a) >= 0.0 {
-                    next.push(a);
-                }
-                if (value(a) >= 0.0) != (value(b) >= 0.0) {
-                    next.push(a + (b - a) * (value(a) / (value(a) - value(b))));
-                }
-            }
-            ring = next;
-        }
-    }
-    !ring.is_empty()
 }
 
 /// Opposite faces, pads on material all over the contact, nothing of the gripper in the part.
