@@ -7,7 +7,7 @@ use super::noise::{self, Noise};
 use super::orient::Role;
 use super::regions::{self, Flatness, Regions};
 use super::repair::Repaired;
-use super::{PlanarFace, boundary};
+use super::{CurvedFace, PlanarFace, boundary, curves};
 use crate::geometry::polygon::{Moments, patch_moments};
 use crate::model::Frame;
 
@@ -20,10 +20,10 @@ const JITTER: [f64; 2] = [1e-7, 1e-5];
 /// the diagonal.
 const NARROWEST: f64 = 5e-4;
 
-/// All planar faces of the part by falling area; facets of curved surfaces ([`Facets`]) and regions
+/// All planar faces of the part by falling area, and the curved ones; facets of curved surfaces ([`Facets`]) and regions
 /// narrower than 5e-4 of the part's diagonal are left out. Says so in the part's warnings when
 /// faces had to be found with wider tolerances, and when noise has broken planes up.
-pub(super) fn planar_faces(part: &mut Repaired) -> Vec<PlanarFace> {
+pub(super) fn faces(part: &mut Repaired) -> (Vec<PlanarFace>, Vec<CurvedFace>) {
     let [fine, rough] = [0, 1].map(|level| {
         let factor = [1.0, 2.0][level];
         Flatness {
@@ -55,7 +55,9 @@ pub(super) fn planar_faces(part: &mut Repaired) -> Vec<PlanarFace> {
             taken * 1e6
         ));
     }
-    outline(part, &regions, &facets)
+    let planar = outline(part, &regions, &facets);
+    let curved = curves::curved_faces(part, &regions, &facets, planar.len() as u32);
+    (planar, curved)
 }
 
 /// The faces among the regions, with boundaries, sorted and numbered.

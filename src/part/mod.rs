@@ -15,6 +15,7 @@ use crate::model::{Frame, LARGEST_LENGTH, Polygon};
 mod boundary;
 mod cracks;
 mod crossing;
+mod curves;
 pub mod drawing;
 mod faces;
 mod facets;
@@ -31,6 +32,7 @@ mod unit;
 mod weld;
 
 pub use crate::units::Unit;
+pub use curves::{Axis, CurvedFace, Shape};
 pub use health::Health;
 #[cfg(feature = "step")]
 pub use read::{StepProcess, serve_step};
@@ -153,6 +155,8 @@ pub struct Part {
     pub health: Health,
     /// Planar faces by falling area.
     pub faces: Vec<PlanarFace>,
+    /// Curved faces by falling area; their numbers continue those of the planar faces.
+    pub curved: Vec<CurvedFace>,
     /// Mass properties at a density of 1 kg/m^3.
     unit_mass: MassProperties,
 }
@@ -243,7 +247,7 @@ impl Part {
     fn build(soup: weld::Soup, unit: Unit, place: &str) -> Result<Self> {
         check_extent(&soup, unit, place)?;
         let mut repaired = repair::repair(soup, unit.metres(), place)?;
-        let faces = faces::planar_faces(&mut repaired);
+        let (faces, curved) = faces::faces(&mut repaired);
         let unit_mass = repaired.mass();
         Ok(Self {
             name: String::new(),
@@ -252,6 +256,7 @@ impl Part {
             mesh: repaired.mesh,
             health: repaired.health,
             faces,
+            curved,
             unit_mass,
         })
     }
@@ -263,6 +268,24 @@ impl Part {
     pub fn mass_properties(&self, density: f64) -> MassProperties {
         let unit = &self.unit_mass;
         MassProperties { mass: unit.mass * density, inertia: unit.inertia * density, ..*unit }
+    }
+
+    /// The curved face of this number.
+    pub fn curved_face(&self, id: u32) -> Option<&CurvedFace> {
+        self.curved.get((id as usize).checked_sub(self.faces.len())?)
+    }
+
+    /// Area of the planar or curved face of this number [m^2].
+    pub fn face_area(&self, id: u32) -> Option<f64> {
+        let planar = self.faces.get(id as usize).map(|face| face.area);
+        planar.or_else(|| Some(self.curved_face(id)?.area))
+    }
+
+    /// Numbers of the curved faces in groups that share an axis, each sorted, in the order of their
+    /// first faces: the bodies of revolution that jaws may turn unnoticed. A face alone is a group
+    /// of one.
+    pub fn coaxial_faces(&self) -> Vec<Vec<u32>> {
+        curves::coaxial_groups(&self.curved)
     }
 
     /// All reachable antiparallel face pairs that the jaws can close on, with widths in
