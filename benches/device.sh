@@ -26,16 +26,16 @@
 #
 # copy it there whole and run `bash FOLDER/device.sh [ADAPTER]`. It holds the release binary and the
 # test binary (stripped), the shipped parts, the reference cases where they are, and the Vulkan
-# loader; about 25 MiB, 64 MiB at most. There it needs bash, coreutils, a glibc no older than that
+# loader; some 27 MiB, 64 MiB at most. There it needs bash, coreutils, a glibc no older than that
 # of the building machine, and the adapter's driver with its ICD file (a JSON that names the
 # driver's library). The loader looks in /usr/share/vulkan/icd.d and /etc/vulkan/icd.d. Containers
 # often have NVIDIA's driver without the file: this script then looks in other usual places, and at
 # last writes one for libGLX_nvidia.so.0. If it still finds no adapter, look for nvidia_icd.json
 # (find / -name 'nvidia_icd*.json') and set VK_DRIVER_FILES to it.
 #
-# Environment: OUT, GRIPFAST (binary), SUITE (test binary), PARTS (folder of the shipped parts),
-# TFLOPS and BANDWIDTH [GB/s] (limits of an adapter that gripfast does not know), LOSE (rehearsal:
-# the sweep loses the device before this chunk).
+# Environment: OUT, GRIPFAST (binary), SUITE (test binary; empty: none), PARTS (folder of the
+# shipped parts), TFLOPS and BANDWIDTH [GB/s] (limits of an adapter that gripfast does not know),
+# LOSE (rehearsal: the sweep loses the device before this chunk).
 set -u
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(dirname "$here")
@@ -113,8 +113,12 @@ if [ -x "$here/gripfast" ]; then
     [ ! -d "$here/reference" ] || export GRIPFAST_REFERENCE="$here/reference"
 else
     program=${GRIPFAST:-$target/release/gripfast}
-    [ -x "$program" ] || build
     suite=${SUITE-$(newest_suite)}
+    # SUITE= (empty) leaves the suite out.
+    if ! [ -x "$program" ] || { [ -z "$suite" ] && [ -z "${SUITE+x}" ]; }; then
+        build
+        suite=${SUITE-$(newest_suite)}
+    fi
     parts=${PARTS:-$root/data/parts}
     commit=$(git -C "$root" describe --always --dirty 2>/dev/null)
     out=${OUT:-$target/device}
@@ -133,6 +137,8 @@ for old in devices check suite sweep commands entry; do
     rm -f "$out/$old.json" "$out/$old.md" "$out/$old.log"
 done
 work=$(mktemp -d) || stop "no folder for temporary files; set TMPDIR"
+# Where a program looks for it, Mesa complains if it is not there.
+export XDG_RUNTIME_DIR=${XDG_RUNTIME_DIR:-$work}
 trap 'rm -rf "$work"' EXIT
 
 # The loader and the driver's file.

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use criterion::{Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
-use gripfast::backend::{Backend, ScoreOptions, SeedSet};
+use gripfast::backend::{Backend, SeedSet};
 use gripfast::gripper::{self, Gripper};
 use gripfast::load::LoadSet;
 use gripfast::part::{Part, ReadOptions};
@@ -29,14 +29,9 @@ fn plan(gripper: &Gripper, loads: &LoadSet, seeds: &SeedSet) -> u64 {
     let mass = part.mass_properties(0.35 / part.mass_properties(1.0).volume);
     let cases = loads.cases(&mass).unwrap();
     let weights = Weights { k1: 1.0, k2: 1.0 };
-    let settings = Settings {
-        force: gripper.force[1],
-        weights,
-        delta: 0.0,
-        mu_c: 0.0,
-        pad_friction: gripper.pad_friction,
-        score: ScoreOptions::default(),
-    };
+    let settings = Settings::of_force(gripper.force[1])
+        .with_weights(weights)
+        .with_pad_friction(gripper.pad_friction);
     let assessor =
         Assessor { loads: &cases, mass, settings: &settings, backend: &Backend::Cpu, seeds };
     let mut collector = Collector::default();
@@ -47,7 +42,7 @@ fn plan(gripper: &Gripper, loads: &LoadSet, seeds: &SeedSet) -> u64 {
     let mut ranking = collector.finish(
         mass.centre_of_mass,
         (high - low).length(),
-        &rank::Options { weights, top: Some(10_000), ..rank::Options::default() },
+        &rank::Options::default().with_weights(weights).with_top(Some(10_000)),
     );
     assessor.finish(&mut ranking.grips);
     ranking.ranked

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use derive_setters::Setters;
 use glam::DVec3;
 
 use crate::model::{Patch, Status};
@@ -47,7 +48,9 @@ impl Weights {
 }
 
 /// What [`rank`] keeps.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Setters)]
+#[setters(prefix = "with_")]
+#[non_exhaustive]
 pub struct Options {
     /// Weights of the score.
     pub weights: Weights,

@@ -26,6 +26,7 @@ pub const VERSION: u32 = 2;
 
 /// A ranked list of grips on one part with one gripper under one set of loads.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct GripSet {
     /// Always [`FORMAT`].
     pub format: String,
@@ -187,6 +188,7 @@ pub struct PoseNoise {
 
 /// A grip with its score, worst load and rank.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct RankedGrip {
     /// 1 is the best.
     pub rank: u64,
@@ -228,6 +230,29 @@ pub struct RankedGrip {
     /// limit state is null.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mu_by_load: Vec<Option<f64>>,
+}
+
+impl RankedGrip {
+    /// A grip and its answer under its worst load; everything else is zero, or not there.
+    pub fn new(grip: Grip, worst: LoadScore) -> Self {
+        Self {
+            rank: 0,
+            grip,
+            score: None,
+            worst,
+            alpha: 0.0,
+            delta_d: 0.0,
+            contact_share: 0.0,
+            twist_margin: 0.0,
+            safety: None,
+            force_needed: None,
+            merged: Vec::new(),
+            load_multiple: None,
+            earlier: None,
+            pose_noise: None,
+            mu_by_load: Vec::new(),
+        }
+    }
 }
 
 /// The answer under one load.

@@ -80,7 +80,7 @@ fn refined(name: &str, times: u32, path: &Path) -> usize {
 /// Proposes all grips: seconds to set up, seconds to propose, candidates, grips.
 fn propose(part: &Part, name: &str, spacing: f64) -> (f64, f64, u64, u64) {
     let gripper = gripper::find(name).unwrap();
-    let options = ProposeOptions { spacing: Some(spacing), ..ProposeOptions::default() };
+    let options = ProposeOptions::default().with_spacing(Some(spacing));
     let prepare = || Proposer::new(part, &gripper, &options).unwrap();
     let (set_up, _) = seconds(|| (), |()| prepare().candidates());
     let (proposing, (candidates, grips)) = seconds(prepare, |mut proposer| {

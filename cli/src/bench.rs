@@ -128,12 +128,16 @@ struct Measured {
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     match args.part {
-        Some(Part::Check(args)) => return check::run(args),
-        Some(Part::Sweep(args)) => return sweep::run(args),
-        Some(Part::Commands(args)) => return commands::run(args),
-        Some(Part::Entry(args)) => return entry::run(args),
-        None => {}
+        Some(Part::Check(args)) => check::run(args),
+        Some(Part::Sweep(args)) => sweep::run(args),
+        Some(Part::Commands(args)) => commands::run(args),
+        Some(Part::Entry(args)) => entry::run(args),
+        None => quick(&args),
     }
+}
+
+/// Throughput of each workload on the processor and the chosen adapter, checked against each other.
+fn quick(args: &Args) -> anyhow::Result<ExitCode> {
     anyhow::ensure!(
         args.seconds.is_finite() && args.seconds > 0.0,
         "--seconds {}: give a positive number",
@@ -163,25 +167,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             let measured = measure(backend, &row, &set, Duration::from_secs_f64(args.seconds))?;
             let check = first.as_ref().map(|first| compare(first, &measured));
             agreed &= check.as_ref().is_none_or(|check| check.is_ok());
-            let solved: usize = measured.scored.iter().map(|scored| scored.solved).sum();
-            let per_second =
-                |count: usize| count as f64 * f64::from(measured.runs) / measured.seconds;
-            rows.push(json!({
-                "workload": row.name,
-                "what": row.what,
-                "backend": backend.name(),
-                "grips": row.workload.contacts.len(),
-                "loads": row.workload.loads(),
-                "seeds": set.len(),
-                "runs": measured.runs,
-                "seconds": measured.seconds,
-                "grips_per_second": per_second(row.workload.contacts.len()),
-                "loads_per_second": per_second(row.workload.loads()),
-                "seed_evaluations_per_second": if matches!(row.task, Task::Score(Polish::All)) { None } else { Some(per_second(row.workload.loads() * set.len())) },
-                "exact_solves_per_second": if row.task == Task::Seed { None } else { Some(per_second(solved)) },
-                "agrees_with_cpu": check.as_ref().map(|check| check.is_ok()),
-                "difference": check.as_ref().map(|check| match check { Ok(most) => json!(most), Err(why) => json!(why) }),
-            }));
+            rows.push(figures(&row, backend, &measured, check.as_ref(), set.len()));
             if first.is_none() {
                 first = Some(measured);
             }
@@ -194,39 +180,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         serde_json::to_writer_pretty(&mut out, &report)?;
         writeln!(out)?;
     } else {
-        let mut table = comfy_table::Table::new();
-        table.load_style(comfy_table::presets::NOTHING).set_header([
-            "workload",
-            "backend",
-            "grips/s",
-            "loads/s",
-            "seed evaluations/s",
-            "exact solves/s",
-            "agrees",
-        ]);
-        for row in &rows {
-            let number = |key: &str| {
-                row[key].as_f64().map_or_else(String::new, |value| format!("{value:.3e}"))
-            };
-            let agrees = match (&row["agrees_with_cpu"], &row["difference"]) {
-                (serde_json::Value::Bool(true), most) => {
-                    format!("to {:.0e}", most.as_f64().unwrap_or(0.0))
-                }
-                (serde_json::Value::Bool(false), why) => format!("NO: {why}"),
-                _ => String::new(),
-            };
-            let text = |key: &str| row[key].as_str().unwrap_or_default().to_owned();
-            table.add_row([
-                text("what"),
-                text("backend"),
-                number("grips_per_second"),
-                number("loads_per_second"),
-                number("seed_evaluations_per_second"),
-                number("exact_solves_per_second"),
-                agrees,
-            ]);
-        }
-        writeln!(out, "{}", table.to_string().trim_end())?;
+        writeln!(out, "{}", table(&rows).to_string().trim_end())?;
         writeln!(out, "{threads} threads, {} twists", set.len())?;
         if software {
             writeln!(
@@ -237,6 +191,71 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     anyhow::ensure!(agreed, "the backends disagree");
     Ok(ExitCode::SUCCESS)
+}
+
+/// What a workload came to, as JSON.
+fn figures(
+    row: &Row,
+    backend: &Backend,
+    measured: &Measured,
+    check: Option<&Result<f64, String>>,
+    seeds: usize,
+) -> serde_json::Value {
+    let solved: usize = measured.scored.iter().map(|scored| scored.solved).sum();
+    let per_second = |count: usize| count as f64 * f64::from(measured.runs) / measured.seconds;
+    let all = matches!(row.task, Task::Score(Polish::All));
+    let loads = row.workload.loads();
+    json!({
+        "workload": row.name,
+        "what": row.what,
+        "backend": backend.name(),
+        "grips": row.workload.contacts.len(),
+        "loads": loads,
+        "seeds": seeds,
+        "runs": measured.runs,
+        "seconds": measured.seconds,
+        "grips_per_second": per_second(row.workload.contacts.len()),
+        "loads_per_second": per_second(loads),
+        "seed_evaluations_per_second": (!all).then(|| per_second(loads * seeds)),
+        "exact_solves_per_second": (row.task != Task::Seed).then(|| per_second(solved)),
+        "agrees_with_cpu": check.map(|check| check.is_ok()),
+        "difference": check.map(|check| match check { Ok(most) => json!(most), Err(why) => json!(why) }),
+    })
+}
+
+fn table(rows: &[serde_json::Value]) -> comfy_table::Table {
+    let mut table = comfy_table::Table::new();
+    table.load_style(comfy_table::presets::NOTHING).set_header([
+        "workload",
+        "backend",
+        "grips/s",
+        "loads/s",
+        "seed evaluations/s",
+        "exact solves/s",
+        "agrees",
+    ]);
+    for row in rows {
+        let number =
+            |key: &str| row[key].as_f64().map_or_else(String::new, |value| format!("{value:.3e}"));
+        let agrees = match (&row["agrees_with_cpu"], &row["difference"]) {
+            (serde_json::Value::Bool(true), most) => {
+                format!("to {:.0e}", most.as_f64().unwrap_or(0.0))
+            }
+            (serde_json::Value::Bool(false), why) => format!("NO: {why}"),
+            _ => String::new(),
+        };
+        let text = |key: &str| row[key].as_str().unwrap_or_default().to_owned();
+        table.add_row([
+            text("what"),
+            text("backend"),
+            number("grips_per_second"),
+            number("loads_per_second"),
+            number("seed_evaluations_per_second"),
+            number("exact_solves_per_second"),
+            agrees,
+        ]);
+    }
+    table
 }
 
 #[cfg(feature = "gpu")]

@@ -99,20 +99,20 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         .iter()
         .map(|text| Joint::parse("--joint", text))
         .collect::<Result<Vec<_>, _>>()?;
-    let options = Options {
-        convention: args
-            .convention
-            .as_deref()
-            .map(|name| Convention::parse("--convention", name))
-            .transpose()?,
-        origin: Origin::parse("--origin", &args.origin)?,
-        top: args.top.or((format == Format::Glb).then_some(GLB_TOP)),
-        opening: args.opening.as_deref().map(|text| length("--opening", text)).transpose()?,
-        joints: if joints.is_empty() { vec![Joint::default()] } else { joints },
-        pad_friction: args.pad_friction,
-        approach: length("--approach", &args.approach)?,
-        part_frame: args.part_frame,
-    };
+    let options = Options::default()
+        .with_convention(
+            args.convention
+                .as_deref()
+                .map(|name| Convention::parse("--convention", name))
+                .transpose()?,
+        )
+        .with_origin(Origin::parse("--origin", &args.origin)?)
+        .with_top(args.top.or((format == Format::Glb).then_some(GLB_TOP)))
+        .with_opening(args.opening.as_deref().map(|text| length("--opening", text)).transpose()?)
+        .with_joints(if joints.is_empty() { vec![Joint::default()] } else { joints })
+        .with_pad_friction(args.pad_friction)
+        .with_approach(length("--approach", &args.approach)?)
+        .with_part_frame(args.part_frame);
     let set = GripSet::read(&args.grips)?;
     let part = if format == Format::Glb {
         Some(read_part(&set, &args.grips, args.part.as_deref())?)
@@ -155,5 +155,5 @@ pub(crate) fn read_part(
     };
     let unit =
         Unit::ALL.into_iter().find(|unit| (unit.metres() / set.part.unit_m - 1.0).abs() < 1e-9);
-    Ok(Part::read(&path, &ReadOptions { unit, ..Default::default() })?)
+    Ok(Part::read(&path, &ReadOptions::default().with_unit(unit))?)
 }

@@ -74,7 +74,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         _ => [0.0, f64::INFINITY],
     };
     let max_memory = args.max_memory.as_deref().map(flags::memory).transpose()?;
-    let options = ReadOptions { unit: args.unit, max_memory, ..ReadOptions::default() };
+    let options = ReadOptions::default().with_unit(args.unit).with_max_memory(max_memory);
     let part = Part::read(&args.part, &options)?;
     let volume = part.mass_properties(1.0).volume;
     let density = match mass {

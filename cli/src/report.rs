@@ -89,7 +89,7 @@ fn recorded_part(grips: &Path, summary: &PartSummary) -> Option<Part> {
 /// Reads the part and makes sure that it is the one of the result.
 fn read_part(path: &Path, summary: &PartSummary) -> gripfast::error::Result<Part> {
     let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == summary.unit_m);
-    let part = Part::read(path, &ReadOptions { unit, ..Default::default() })?;
+    let part = Part::read(path, &ReadOptions::default().with_unit(unit))?;
     let (low, high) = part.mesh.bounding_box();
     let tolerance = SAME_BOX * (summary.bbox_max - summary.bbox_min).length();
     let off = (low - summary.bbox_min).abs().max((high - summary.bbox_max).abs()).max_element();

@@ -44,7 +44,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         .map_err(|error| Error::input(&file, format!("gripper: {error}"), "make the file again"))?;
     let path = args.part.unwrap_or_else(|| PathBuf::from(&set.part.file));
     let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == set.part.unit_m);
-    let part = Part::read(&path, &ReadOptions { unit, ..Default::default() })?;
+    let part = Part::read(&path, &ReadOptions::default().with_unit(unit))?;
     let options = ProposeOptions::from(&set.provenance.request.candidates);
     let proposer = Proposer::new(&part, &gripper, &options)?;
     let explanation = proposer.explain_pose(

@@ -193,14 +193,7 @@ impl Case<'_> {
     /// `mu_s` is at least this much, it ends without an answer as soon as that is so.
     pub(super) fn score(&self, beaten: Option<&(dyn Fn(f64) -> bool + Sync)>) -> Scored {
         if self.options.polish == Polish::All {
-            let all: Vec<Score> = (0..self.seeds.len())
-                .into_par_iter()
-                .with_min_len(8)
-                .map(|load| self.solve(load))
-                .collect();
-            let answers: Vec<(usize, Score)> = all.iter().copied().enumerate().collect();
-            let worst = self.settle(self.worst(&answers));
-            return Scored { worst, solved: all.len(), compared: 0, all, outranked: false };
+            return self.score_all();
         }
         let mut work =
             Work { case: self, solved: Vec::new(), compared: 0, neighbours: Neighbours::default() };
@@ -211,97 +204,44 @@ impl Case<'_> {
         let has_bounds = |load: &usize| {
             matches!(self.seeds[*load].status, SeedStatus::Bounded | SeedStatus::Coupled)
         };
-        let (mut bounded, mut open): (Vec<usize>, Vec<usize>) =
-            (0..self.seeds.len()).partition(has_bounds);
-        // Loads without bounds are compared one by one. One that has no limit state is the worst,
-        // whatever the others are (a load with bounds has one): the nearest to twisting out comes
-        // first. In a race the most demanding does.
-        let urgency: Vec<f64> = if beaten.is_some() {
+        let (bounded, open): (Vec<usize>, Vec<usize>) = (0..self.seeds.len()).partition(has_bounds);
+        let open = self.in_turn(open, beaten.is_some());
+        let floor = bounded.iter().map(|&load| self.seeds[load].lower).fold(0.0, f64::max);
+        let ended = match work.without_bounds(&open, floor, &out) {
+            Ok(largest) => work.with_bounds(bounded, largest, &out),
+            Err(ended) => Err(ended),
+        };
+        match ended {
+            Ok(()) => work.worst(),
+            Err(Ended::Outranked) => work.outranked(),
+            Err(Ended::Refused) => work.refused(),
+        }
+    }
+
+    /// Every load solved exactly.
+    fn score_all(&self) -> Scored {
+        let all: Vec<Score> = (0..self.seeds.len())
+            .into_par_iter()
+            .with_min_len(8)
+            .map(|load| self.solve(load))
+            .collect();
+        let answers: Vec<(usize, Score)> = all.iter().copied().enumerate().collect();
+        let worst = self.settle(self.worst(&answers));
+        Scored { worst, solved: all.len(), compared: 0, all, outranked: false }
+    }
+
+    /// Loads without bounds in the order in which they are compared. One that has no limit state
+    /// is the worst, whatever the others are (a load with bounds has one): the nearest to twisting
+    /// out comes first. In a race the most demanding does.
+    fn in_turn(&self, open: Vec<usize>, race: bool) -> Vec<usize> {
+        let urgency: Vec<f64> = if race {
             open.iter().map(|&load| -self.seeds[load].estimate).collect()
         } else {
             self.margins(&open)
         };
         let mut order: Vec<usize> = (0..open.len()).collect();
         order.sort_by(|&a, &b| urgency[a].total_cmp(&urgency[b]).then(a.cmp(&b)));
-        open = order.into_iter().map(|place| open[place]).collect();
-        let mut largest: f64 = 0.0;
-        let mut floor = bounded.iter().map(|&load| self.seeds[load].lower).fold(0.0, f64::max);
-        // The one that seems to ask for most comes before them all: few of the others reach it.
-        let estimate = |load: usize| self.seeds[load].estimate;
-        let leader = open.iter().copied().max_by(|&a, &b| estimate(a).total_cmp(&estimate(b)));
-        let leader = leader.filter(|&load| match work.compare(load, 0.0) {
-            Compared::Solved(mu) => {
-                largest = mu;
-                true
-            }
-            // Its turn comes.
-            _ => {
-                work.solved.clear();
-                false
-            }
-        });
-        for load in open {
-            if out(largest) {
-                return work.outranked();
-            }
-            floor = floor.max(largest);
-            if leader != Some(load) {
-                match work.compare(load, floor * (1.0 - 2.0 * TIE)) {
-                    Compared::Below => {}
-                    Compared::Solved(mu) => largest = largest.max(mu),
-                    Compared::Refused => return work.refused(),
-                }
-            }
-        }
-        if out(largest) {
-            return work.outranked();
-        }
-        // Then the others by falling upper bound, until none can reach the largest found. For
-        // congruent faces the slip problem alone decides `mu_s`: the seven equations are solved for
-        // the worst of them only.
-        let floor = bounded.iter().map(|&load| self.seeds[load].lower).fold(largest, f64::max);
-        bounded.retain(|&load| self.seeds[load].upper >= floor);
-        bounded
-            .sort_by(|&a, &b| self.seeds[b].upper.total_cmp(&self.seeds[a].upper).then(a.cmp(&b)));
-        let mut slips: Vec<(usize, f64)> = Vec::new();
-        // Ties with the largest are solved too, so that the first of them is found.
-        // Congruent to rounding, not only to the single precision of the part's file.
-        let exact = self.pads.is_some_and(|pads| pads.congruent);
-        let margin = if exact { 2.0 * TIE } else { F32_TOLERANCE };
-        for load in bounded {
-            if self.seeds[load].upper < largest * (1.0 - margin) {
-                break;
-            }
-            if let (SeedStatus::Bounded, Some(pads)) = (self.seeds[load].status, self.pads) {
-                let mu = slip_only(pads, self.problem, load, self.seeds[load].twist);
-                largest = largest.max(mu);
-                slips.push((load, mu));
-            } else {
-                match work.compare(load, largest * (1.0 - 2.0 * TIE)) {
-                    Compared::Below => {}
-                    Compared::Solved(mu) => largest = largest.max(mu),
-                    Compared::Refused => largest = f64::INFINITY,
-                }
-            }
-        }
-        work.compared += slips.len();
-        if out(largest * (1.0 - margin)) {
-            return work.outranked();
-        }
-        slips.retain(|&(_, mu)| mu >= largest * (1.0 - margin));
-        slips.sort_unstable_by_key(|&(load, _)| load);
-        for (load, mu) in slips {
-            let score = work.solve(load);
-            // The first of those that tie is the answer.
-            if exact
-                && usable(&score).is_some_and(|found| {
-                    (found - mu).abs() <= TIE * mu && found >= largest * (1.0 - TIE)
-                })
-            {
-                break;
-            }
-        }
-        work.worst()
+        order.into_iter().map(|place| open[place]).collect()
     }
 
     /// Margin against twisting out of each of the `loads`.
@@ -401,6 +341,14 @@ enum Compared {
     Refused,
 }
 
+/// Why a grip's loads are not all looked at.
+enum Ended {
+    /// The grip is out of the race.
+    Outranked,
+    /// The load solved last has no limit state.
+    Refused,
+}
+
 /// States found of some loads, for the next ones to begin at. No more than [`MOST`] and none much
 /// like another, so that finding the nearest does not grow with the number of loads.
 #[derive(Default)]
@@ -449,6 +397,100 @@ fn place(load: &Load) -> [f32; 6] {
 }
 
 impl Work<'_> {
+    /// Compares loads without bounds one by one. The largest `mu_s` among those solved; the others
+    /// have less than this or than `floor`, which a load with bounds reaches.
+    fn without_bounds(
+        &mut self,
+        open: &[usize],
+        mut floor: f64,
+        out: &dyn Fn(f64) -> bool,
+    ) -> std::result::Result<f64, Ended> {
+        let mut largest: f64 = 0.0;
+        // The one that seems to ask for most comes before them all: few of the others reach it.
+        let estimate = |load: usize| self.case.seeds[load].estimate;
+        let leader = open.iter().copied().max_by(|&a, &b| estimate(a).total_cmp(&estimate(b)));
+        let leader = leader.filter(|&load| match self.compare(load, 0.0) {
+            Compared::Solved(mu) => {
+                largest = mu;
+                true
+            }
+            // Its turn comes.
+            _ => {
+                self.solved.clear();
+                false
+            }
+        });
+        for &load in open {
+            if out(largest) {
+                return Err(Ended::Outranked);
+            }
+            floor = floor.max(largest);
+            if leader != Some(load) {
+                match self.compare(load, floor * (1.0 - 2.0 * TIE)) {
+                    Compared::Below => {}
+                    Compared::Solved(mu) => largest = largest.max(mu),
+                    Compared::Refused => return Err(Ended::Refused),
+                }
+            }
+        }
+        if out(largest) { Err(Ended::Outranked) } else { Ok(largest) }
+    }
+
+    /// Solves loads with bounds by falling upper bound, until none can reach the `largest` found.
+    /// For congruent faces the slip problem alone decides `mu_s`: the seven equations are solved
+    /// for the worst of them only.
+    fn with_bounds(
+        &mut self,
+        mut bounded: Vec<usize>,
+        mut largest: f64,
+        out: &dyn Fn(f64) -> bool,
+    ) -> std::result::Result<(), Ended> {
+        let case = self.case;
+        let floor = bounded.iter().map(|&load| case.seeds[load].lower).fold(largest, f64::max);
+        bounded.retain(|&load| case.seeds[load].upper >= floor);
+        bounded
+            .sort_by(|&a, &b| case.seeds[b].upper.total_cmp(&case.seeds[a].upper).then(a.cmp(&b)));
+        let mut slips: Vec<(usize, f64)> = Vec::new();
+        // Ties with the largest are solved too, so that the first of them is found.
+        // Congruent to rounding, not only to the single precision of the part's file.
+        let exact = case.pads.is_some_and(|pads| pads.congruent);
+        let margin = if exact { 2.0 * TIE } else { F32_TOLERANCE };
+        for load in bounded {
+            if case.seeds[load].upper < largest * (1.0 - margin) {
+                break;
+            }
+            if let (SeedStatus::Bounded, Some(pads)) = (case.seeds[load].status, case.pads) {
+                let mu = slip_only(pads, case.problem, load, case.seeds[load].twist);
+                largest = largest.max(mu);
+                slips.push((load, mu));
+            } else {
+                match self.compare(load, largest * (1.0 - 2.0 * TIE)) {
+                    Compared::Below => {}
+                    Compared::Solved(mu) => largest = largest.max(mu),
+                    Compared::Refused => largest = f64::INFINITY,
+                }
+            }
+        }
+        self.compared += slips.len();
+        if out(largest * (1.0 - margin)) {
+            return Err(Ended::Outranked);
+        }
+        slips.retain(|&(_, mu)| mu >= largest * (1.0 - margin));
+        slips.sort_unstable_by_key(|&(load, _)| load);
+        for (load, mu) in slips {
+            let score = self.solve(load);
+            // The first of those that tie is the answer.
+            if exact
+                && usable(&score).is_some_and(|found| {
+                    (found - mu).abs() <= TIE * mu && found >= largest * (1.0 - TIE)
+                })
+            {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     /// Whether a load's `mu_s` is below a value, or what it is.
     fn compare(&mut self, load: usize, value: f64) -> Compared {
         let case = self.case;

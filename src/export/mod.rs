@@ -17,6 +17,8 @@ mod yaml;
 use std::io::Write;
 use std::path::Path;
 
+use derive_setters::Setters;
+
 use crate::error::{Error, ErrorKind, Result};
 use crate::gripper::Gripper;
 use crate::model::Frame;
@@ -127,7 +129,9 @@ impl Format {
 }
 
 /// How to export.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Setters)]
+#[setters(prefix = "with_")]
+#[non_exhaustive]
 pub struct Options {
     /// Axes of the tool frame; the format's own when absent.
     pub convention: Option<Convention>,

@@ -6,6 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
+use derive_setters::Setters;
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -128,7 +129,9 @@ pub struct FacePair {
 }
 
 /// How to read a part.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Setters)]
+#[setters(prefix = "with_")]
+#[non_exhaustive]
 pub struct ReadOptions {
     /// Unit of the file's numbers. `None`: the file's own where it states one (3MF, glTF),
     /// otherwise millimetres.

@@ -1,5 +1,6 @@
 //! Grips of one part under one set of loads, from pose to numbers.
 
+use derive_setters::Setters;
 use rayon::prelude::*;
 
 use crate::backend::{Backend, Batch, Best, Problem, ScoreOptions, Scored, SeedSet};
@@ -16,7 +17,9 @@ use crate::request::{Polish, Request};
 use crate::results::{LoadCase, LoadScore, RankedGrip};
 
 /// What decides the answer, beside part, gripper and loads.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Setters)]
+#[setters(prefix = "with_")]
+#[non_exhaustive]
 pub struct Settings {
     /// Gripping force \[N\].
     pub force: f64,
@@ -33,6 +36,18 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// This gripping force \[N\], a pad friction that is not known, and defaults.
+    pub fn of_force(force: f64) -> Self {
+        Self {
+            force,
+            weights: Weights::default(),
+            delta: 0.0,
+            mu_c: 0.0,
+            pad_friction: None,
+            score: ScoreOptions::default(),
+        }
+    }
+
     /// Those of a request with this gripper. Only the worst loads are solved: the others of grips
     /// that are kept come after the ranking.
     ///

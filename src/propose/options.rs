@@ -1,5 +1,6 @@
 //! What to propose, and the reasons for which a candidate falls.
 
+use derive_setters::Setters;
 use glam::DVec3;
 use serde::Serialize;
 
@@ -10,8 +11,16 @@ use crate::request::{Candidates, Region, Side};
 
 pub use crate::request::{Cone, Ground};
 
-/// What to propose.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// What to propose: from a request, or the default with what differs.
+///
+/// ```
+/// use gripfast::propose::ProposeOptions;
+/// let options = ProposeOptions::default().with_spacing(Some(0.004)).with_flips(true);
+/// assert_eq!(options.spacing, Some(0.004));
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Setters)]
+#[setters(prefix = "with_")]
+#[non_exhaustive]
 pub struct ProposeOptions {
     /// Step of the position grid \[m\]; `None`: a fifth of the pad's shorter side.
     pub spacing: Option<f64>,

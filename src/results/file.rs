@@ -33,6 +33,25 @@ struct Head<'a> {
 }
 
 impl GripSet {
+    /// A set without grips and counts. `gripper` is a [`crate::gripper::Gripper`] as JSON.
+    pub fn new(
+        provenance: Provenance,
+        part: PartSummary,
+        gripper: serde_json::Value,
+        loads: Vec<LoadCase>,
+    ) -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            provenance,
+            part,
+            gripper,
+            loads,
+            summary: Summary::default(),
+            grips: Vec::new(),
+        }
+    }
+
     /// Reads a native result file, JSON or JSON Lines.
     ///
     /// # Errors

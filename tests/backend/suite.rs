@@ -14,6 +14,8 @@ use gripfast::contact::{Field, Loops};
 use gripfast::mechanics::{self, Options, slip};
 use gripfast::model::{Contact, Patch, Polygon, Wrench};
 
+use crate::support::random::Random;
+
 /// Largest relative difference allowed between the bounds of two backends.
 const TOLERANCE: f64 = 4e-5;
 
@@ -36,45 +38,29 @@ fn gpu() -> Option<Backend> {
     None
 }
 
-struct Random(u64);
-
 impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-
-    fn vector(&mut self) -> DVec3 {
-        DVec3::new(self.within(-1.0, 1.0), self.within(-1.0, 1.0), self.within(-1.0, 1.0))
-    }
-
     fn wrench(&mut self, force: f64, arm: f64) -> Wrench {
-        let size = force * 10_f64.powf(self.within(-2.0, 0.0));
+        let size = force * 10_f64.powf(self.range(-2.0, 0.0));
         Wrench { force: self.vector() * size, moment: self.vector() * size * arm }
     }
 
     /// A star-shaped polygon, sometimes with a hole, perhaps stretched.
     fn patch(&mut self, size: f64) -> Patch {
-        let corners = 3 + (self.next() * 8.0) as usize;
+        let corners = 3 + (self.unit() * 8.0) as usize;
         let (centre, turn, flat) = (
-            DVec2::new(self.within(-1.0, 1.0), self.within(-1.0, 1.0)) * size,
-            self.next(),
-            self.within(0.15, 1.0),
+            DVec2::new(self.range(-1.0, 1.0), self.range(-1.0, 1.0)) * size,
+            self.unit(),
+            self.range(0.15, 1.0),
         );
         let mut ring = |low: f64, high: f64| -> Vec<DVec2> {
             (0..corners)
                 .map(|i| {
-                    let angle = (i as f64 + turn + self.within(-0.2, 0.2)) / corners as f64
+                    let angle = (i as f64 + turn + self.range(-0.2, 0.2)) / corners as f64
                         * std::f64::consts::TAU;
                     centre
                         + DVec2::from_angle(angle)
                             * size
-                            * self.within(low, high)
+                            * self.range(low, high)
                             * DVec2::new(1.0, flat)
                 })
                 .collect()
@@ -87,8 +73,8 @@ impl Random {
 
     /// Two rectangles of which one hangs over an edge.
     fn similar(&mut self, size: f64) -> Arc<Contact> {
-        let (a, b) = (size, size * self.within(0.3, 1.0));
-        let cut = a * self.within(0.0, 0.5);
+        let (a, b) = (size, size * self.range(0.3, 1.0));
+        let cut = a * self.range(0.0, 0.5);
         Arc::new(Contact {
             face_i: rectangle(a, b, DVec2::ZERO),
             face_ii: rectangle(a - cut, b, DVec2::new(-cut / 2.0, 0.0)),
@@ -204,7 +190,7 @@ fn assert_bounds(seeds: &[Seed], problem: &Problem<'_>) -> [usize; 3] {
 }
 
 fn bounds_enclose_the_answer(backend: &Backend) {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     // GRIPFAST_LONG=100 tries a million loads.
     let times = std::env::var("GRIPFAST_LONG")
         .ok()
@@ -214,16 +200,16 @@ fn bounds_enclose_the_answer(backend: &Backend) {
         let set = SeedSet::new(frequency).unwrap();
         let mut counts = [0; 3];
         for _ in 0..grips {
-            let size = 10_f64.powf(random.within(-3.0, 1.0));
-            let contact = match (random.next() * 4.0) as usize {
+            let size = 10_f64.powf(random.range(-3.0, 1.0));
+            let contact = match (random.unit() * 4.0) as usize {
                 0 | 1 => random.congruent(size),
                 2 => random.similar(size),
                 _ => Arc::new(Contact { face_i: random.patch(size), face_ii: random.patch(size) }),
             };
             // From outside and, less often, from inside.
             let (distance, force) =
-                (size * random.within(-3.0, 6.0), 10_f64.powf(random.within(-2.0, 3.0)));
-            let strength = 10_f64.powf(random.within(-2.0, 0.0));
+                (size * random.range(-3.0, 6.0), 10_f64.powf(random.range(-2.0, 3.0)));
+            let strength = 10_f64.powf(random.range(-2.0, 0.0));
             let wrenches: Vec<Wrench> =
                 (0..20).map(|_| random.wrench(force * strength, size)).collect();
             let problem = Problem { contact: &contact, distance, force, wrenches: &wrenches };
@@ -244,7 +230,7 @@ fn bounds_enclose_the_answer(backend: &Backend) {
 }
 
 fn seeds_start_the_solver_close(backend: &Backend) {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let (set, dense) = (SeedSet::default(), SeedSet::with_at_least(10_000).unwrap());
     let (mut iterations, mut worse) = (Vec::new(), 0.0_f64);
     for _ in 0..12 {
@@ -326,20 +312,16 @@ fn few_loads_of_a_ball_are_solved(backend: &Backend) {
 /// Different areas in full contact: bounds that allow for the friction coupling are still tight
 /// enough.
 fn few_loads_of_a_ball_are_solved_on_different_faces(backend: &Backend) {
-    let mut random = Random(41);
+    let mut random = Random::new(41);
     let points: Vec<DVec3> = (0..24)
         .map(|_| {
-            DVec3::new(
-                random.within(0.0, 0.02),
-                random.within(0.0, 0.02),
-                random.within(0.0, 0.004),
-            )
+            DVec3::new(random.range(0.0, 0.02), random.range(0.0, 0.02), random.range(0.0, 0.004))
         })
         .collect();
     let (mut solved, mut loads) = (0, 0);
     for point in points {
         let mut corner = || {
-            let cut = random.within(0.001, 0.007);
+            let cut = random.range(0.001, 0.007);
             let ring = [
                 (-0.011, -0.01),
                 (0.011, -0.01),
@@ -373,7 +355,7 @@ fn few_loads_of_a_ball_are_solved_on_different_faces(backend: &Backend) {
 /// unsolved. Depends neither on the number of threads nor, but for how many are left, on how the
 /// grips are cut into batches.
 fn the_best_grips_are_those_of_the_whole_list(backend: &Backend) {
-    let mut random = Random(43);
+    let mut random = Random::new(43);
     let set = SeedSet::default();
     let grips: Vec<(Arc<Contact>, Vec<Wrench>, f64)> = (0..150)
         .map(|i| {
@@ -382,8 +364,8 @@ fn the_best_grips_are_those_of_the_whole_list(backend: &Backend) {
             } else {
                 random.congruent(0.02)
             };
-            let reach = random.within(0.005, 0.03);
-            (contact, ball(24, random.vector() * reach), random.within(0.1, 1.2))
+            let reach = random.range(0.005, 0.03);
+            (contact, ball(24, random.vector() * reach), random.range(0.1, 1.2))
         })
         .collect();
     // Some of them twice: ties.
@@ -552,7 +534,7 @@ fn degenerate_contacts_and_loads(backend: &Backend) {
 }
 
 fn batch_sizes(backend: &Backend) {
-    let mut random = Random(17);
+    let mut random = Random::new(17);
     let set = SeedSet::new(2).unwrap();
     let contact = random.congruent(0.02);
     let wrenches: Vec<Wrench> = (0..100_000).map(|_| random.wrench(20.0, 0.02)).collect();
@@ -585,7 +567,7 @@ fn batch_sizes(backend: &Backend) {
 }
 
 fn same_bytes_twice_and_permuted_answers_for_a_permuted_batch(backend: &Backend) {
-    let mut random = Random(23);
+    let mut random = Random::new(23);
     let set = SeedSet::default();
     let shared = random.congruent(0.02);
     let grips: Vec<(Arc<Contact>, Vec<Wrench>)> = (0..200)
@@ -597,7 +579,7 @@ fn same_bytes_twice_and_permuted_answers_for_a_permuted_batch(backend: &Backend)
             };
             (
                 contact,
-                (0..(random.next() * 100.0) as usize).map(|_| random.wrench(20.0, 0.02)).collect(),
+                (0..(random.unit() * 100.0) as usize).map(|_| random.wrench(20.0, 0.02)).collect(),
             )
         })
         .collect();
@@ -635,7 +617,7 @@ fn same_bytes_twice_and_permuted_answers_for_a_permuted_batch(backend: &Backend)
 }
 
 fn final_answers_are_those_of_the_processor(backend: &Backend) {
-    let mut random = Random(29);
+    let mut random = Random::new(29);
     let set = SeedSet::default();
     let grips: Vec<(Arc<Contact>, Vec<Wrench>)> = (0..60)
         .map(|i| {
@@ -724,7 +706,7 @@ fn gpu_that_is_lost_in_mid_batch() {
         return;
     }
     let named = std::env::var(ADAPTER_VARIABLE).unwrap_or_else(|_| "0".to_owned());
-    let mut random = Random(47);
+    let mut random = Random::new(47);
     let contact = random.congruent(0.02);
     let wrenches: Vec<Wrench> = (0..2300).map(|_| random.wrench(20.0, 0.02)).collect();
     let problem = Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches };

@@ -22,7 +22,7 @@ impl Case {
         let path = crate::support::root().join("data/parts").join(part);
         let part = Part::read(&path, &ReadOptions::default()).unwrap();
         let gripper = gripper::find(gripper).unwrap();
-        let options = ProposeOptions { spacing: Some(0.006), ..Default::default() };
+        let options = ProposeOptions::default().with_spacing(Some(0.006));
         let all: Vec<Grip> = Proposer::new(&part, &gripper, &options)
             .unwrap()
             .flat_map(|chunk| chunk.grips)

@@ -9,6 +9,8 @@
 
 mod mutate;
 mod seeds;
+#[path = "../support/mod.rs"]
+mod support;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -20,7 +22,7 @@ use gripfast::mechanics::{Options, solve};
 use gripfast::part::{Part, ReadOptions};
 use gripfast::pick::Scene;
 
-use mutate::Random;
+use support::random::Random;
 
 /// Longest that one input may take.
 const HANG: Duration = Duration::from_secs(2);
@@ -37,7 +39,7 @@ struct Target {
 }
 
 fn part(path: &Path, _: &[u8]) {
-    let options = ReadOptions { max_memory: Some(MEMORY), ..ReadOptions::default() };
+    let options = ReadOptions::default().with_max_memory(Some(MEMORY));
     if let Ok(part) = Part::read(path, &options) {
         let mass = part.mass_properties(1.0);
         assert!(mass.volume.is_finite() && mass.centre_of_mass.is_finite());

@@ -10,6 +10,8 @@ use gripfast::model::{Contact, Face, Slip, Status, Wrench};
 use nalgebra::{Matrix5, Vector5};
 use serde_json::{Value, json};
 
+use crate::support::random::Random;
+
 fn answer(value: &Value) -> Answer {
     let Case { surfaces, distance, force, wrench, .. } =
         case::parse("a case", value.clone()).unwrap();
@@ -226,7 +228,7 @@ fn a_wedge_needs_the_tangent_of_its_half_angle() {
 /// Planes: the planar solver's answers, also separated.
 #[test]
 fn the_flat_limit_is_the_planar_solver() {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     for _ in 0..60 {
         let mut piece = |shift: f64| {
             let low = [-0.01 - 0.01 * random.unit(), -0.01 - 0.005 * random.unit()];
@@ -449,27 +451,6 @@ fn soft_pads_and_tilts_are_said() {
     assert!(!round.iter().any(|note| matches!(note, Note::TiltPushes { .. })), "{round:?}");
 }
 
-/// A generator of random numbers (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn signed(&mut self) -> f64 {
-        2.0 * self.unit() - 1.0
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-}
-
 /// A body with round, drafted or stepped faces, described once more for the check on points: gap
 /// and felt tilt of each piece, in the check's own words.
 struct Posed {
@@ -483,22 +464,22 @@ struct Posed {
 
 /// A random body of one of seven kinds under a random load.
 fn posed(number: u64) -> Posed {
-    let mut random = Random(number.wrapping_mul(0x5851_F42D_4C95_7F2D) ^ 0x1234);
-    let r = random.between(0.005, 0.03);
-    let l = r * random.between(0.8, 4.0);
-    let force = random.between(20.0, 200.0);
+    let mut random = Random::new(number.wrapping_mul(0x5851_F42D_4C95_7F2D) ^ 0x1234);
+    let r = random.range(0.005, 0.03);
+    let l = r * random.range(0.8, 4.0);
+    let force = random.range(20.0, 200.0);
     // Half width of the contact over the radius, from which the pads' stiffness follows.
-    let share = random.between(0.05, 0.3);
+    let share = random.range(0.05, 0.3);
     let k = 1.5 * force / (l * share.powi(3) * r * r);
-    let stiffness = [k, k * random.between(0.3, 3.0)];
+    let stiffness = [k, k * random.range(0.3, 3.0)];
     let x = 0.5 * l;
     let cylinder = Gap::Cylinder { radius: r, axis: DVec2::X, at: DVec2::ZERO, height: 0.0 };
     let sphere = Gap::Sphere { radius: r, at: DVec2::ZERO, height: 0.0 };
-    let meridian = r * random.between(1.5, 8.0);
+    let meridian = r * random.range(1.5, 8.0);
     let (axis, at, height) = (DVec2::X, DVec2::ZERO, 0.0);
     let barrel = Gap::Barrel { radius: r, meridian, axis, at, height };
     let side = |gap: Gap| vec![rectangle([-x, -r], [x, r], gap)];
-    let flat = r * random.between(0.3, 0.8);
+    let flat = r * random.range(0.3, 0.8);
     let plane = vec![rectangle([-x, -flat], [x, flat], Gap::default())];
     let give = 0.5 * share * share * r;
     let mut distance = 2.0 * r;
@@ -522,7 +503,7 @@ fn posed(number: u64) -> Posed {
         }
         5 => {
             // A step on one face.
-            let cut = random.between(-0.4, 0.4) * l;
+            let cut = random.range(-0.4, 0.4) * l;
             let down = Gap::Plane { height: 0.5 * give * random.unit(), slope: DVec2::ZERO };
             let step = vec![
                 rectangle([-x, -flat], [cut, flat], Gap::default()),
@@ -532,7 +513,7 @@ fn posed(number: u64) -> Posed {
         }
         _ => (plane, side(sphere), vec![]),
     };
-    let size = force * random.between(0.1, 0.7);
+    let size = force * random.range(0.1, 0.7);
     let mut vector = || DVec3::new(random.signed(), random.signed(), random.signed());
     let (f, m) = (size * vector(), vector());
     let across = if spins.is_empty() { 0.3 * flat } else { r };

@@ -4,8 +4,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::brute::cases::{Case, Random, case};
+use crate::brute::cases::{Case, case};
 use crate::brute::{Problem, check};
+use crate::support::random::Random;
 use gripfast::mechanics::{Options, solve};
 use gripfast::model::Status;
 use rayon::prelude::*;

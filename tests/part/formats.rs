@@ -62,7 +62,7 @@ impl Scratch {
     fn read(&self, name: &str, bytes: &[u8], unit: Option<Unit>) -> Part {
         let path = self.0.path().join(name);
         std::fs::write(&path, bytes).unwrap();
-        let part = Part::read(&path, &ReadOptions { unit, ..Default::default() })
+        let part = Part::read(&path, &ReadOptions::default().with_unit(unit))
             .unwrap_or_else(|error| panic!("{error}"));
         let zipped = self.0.path().join(format!("{name}.gz"));
         let mut encoder = flate2::write::GzEncoder::new(
@@ -71,7 +71,7 @@ impl Scratch {
         );
         encoder.write_all(bytes).unwrap();
         encoder.finish().unwrap();
-        let unzipped = Part::read(&zipped, &ReadOptions { unit, ..Default::default() })
+        let unzipped = Part::read(&zipped, &ReadOptions::default().with_unit(unit))
             .unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(
             (&unzipped.mesh, &unzipped.faces, &unzipped.name),
@@ -336,8 +336,7 @@ fn binary_stl_reads_as_the_library_reads_it() {
     }
     let path = folder.join("parts/trimesh__1002_tray_bottom.STL"); // a text file
     let library = stl_io::read_stl(&mut std::fs::File::open(&path).unwrap()).unwrap();
-    let part =
-        Part::read(&path, &ReadOptions { unit: Some(Unit::Metre), ..Default::default() }).unwrap();
+    let part = Part::read(&path, &ReadOptions::default().with_unit(Some(Unit::Metre))).unwrap();
     assert_eq!(part.mesh.triangles.len(), library.faces.len());
     for (own, theirs) in part.mesh.triangles.iter().zip(&library.faces) {
         let mut own = own.map(|k| part.mesh.vertices[k as usize].to_array().map(|x| x as f32));

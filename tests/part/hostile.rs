@@ -21,7 +21,7 @@ fn bad(name: &str, bytes: &[u8]) -> Error {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
-    let options = ReadOptions { max_memory: Some(64 << 20), ..ReadOptions::default() };
+    let options = ReadOptions::default().with_max_memory(Some(64 << 20));
     let error = refused(&path, &options);
     assert!(error.to_string().contains(name), "{error}");
     error
@@ -262,10 +262,10 @@ fn gltf_buffers_stay_in_the_folder_of_the_part() {
         assert!(read("link", &usual).unwrap_err().to_string().contains("outside"));
         assert!(read("zero", &usual).is_err());
         std::os::unix::fs::symlink("/dev/zero", folder.join("zero")).unwrap();
-        let open = ReadOptions { outside_buffers: true, ..ReadOptions::default() };
+        let open = ReadOptions::default().with_outside_buffers(true);
         assert!(read("zero", &open).unwrap_err().to_string().contains("no file"));
     }
-    let open = ReadOptions { outside_buffers: true, ..ReadOptions::default() };
+    let open = ReadOptions::default().with_outside_buffers(true);
     assert!(read("../secret.bin", &open).is_ok());
     assert!(read("%zz", &usual).unwrap_err().to_string().contains("badly encoded"));
 }

@@ -44,12 +44,10 @@ fn gripper(folder: &Path, fingers: &str) -> gripfast::error::Result<Gripper> {
 }
 
 fn grips(part: &Part, gripper: &Gripper) -> BTreeSet<u64> {
-    let options = ProposeOptions {
-        spacing: Some(4e-3),
-        angle_step: 0.6,
-        edge_angles: false,
-        ..ProposeOptions::default()
-    };
+    let options = ProposeOptions::default()
+        .with_spacing(Some(4e-3))
+        .with_angle_step(0.6)
+        .with_edge_angles(false);
     let proposer = Proposer::new(part, gripper, &options).unwrap();
     // Special places follow from the exact outline of the bodies.
     let grid: usize =
@@ -174,7 +172,7 @@ fn palm_and_closing_fingers_follow_the_pads() {
              [[palm]]\nname = \"housing\"\nbox = [\"40mm\", \"60mm\", \"40mm\"]\nat = [\"-32mm\", \"0mm\", \"0mm\"]\n{motion}"
         );
         let gripper = gripper::parse(&text, "test").unwrap();
-        let options = ProposeOptions { spacing: Some(1e-3), ..ProposeOptions::default() };
+        let options = ProposeOptions::default().with_spacing(Some(1e-3));
         let grips = Proposer::new(&part, &gripper, &options).unwrap().flat_map(|c| c.grips);
         grips
             .filter(|grip| {

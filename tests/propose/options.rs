@@ -121,9 +121,8 @@ fn the_answer_does_not_depend_on_threads_or_chunks() {
     assert!(!reference.0.is_empty());
     for (threads, chunk) in [(1, 100), (3, 1), (2, 1_000_000)] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let found = pool.install(|| {
-            run(&part, &gripper, &ProposeOptions { chunk, ..ProposeOptions::default() })
-        });
+        let found =
+            pool.install(|| run(&part, &gripper, &ProposeOptions::default().with_chunk(chunk)));
         assert_eq!(found.1, reference.1);
         assert_eq!(
             found.1.candidates,
@@ -137,8 +136,7 @@ fn the_answer_does_not_depend_on_threads_or_chunks() {
 fn flips_are_marked_and_not_counted() {
     let part = cuboid(0.06, 0.04, 0.03);
     let (plain, plain_tally) = run(&part, &generic(), &ProposeOptions::default());
-    let (both, tally) =
-        run(&part, &generic(), &ProposeOptions { flips: true, ..ProposeOptions::default() });
+    let (both, tally) = run(&part, &generic(), &ProposeOptions::default().with_flips(true));
     assert_eq!(
         (both.len(), tally.grips, tally.candidates),
         (2 * plain.len(), plain_tally.grips, plain_tally.candidates)
@@ -314,7 +312,7 @@ fn bad_options_are_refused() {
 fn inside_grips_open_into_the_channel() {
     let part = channel();
     let gripper = generic();
-    let options = ProposeOptions { outside: false, inside: true, ..ProposeOptions::default() };
+    let options = ProposeOptions::default().with_outside(false).with_inside(true);
     let (grips, tally) = run(&part, &gripper, &options);
     assert_eq!(tally.pairs, 1, "{tally:?}");
     assert!(!grips.is_empty(), "{tally:?}");
@@ -363,11 +361,9 @@ fn inside_grips_open_into_the_channel() {
 fn explanations_agree_with_the_run() {
     let part = channel();
     let gripper = generic();
-    let options = ProposeOptions {
-        ground: Some(Ground { normal: DVec3::Y, offset: -0.02 }),
-        max_offset: Some(0.05),
-        ..ProposeOptions::default()
-    };
+    let options = ProposeOptions::default()
+        .with_ground(Some(Ground { normal: DVec3::Y, offset: -0.02 }))
+        .with_max_offset(Some(0.05));
     let mut proposer = Proposer::new(&part, &gripper, &options).unwrap();
     let grips: std::collections::HashMap<u64, Grip> =
         proposer.by_ref().flat_map(|chunk| chunk.grips).map(|grip| (grip.id, grip)).collect();

@@ -3,7 +3,7 @@
 
 use crate::interference::clip_leaves;
 use glam::{DVec2, DVec3};
-use gripfast::backend::{Backend, ScoreOptions, SeedSet};
+use gripfast::backend::{Backend, SeedSet};
 use gripfast::geometry::{Bounds2, contains, patch_area, ring_area};
 use gripfast::gripper::{self, Gripper, Jaw, Shape};
 use gripfast::load::LoadSet;
@@ -155,14 +155,8 @@ fn refined(part: &Part, times: u32) -> Part {
 fn scores(part: &Part, gripper: &Gripper, grips: Vec<Grip>) -> Vec<RankedGrip> {
     let mass = part.mass_properties(0.3 / part.mass_properties(1.0).volume);
     let loads = LoadSet::parse("loads", "gravity:26").unwrap().cases(&mass).unwrap();
-    let settings = Settings {
-        force: gripper.force[1] / 4.0,
-        weights: Weights::default(),
-        delta: 0.0,
-        mu_c: 0.0,
-        pad_friction: gripper.pad_friction,
-        score: ScoreOptions::default(),
-    };
+    let settings =
+        Settings::of_force(gripper.force[1] / 4.0).with_pad_friction(gripper.pad_friction);
     Assessor {
         loads: &loads,
         mass,

@@ -37,11 +37,9 @@ fn trial(path: &str) -> Option<Part> {
 
 /// From above, on the table z = 0.
 fn on_a_table() -> ProposeOptions {
-    ProposeOptions {
-        approach_cone: Some(Cone { axis: DVec3::NEG_Z, half_angle: 2_f64.to_radians() }),
-        ground: Some(Ground { normal: DVec3::Z, offset: 0.0 }),
-        ..ProposeOptions::default()
-    }
+    ProposeOptions::default()
+        .with_approach_cone(Some(Cone { axis: DVec3::NEG_Z, half_angle: 2_f64.to_radians() }))
+        .with_ground(Some(Ground { normal: DVec3::Z, offset: 0.0 }))
 }
 
 /// How far the lowest body of a finger stands below the pads' middle in an approach from above.
@@ -61,7 +59,7 @@ fn plates_on_a_table_are_gripped_from_above_at_any_spacing() {
             // Of the pads stands above the table what the fingertips below them leave.
             let covered = (height - (lowest(&gripper) - pad)).min(2.0 * pad);
             for spacing in [None, Some(0.009), Some(0.037)] {
-                let options = ProposeOptions { spacing, ..on_a_table() };
+                let options = on_a_table().with_spacing(spacing);
                 let (grips, tally) = run(&plate, &gripper, &options);
                 let place = format!("{name}, {height} m, {spacing:?}: {tally:?}");
                 if covered < 0.25 * height.min(2.0 * pad) {
@@ -126,7 +124,7 @@ fn the_numbers_of_the_grid_come_first_and_special_places_follow() {
         let at = grip.part_from_grip.origin.abs();
         (at.x - (0.03 - half)).abs() < 1e-9 && (at.z - half).abs() < 1e-9
     };
-    let odd = ProposeOptions { spacing: Some(0.0077), ..ProposeOptions::default() };
+    let odd = ProposeOptions::default().with_spacing(Some(0.0077));
     assert!(run(&part, &gripper, &odd).0.iter().any(|grip| corner(&grip)));
 }
 
@@ -135,7 +133,7 @@ fn limits_are_options_and_are_counted_by_themselves() {
     let gripper = gripper::find("robotiq-2f85").unwrap();
     let width = |width: f64| block(DVec3::new(width * 1e-3, 0.1, 0.1));
     let with = |part: &Part, min_opening: f64| {
-        run(part, &gripper, &ProposeOptions { min_opening, ..ProposeOptions::default() })
+        run(part, &gripper, &ProposeOptions::default().with_min_opening(min_opening))
     };
     let standard = ProposeOptions::default();
     assert!(!run(&width(84.8), &gripper, &standard).0.is_empty());
@@ -155,7 +153,7 @@ fn limits_are_options_and_are_counted_by_themselves() {
     };
     let (found, tally) = flats(&standard);
     assert!(found == 0 && tally.rejections["pad_share_too_small"] > 0, "{tally:?}");
-    let all = ProposeOptions { min_pad_share: 0.0, ..ProposeOptions::default() };
+    let all = ProposeOptions::default().with_min_pad_share(0.0);
     assert!(tally.remarks(&gripper, &standard).iter().any(|remark| remark.contains("2.00 %")));
     assert!(flats(&all).0 > 0, "{:?}", flats(&all).1);
 }
@@ -164,11 +162,9 @@ fn limits_are_options_and_are_counted_by_themselves() {
 fn the_nearest_approach_to_an_empty_cone_is_named() {
     let part = block(DVec3::new(0.06, 0.04, 0.03));
     let axis = DVec3::new(1.0, 0.01, -1.0);
-    let options = ProposeOptions {
-        approach_cone: Some(Cone { axis, half_angle: 0.1_f64.to_radians() }),
-        angle_step: 90_f64.to_radians(),
-        ..ProposeOptions::default()
-    };
+    let options = ProposeOptions::default()
+        .with_approach_cone(Some(Cone { axis, half_angle: 0.1_f64.to_radians() }))
+        .with_angle_step(90_f64.to_radians());
     let gripper = gripper::find("generic").unwrap();
     let (grips, tally) = run(&part, &gripper, &options);
     let nearest = tally.nearest_approach.unwrap();
@@ -181,11 +177,8 @@ fn the_nearest_approach_to_an_empty_cone_is_named() {
 fn a_pad_over_two_lands_touches_both() {
     let Some(part) = trial("faces/lands_groove.stl") else { return };
     let gripper = gripper::find("robotiq-2f85").unwrap();
-    let options = ProposeOptions {
-        spacing: Some(0.005),
-        angle_step: 90_f64.to_radians(),
-        ..ProposeOptions::default()
-    };
+    let options =
+        ProposeOptions::default().with_spacing(Some(0.005)).with_angle_step(90_f64.to_radians());
     let (grips, _) = run(&part, &gripper, &options);
     // The lands reach from x = 0 to 10 and from 12 to 22 mm on the plane y = 10 mm.
     let place = DVec3::new(0.015, 0.005, 0.015);
@@ -237,8 +230,7 @@ fn two_tessellations_of_a_part_give_the_same_angles() {
     for file in files {
         let Some(path) = reference(file) else { return };
         let part = Part::read(&path, &ReadOptions::default()).unwrap();
-        let options =
-            ProposeOptions { angle_step: 90_f64.to_radians(), ..ProposeOptions::default() };
+        let options = ProposeOptions::default().with_angle_step(90_f64.to_radians());
         let proposer = Proposer::new(&part, &gripper, &options).unwrap();
         let mut angles: Vec<(i64, Vec<i64>)> = proposer
             .sites()

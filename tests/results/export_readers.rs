@@ -215,7 +215,7 @@ fn native_json_and_json_lines() {
 fn csv() {
     let set = grips::grip_set(5);
     for convention in Convention::ALL {
-        let options = Options { convention: Some(convention.0), ..Options::default() };
+        let options = Options::default().with_convention(Some(convention.0));
         let Some(found) =
             round_trip(&set, Format::Csv, "grips.csv", ("read_csv.py", "csv"), &options, 1e-15)
         else {
@@ -234,7 +234,7 @@ fn csv() {
 #[test]
 fn parquet() {
     let set = grips::grip_set(5);
-    let options = Options { origin: Origin::Behind(0.05), ..Options::default() };
+    let options = Options::default().with_origin(Origin::Behind(0.05));
     let Some(found) = round_trip(
         &set,
         Format::Parquet,
@@ -264,11 +264,9 @@ fn parquet() {
 #[test]
 fn isaac_grasp() {
     let set = grips::grip_set(5);
-    let options = Options {
-        joints: vec![Joint { name: "joint: \"1\"".into(), ..Joint::default() }],
-        origin: Origin::Stated(Stated::Flange),
-        ..Options::default()
-    };
+    let options = Options::default()
+        .with_joints(vec![Joint { name: "joint: \"1\"".into(), ..Joint::default() }])
+        .with_origin(Origin::Stated(Stated::Flange));
     let Some(found) = round_trip(
         &set,
         Format::IsaacGrasp,
@@ -301,7 +299,7 @@ fn isaac_grasp() {
 fn moveit() {
     let mut set = grips::grip_set(5);
     set.grips[4].grip.part_from_grip.rotation = DMat3::IDENTITY;
-    let options = Options { opening: Some(0.05), ..Options::default() };
+    let options = Options::default().with_opening(Some(0.05));
     let Some(found) =
         round_trip(&set, Format::MoveIt, "grips.yaml", ("read_moveit.py", "yaml"), &options, 1e-15)
     else {
@@ -317,7 +315,7 @@ fn moveit() {
 #[test]
 fn graspgen() {
     let set = grips::grip_set(5);
-    let options = Options { pad_friction: Some(0.1), ..Options::default() };
+    let options = Options::default().with_pad_friction(Some(0.1));
     let Some(found) = round_trip(
         &set,
         Format::GraspGen,
@@ -337,7 +335,7 @@ fn graspnet() {
     let mut set = grips::grip_set(5);
     set.grips[4].worst.mu_s = Some(0.0);
     for convention in [None, Some(Convention::GraspGen)] {
-        let options = Options { convention, ..Options::default() };
+        let options = Options::default().with_convention(convention);
         let Some(found) = round_trip(
             &set,
             Format::GraspNet,

@@ -61,7 +61,7 @@ fn no_friction_needed_is_best_and_weights_count() {
         [1, 0]
     );
     let weights = Weights { k1: 0.0, k2: 2.0 };
-    let found = rank(list, DVec3::ZERO, SIZE, &Options { weights, ..Options::default() });
+    let found = rank(list, DVec3::ZERO, SIZE, &Options::default().with_weights(weights));
     assert_eq!(ids(&found.grips), [0, 1, 2]);
     assert_eq!(found.grips[0].score, Some(3.0));
 }
@@ -107,8 +107,7 @@ fn duplicates_by_symmetry_are_merged_only_when_they_score_and_look_the_same() {
         at(3, com + DVec3::new(-0.01, 0.005, 0.0), 0.2), // elsewhere along the approach
         at(4, com + DVec3::new(0.01, 0.005, 0.0), 0.25), // scores otherwise
     ];
-    let found =
-        rank(list.clone(), com, SIZE, &Options { merge_duplicates: true, ..Options::default() });
+    let found = rank(list.clone(), com, SIZE, &Options::default().with_merge_duplicates(true));
     assert_eq!(ids(&found.grips), [0, 3, 4]);
     assert_eq!(found.grips[0].merged, [1, 2]);
     assert_eq!(found.rejections["duplicate"], 2);
@@ -124,7 +123,7 @@ fn a_diverse_choice_keeps_the_best_and_leaves_the_neighbourhood() {
     let mut turned = at(100, DVec3::ZERO, 0.9);
     turned.grip.part_from_grip.rotation = DMat3::from_rotation_z(std::f64::consts::PI);
     list.push(turned);
-    let options = Options { top: Some(3), diverse: true, ..Options::default() };
+    let options = Options::default().with_top(Some(3)).with_diverse(true);
     let found = rank(list.clone(), DVec3::ZERO, SIZE, &options);
     assert_eq!(found.grips.len(), 3);
     assert_eq!(found.grips[0].grip.id, 0);
@@ -133,20 +132,11 @@ fn a_diverse_choice_keeps_the_best_and_leaves_the_neighbourhood() {
     assert_eq!(found.grips[2].rank, 101, "ranks are those of the whole list");
     assert_eq!(found.ranked, 101);
     assert_eq!(
-        ids(&rank(
-            list.clone(),
-            DVec3::ZERO,
-            SIZE,
-            &Options { top: Some(3), ..Options::default() }
-        )
-        .grips),
+        ids(&rank(list.clone(), DVec3::ZERO, SIZE, &Options::default().with_top(Some(3))).grips),
         [0, 1, 2]
     );
     // More than there are: all of them, in order.
-    assert_eq!(
-        rank(list, DVec3::ZERO, SIZE, &Options { top: Some(500), ..options }).grips.len(),
-        101
-    );
+    assert_eq!(rank(list, DVec3::ZERO, SIZE, &options.with_top(Some(500))).grips.len(), 101);
     assert_eq!(rank(vec![], DVec3::ZERO, SIZE, &options).grips.len(), 0);
 }
 
@@ -167,7 +157,7 @@ proptest! {
         };
         let mut shuffled = make(true);
         shuffled.sort_by_key(|grip| shuffle[grip.grip.id as usize]);
-        let options = Options { merge_duplicates: true, top: Some(10), diverse, ..Options::default() };
+        let options = Options::default().with_merge_duplicates(true).with_top(Some(10)).with_diverse(diverse);
         let one = rank(make(false), DVec3::ZERO, SIZE, &options);
         let two = rank(shuffled, DVec3::ZERO, SIZE, &options);
         prop_assert_eq!(ids(&one.grips), ids(&two.grips));

@@ -23,7 +23,9 @@ fn down(id: u64, origin: DVec3) -> RankedGrip {
 }
 
 fn set(grips: Vec<RankedGrip>) -> GripSet {
-    GripSet { grips, ..grips::grip_set(0) }
+    let mut set = grips::grip_set(0);
+    set.grips = grips;
+    set
 }
 
 fn boxed(name: &str, half: DVec3, origin: DVec3) -> Obstacle {

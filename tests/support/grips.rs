@@ -12,8 +12,7 @@ use gripfast::model::{Bounds, Contact, Frame, Grip, Polygon, Pressure, Slip, Sta
 use gripfast::part::MassProperties;
 use gripfast::request::Request;
 use gripfast::results::{
-    FORMAT, GripSet, LoadCase, LoadScore, PartSummary, Provenance, RankedGrip, Resolved, Summary,
-    VERSION,
+    GripSet, LoadCase, LoadScore, PartSummary, Provenance, RankedGrip, Resolved, Summary,
 };
 use gripfast::units::{Force, Length, Mass};
 
@@ -46,9 +45,8 @@ pub(crate) fn grip(id: u64, part_from_grip: Frame, mu_s: f64) -> RankedGrip {
         face_i: vec![Polygon { holes: vec![hole], ..square(0.005) }],
         face_ii: vec![square(0.004)],
     };
-    RankedGrip {
-        rank: 0,
-        grip: Grip {
+    let mut ranked = RankedGrip::new(
+        Grip {
             id,
             part_from_grip,
             width: 0.02 + 1e-4 * id as f64,
@@ -59,8 +57,7 @@ pub(crate) fn grip(id: u64, part_from_grip: Frame, mu_s: f64) -> RankedGrip {
             inside: false,
             flip_of: None,
         },
-        score: None,
-        worst: LoadScore {
+        LoadScore {
             load: u32::try_from(id % 2).unwrap(),
             wrench: Wrench {
                 force: DVec3::new(1.0, -2.0, 0.5),
@@ -80,18 +77,16 @@ pub(crate) fn grip(id: u64, part_from_grip: Frame, mu_s: f64) -> RankedGrip {
             }),
             residual: 1e-13,
         },
-        alpha: 0.25,
-        delta_d: 0.001,
-        contact_share: 0.9,
-        twist_margin: 0.8,
-        safety: Some(0.6 / mu_s),
-        force_needed: Some(100.0 * mu_s / 0.6),
-        merged: Vec::new(),
-        load_multiple: Some(0.6 / mu_s),
-        earlier: None,
-        pose_noise: None,
-        mu_by_load: vec![Some(mu_s), None],
-    }
+    );
+    ranked.alpha = 0.25;
+    ranked.delta_d = 0.001;
+    ranked.contact_share = 0.9;
+    ranked.twist_margin = 0.8;
+    ranked.safety = Some(0.6 / mu_s);
+    ranked.force_needed = Some(100.0 * mu_s / 0.6);
+    ranked.load_multiple = Some(0.6 / mu_s);
+    ranked.mu_by_load = vec![Some(mu_s), None];
+    ranked
 }
 
 /// `count` grips with various poses, ranked, `mu_s` 0.05, 0.10, ...
@@ -121,11 +116,9 @@ pub(crate) fn grip_set(count: u64) -> GripSet {
             0.06_f64.powi(2) + 0.04_f64.powi(2),
         ) * (mass / 12.0),
     );
-    GripSet {
-        format: FORMAT.into(),
-        version: VERSION,
-        provenance: provenance(),
-        part: PartSummary {
+    let mut set = GripSet::new(
+        provenance(),
+        PartSummary {
             file: "box.stl".into(),
             unit_m: 0.001,
             triangles: 12,
@@ -138,8 +131,8 @@ pub(crate) fn grip_set(count: u64) -> GripSet {
                 inertia,
             },
         },
-        gripper: serde_json::to_value(gripper()).unwrap(),
-        loads: vec![
+        serde_json::to_value(gripper()).unwrap(),
+        vec![
             LoadCase {
                 name: "gravity -z".into(),
                 wrench: Wrench { force: DVec3::new(0.0, 0.0, -1.27), moment: DVec3::ZERO },
@@ -149,15 +142,16 @@ pub(crate) fn grip_set(count: u64) -> GripSet {
                 wrench: Wrench { force: DVec3::new(0.0, 0.0, 1.27), moment: DVec3::ZERO },
             },
         ],
-        summary: Summary {
-            pairs: 3,
-            candidates: 100,
-            ranked: count,
-            rejections: BTreeMap::from([("twisted_out".to_owned(), 5)]),
-            comparison: None,
-        },
-        grips,
-    }
+    );
+    set.summary = Summary {
+        pairs: 3,
+        candidates: 100,
+        ranked: count,
+        rejections: BTreeMap::from([("twisted_out".to_owned(), 5)]),
+        comparison: None,
+    };
+    set.grips = grips;
+    set
 }
 
 fn provenance() -> Provenance {

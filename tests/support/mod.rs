@@ -5,6 +5,7 @@
 use std::path::{Path, PathBuf};
 
 pub(crate) mod grips;
+pub(crate) mod random;
 pub(crate) mod report;
 
 /// The root of the checkout, from whichever package the suite belongs to.

@@ -16,7 +16,7 @@ use gripfast::model::{Contact, Frame, Grip, Patch, Status};
 use gripfast::part::{FacePair, Mesh, Part, ReadOptions};
 use gripfast::request::Request;
 use gripfast::results::{
-    FORMAT, GripSet, LoadScore, PartSummary, Provenance, RankedGrip, Resolved, Summary, VERSION,
+    GripSet, LoadScore, PartSummary, Provenance, RankedGrip, Resolved, Summary,
 };
 use gripfast::units::Force;
 
@@ -79,11 +79,9 @@ pub(crate) fn plan(
     }
     summary.ranked = grips.len() as u64;
     let (bbox_min, bbox_max) = part.mesh.bounding_box();
-    GripSet {
-        format: FORMAT.into(),
-        version: VERSION,
-        provenance: provenance(part, loads),
-        part: PartSummary {
+    let mut set = GripSet::new(
+        provenance(part, loads),
+        PartSummary {
             file: part.file.display().to_string(),
             unit_m: part.unit_m,
             triangles: part.mesh.triangles.len(),
@@ -91,11 +89,12 @@ pub(crate) fn plan(
             bbox_max,
             mass,
         },
-        gripper: serde_json::to_value(&gripper).unwrap(),
-        loads: cases,
-        summary,
-        grips,
-    }
+        serde_json::to_value(&gripper).unwrap(),
+        cases,
+    );
+    set.summary = summary;
+    set.grips = grips;
+    set
 }
 
 fn provenance(part: &Part, loads: &str) -> Provenance {
@@ -178,10 +177,9 @@ fn score(
     let share = (worst.contact_area_i / area(&grip.contact.face_i))
         .min(worst.contact_area_ii / area(&grip.contact.face_ii));
     let friction = gripper.pad_friction;
-    RankedGrip {
-        rank: 0,
-        score: worst.mu_s.filter(|mu| *mu > 0.0).map(f64::recip),
-        worst: LoadScore {
+    let mut ranked = RankedGrip::new(
+        grip.clone(),
+        LoadScore {
             load: load as u32,
             wrench: wrench(load),
             status: worst.status,
@@ -191,31 +189,32 @@ fn score(
             bounds: worst.bounds.filter(|bounds| bounds.upper.is_finite()),
             residual: worst.residual,
         },
-        alpha: twist_out::alpha(grip.width, lever, 0.0, 0.0),
-        delta_d: twist_out::delta_d(grip.width, lever),
-        contact_share: if worst.status == Status::TwistedOut { 0.0 } else { share.min(1.0) },
-        twist_margin: levers.margin(FORCE, &wrench(load)),
-        safety: worst
-            .mu_s
-            .zip(friction)
-            .filter(|(mu, _)| *mu > 0.0)
-            .map(|(mu, friction)| friction / mu),
-        force_needed: friction.and_then(|friction| {
-            inverse::force_needed(&pads, grip.distance(), &wrench(load), friction, &options)
-        }),
-        merged: Vec::new(),
-        load_multiple: friction.map(|friction| {
-            inverse::load_multiple(&pads, grip.distance(), FORCE, &wrench(load), friction, &options)
-        }),
-        earlier: None,
-        pose_noise: None,
-        mu_by_load: if cases.len() > 1 {
-            scores.iter().map(|score| score.mu_s).collect()
-        } else {
-            Vec::new()
-        },
-        grip,
-    }
+    );
+    let score = worst.mu_s.filter(|mu| *mu > 0.0).map(f64::recip);
+    let alpha = twist_out::alpha(grip.width, lever, 0.0, 0.0);
+    let delta_d = twist_out::delta_d(grip.width, lever);
+    let contact_share = if worst.status == Status::TwistedOut { 0.0 } else { share.min(1.0) };
+    let twist_margin = levers.margin(FORCE, &wrench(load));
+    let safety =
+        worst.mu_s.zip(friction).filter(|(mu, _)| *mu > 0.0).map(|(mu, friction)| friction / mu);
+    let force_needed = friction.and_then(|friction| {
+        inverse::force_needed(&pads, grip.distance(), &wrench(load), friction, &options)
+    });
+    let load_multiple = friction.map(|friction| {
+        inverse::load_multiple(&pads, grip.distance(), FORCE, &wrench(load), friction, &options)
+    });
+    let mu_by_load =
+        if cases.len() > 1 { scores.iter().map(|score| score.mu_s).collect() } else { Vec::new() };
+    ranked.score = score;
+    ranked.alpha = alpha;
+    ranked.delta_d = delta_d;
+    ranked.contact_share = contact_share;
+    ranked.twist_margin = twist_margin;
+    ranked.safety = safety;
+    ranked.force_needed = force_needed;
+    ranked.load_multiple = load_multiple;
+    ranked.mu_by_load = mu_by_load;
+    ranked
 }
 
 /// The same set repeated to `n` grips with new ids and ranks: only its size means anything.

@@ -5,31 +5,18 @@
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use gripfast::backend::{Backend, ScoreOptions, SeedSet};
+use gripfast::backend::{Backend, SeedSet};
 use gripfast::gripper;
 use gripfast::load::LoadSet;
 use gripfast::part::{Part, ReadOptions, Unit};
 use gripfast::plan::{Assessor, Settings};
 use gripfast::propose::{ProposeOptions, Proposer};
-use gripfast::rank::{self, Weights};
+use gripfast::rank;
 use gripfast::results::RankedGrip;
 
+use crate::support::random::Random;
+
 type Triangle = [DVec3; 3];
-
-/// A multiplicative congruential generator: the defects are the same on every machine.
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn below(&mut self, count: usize) -> usize {
-        (self.unit() * count as f64) as usize
-    }
-}
 
 fn shared() -> Option<PathBuf> {
     let folder = crate::support::root().join("../shared/parts");
@@ -114,7 +101,7 @@ fn ascii(triangles: &[Triangle], end: &str, solids: usize) -> Vec<u8> {
 fn read(folder: &Path, bytes: &[u8], unit: Option<Unit>) -> gripfast::error::Result<Part> {
     let path = folder.join("spoiled.stl");
     std::fs::write(&path, bytes).unwrap();
-    Part::read(&path, &ReadOptions { unit, ..Default::default() })
+    Part::read(&path, &ReadOptions::default().with_unit(unit))
 }
 
 fn diagonal(triangles: &[Triangle]) -> f64 {
@@ -191,23 +178,14 @@ fn assert_contains(name: &str, mode: &str, clean: &Part, dirty: &Part, moved: DV
 /// All grips of a coarse set, scored and in order.
 fn ranking(part: &Part) -> Vec<RankedGrip> {
     let gripper = gripper::find("generic").unwrap();
-    let options = ProposeOptions {
-        spacing: Some(15e-3),
-        angle_step: std::f64::consts::FRAC_PI_2,
-        ..ProposeOptions::default()
-    };
+    let options = ProposeOptions::default()
+        .with_spacing(Some(15e-3))
+        .with_angle_step(std::f64::consts::FRAC_PI_2);
     let grips =
         Proposer::new(part, &gripper, &options).unwrap().flat_map(|chunk| chunk.grips).collect();
     let mass = part.mass_properties(0.2 / part.mass_properties(1.0).volume);
     let loads = LoadSet::parse("loads", "gravity").unwrap().cases(&mass).unwrap();
-    let settings = Settings {
-        force: 40.0,
-        weights: Weights::default(),
-        delta: 0.0,
-        mu_c: 0.0,
-        pad_friction: gripper.pad_friction,
-        score: ScoreOptions::default(),
-    };
+    let settings = Settings::of_force(40.0).with_pad_friction(gripper.pad_friction);
     let ranked = Assessor {
         loads: &loads,
         mass,
@@ -275,7 +253,7 @@ fn defects_that_leave_the_shape_alone_change_nothing() {
             "{name}: {:?}",
             clean.health.lines()
         );
-        let mut random = Random(7);
+        let mut random = Random::new(7);
         let order = if RANKED.contains(&name) { ranking(&clean) } else { Vec::new() };
         assert!(!RANKED.contains(&name) || order.len() > 30, "{name}: {} grips", order.len());
         let check = |mode: &str, bytes: Vec<u8>| {
@@ -398,7 +376,7 @@ fn defects_that_change_the_shape_are_reported() {
         let clean = read(scratch.path(), &plain(&t), None).unwrap();
         let read = |bytes: Vec<u8>| read(scratch.path(), &bytes, None);
         let size = diagonal(&t);
-        let mut random = Random(11);
+        let mut random = Random::new(11);
 
         let holed: Vec<Triangle> = t
             .iter()
@@ -543,7 +521,7 @@ fn noise_is_told_with_its_size_and_a_remedy() {
     for name in ["l_bracket", "shaft_key"] {
         let t = load(&crate::support::root().join(format!("data/parts/{name}.stl")));
         let size = diagonal(&t);
-        let mut random = Random(5);
+        let mut random = Random::new(5);
         let mut moves = std::collections::HashMap::new();
         let spoiled: Vec<Triangle> = t
             .iter()

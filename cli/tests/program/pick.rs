@@ -7,7 +7,6 @@ use assert_cmd::Command;
 use glam::{DMat3, DVec3};
 use gripfast::model::Frame;
 use gripfast::pick::{Opening, Reach, Retreat, Scene, Solid};
-use gripfast::results::GripSet;
 
 const SCENE: &str = r#"
 [part]
@@ -47,7 +46,7 @@ const OBJ: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4
 fn folder(scene: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let down = DMat3::from_cols(DVec3::NEG_Z, DVec3::X, DVec3::NEG_Y);
-    let mut set = GripSet { grips: Vec::new(), ..grips::grip_set(0) };
+    let mut set = grips::grip_set(0);
     for id in 0..30 {
         let mut grip = grips::grip(
             id,

@@ -5,7 +5,7 @@ use std::process::Output;
 
 use assert_cmd::Command;
 use glam::{DVec2, DVec3};
-use gripfast::backend::{Backend, ScoreOptions, SeedSet};
+use gripfast::backend::{Backend, SeedSet};
 use gripfast::export::Format;
 use gripfast::geometry::patch_area;
 use gripfast::gripper::{self, Gripper};
@@ -15,7 +15,6 @@ use gripfast::part::{Part, ReadOptions, Unit};
 use gripfast::plan::noise::Noise;
 use gripfast::plan::{Assessor, Settings};
 use gripfast::propose::{Displacement, ProposeOptions, Proposer};
-use gripfast::rank::Weights;
 use gripfast::results::{GripSet, LoadCase, RankedGrip};
 
 const BRACKET: [&str; 10] = [
@@ -262,14 +261,11 @@ fn box_and_grips(folder: &Path, gripper: &Gripper) -> (Part, ProposeOptions, Vec
     write_box(&file, DVec3::new(80.0, 60.0, 20.0));
     let part = Part::read(
         &file,
-        &ReadOptions {
-            unit: Some(Unit::ALL.into_iter().find(|unit| unit.metres() == 1e-3).unwrap()),
-            ..ReadOptions::default()
-        },
+        &ReadOptions::default()
+            .with_unit(Some(Unit::ALL.into_iter().find(|unit| unit.metres() == 1e-3).unwrap())),
     )
     .unwrap();
-    let options =
-        ProposeOptions { angle_step: 0.5, spacing: Some(0.004), ..ProposeOptions::default() };
+    let options = ProposeOptions::default().with_angle_step(0.5).with_spacing(Some(0.004));
     let grips: Vec<Grip> = Proposer::new(&part, gripper, &options)
         .unwrap()
         .flat_map(|chunk| chunk.grips)
@@ -316,14 +312,7 @@ fn displaced_grips_agree_with_pads_clipped_by_hand() {
                 wrench: Wrench { force, moment: DVec3::new(0.01, 0.0, -0.02) },
             })
             .to_vec();
-    let settings = Settings {
-        force: 40.0,
-        weights: Weights::default(),
-        delta: 0.0,
-        mu_c: 0.0,
-        pad_friction: None,
-        score: ScoreOptions::default(),
-    };
+    let settings = Settings::of_force(40.0);
     let seeds = SeedSet::with_at_least(81).unwrap();
     let assessor = Assessor {
         loads: &loads,

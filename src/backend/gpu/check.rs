@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DMat2, DVec2, DVec3};
 
 use super::super::job::Job;
-use super::super::layout::{BOUNDED, COUPLED, LEAST_DISSIPATION};
+use super::super::layout::{BOUNDED, COUPLED, LEAST_DISSIPATION, LoadRecord, SeedRecord};
 use super::super::prepare::{Contacts, Records, not_searched};
 use super::super::seeds::{NEGATED, RING};
 use super::super::table::contact_basis;
@@ -177,16 +177,16 @@ fn upper(w: DVec3, gradients: &[DVec3], seeds: &SeedSet, best: usize) -> f64 {
 }
 
 /// A small generator, so that the contacts are the same everywhere.
-struct Random(u64);
+pub(super) struct Random(pub(super) u64);
 
 impl Random {
-    fn within(&mut self, low: f64, high: f64) -> f64 {
+    pub(super) fn within(&mut self, low: f64, high: f64) -> f64 {
         self.0 =
             self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         low + (high - low) * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn vector(&mut self) -> DVec3 {
+    pub(super) fn vector(&mut self) -> DVec3 {
         DVec3::new(self.within(-1.0, 1.0), self.within(-1.0, 1.0), self.within(-1.0, 1.0))
     }
 
@@ -222,6 +222,116 @@ impl Random {
     }
 }
 
+/// Contacts under a hundred loads each; every second one with different faces.
+fn random_grips(contacts: usize) -> Vec<(Arc<Contact>, Vec<Wrench>)> {
+    let mut random = Random(31);
+    let wrench = |random: &mut Random| {
+        let size = 40.0 * 10_f64.powf(random.within(-2.0, -0.3));
+        Wrench { force: random.vector() * size, moment: random.vector() * size * 0.01 }
+    };
+    (0..contacts)
+        .map(|i| {
+            let contact = Arc::new(random.contact(i % 2 == 0));
+            (contact, (0..100).map(|_| wrench(&mut random)).collect())
+        })
+        .collect()
+}
+
+/// Largest deviations so far.
+#[derive(Default)]
+struct Compared {
+    /// Dissipation, and gradients of weight 1 and of weights x1 and x2.
+    basis: [Most; 3],
+    /// Lower bound, upper bound, interpolated twist.
+    bounds: [Most; 3],
+    other_twist: usize,
+    other_status: usize,
+    loads: usize,
+    bounded: usize,
+}
+
+impl Compared {
+    /// The integrals of one contact: of the device (`found`) and the processor (`twin`).
+    fn basis(&mut self, exact: &Exact, twin: &[f32], found: &[f32], seeds: &SeedSet) {
+        for (place, (&twin, &found)) in twin.iter().zip(found).enumerate() {
+            let (k, weight, part) = (place / 12 % seeds.len(), place / 4 % 3, place % 4);
+            let on = place / 12 / seeds.len();
+            let g = exact.basis[on][k];
+            let v = &seeds.twists()[k];
+            let (value, scale) = if part < 3 {
+                (g[weight][part], exact.area[on])
+            } else {
+                ((0..3).map(|m| f64::from(v[m]) * g[weight][m]).sum(), exact.area[on])
+            };
+            let most = match (weight, part) {
+                (0, 3) => &mut self.basis[0],
+                (0, _) => &mut self.basis[1],
+                _ => &mut self.basis[2],
+            };
+            let scale = if (weight, part) == (0, 3) { value } else { scale };
+            most.add(found, twin, value, scale);
+        }
+    }
+
+    /// The seed of one load: of the device and the processor.
+    fn load(
+        &mut self,
+        exact: &Exact,
+        load: &LoadRecord,
+        [found, twin]: [&SeedRecord; 2],
+        seeds: &SeedSet,
+    ) {
+        self.loads += 1;
+        self.other_status += usize::from(found.status != twin.status);
+        let same = found.best == twin.best;
+        self.other_twist += usize::from(!same);
+        let has_bounds = |status: u32| matches!(status, BOUNDED | COUPLED);
+        if !(has_bounds(found.status) && has_bounds(twin.status)) {
+            return;
+        }
+        self.bounded += 1;
+        let [f3, m1, m2] = [load.f3, load.m1, load.m2].map(f64::from);
+        let gradients = exact.gradients(f3, m1, m2);
+        let w = DVec3::from(load.wrench.map(f64::from));
+        let value = lower(w, &gradients, seeds);
+        self.bounds[0].add(found.lower, twin.lower, value, value);
+        let value = upper(w, &gradients, seeds, found.best as usize);
+        if same {
+            self.bounds[1].add(found.upper, twin.upper, value, value);
+            for m in 0..3 {
+                self.bounds[2].add(found.twist[m], twin.twist[m], 0.0, 1.0);
+            }
+        } else {
+            self.bounds[1].add(found.upper, found.upper, value, value);
+        }
+    }
+
+    fn check(&self) -> KernelCheck {
+        let Self { basis, bounds, .. } = self;
+        let largest = bounds[..2]
+            .iter()
+            .map(|most| most.from_exact.max(most.twin_from_exact))
+            .fold(0.0, f64::max);
+        let deviations = vec![
+            basis[0].of("fill_basis", "dissipation, relative", true),
+            basis[1].of("fill_basis", "weight 1, of the area", true),
+            basis[2].of("fill_basis", "weights x1 and x2, of the area", true),
+            bounds[0].of("search", "lower bound, relative", true),
+            bounds[1].of("search", "upper bound, relative", true),
+            bounds[2].of("search", "interpolated twist, absolute", false),
+        ];
+        KernelCheck {
+            deviations,
+            other_twist: self.other_twist,
+            other_status: self.other_status,
+            loads: self.loads,
+            bounded: self.bounded,
+            tolerance: F32_TOLERANCE,
+            largest,
+        }
+    }
+}
+
 impl Gpu {
     /// Runs both kernels on random contacts (half of them with different faces, at no distance so
     /// that friction does not couple, for double precision has no twin of that) and compares every
@@ -230,17 +340,7 @@ impl Gpu {
     /// # Errors
     /// [`crate::error::ErrorKind::Device`] when the device fails or leaves a record unwritten.
     pub fn check_kernels(&self, seeds: &SeedSet, contacts: usize) -> Result<KernelCheck> {
-        let mut random = Random(31);
-        let grips: Vec<(Arc<Contact>, Vec<Wrench>)> = (0..contacts)
-            .map(|i| {
-                let wrench = |random: &mut Random| {
-                    let size = 40.0 * 10_f64.powf(random.within(-2.0, -0.3));
-                    Wrench { force: random.vector() * size, moment: random.vector() * size * 0.01 }
-                };
-                let contact = Arc::new(random.contact(i % 2 == 0));
-                (contact, (0..100).map(|_| wrench(&mut random)).collect())
-            })
-            .collect();
+        let grips = random_grips(contacts);
         let problems: Vec<Problem<'_>> = grips
             .iter()
             .map(|(contact, wrenches)| Problem { contact, distance: 0.0, force: 40.0, wrenches })
@@ -249,8 +349,7 @@ impl Gpu {
         let made = Contacts::new(&batch.problems)?;
         let job = Job::new(&made, &batch, seeds)?;
         let mut answers = vec![not_searched(SeedStatus::NoContact); job.loads];
-        let (mut basis, mut bounds) = ([Most::default(); 3], [Most::default(); 3]);
-        let (mut other_twist, mut other_status, mut loads, mut bounded) = (0, 0, 0, 0);
+        let mut compared = Compared::default();
         for mut plan in job.plans(self.limits(), &mut answers) {
             let chunk = job.build(&mut plan);
             let members: Vec<usize> = plan.iter().map(|(contact, _)| *contact).collect();
@@ -265,76 +364,20 @@ impl Gpu {
                     face(header.edges_ii, header.edges_end),
                 ];
                 let twin = contact_basis(header, edges, seeds.twists()).concat();
-                let first = header.basis as usize * 4;
-                for (place, (&twin, &found)) in twin.iter().zip(&found[first..]).enumerate() {
-                    let (k, weight, part) = (place / 12 % seeds.len(), place / 4 % 3, place % 4);
-                    let on = place / 12 / seeds.len();
-                    let g = exact.basis[on][k];
-                    let v = &seeds.twists()[k];
-                    let (value, scale) = if part < 3 {
-                        (g[weight][part], exact.area[on])
-                    } else {
-                        ((0..3).map(|m| f64::from(v[m]) * g[weight][m]).sum(), exact.area[on])
-                    };
-                    let most = match (weight, part) {
-                        (0, 3) => &mut basis[0],
-                        (0, _) => &mut basis[1],
-                        _ => &mut basis[2],
-                    };
-                    let scale = if (weight, part) == (0, 3) { value } else { scale };
-                    most.add(found, twin, value, scale);
-                }
+                compared.basis(&exact, &twin, &found[header.basis as usize * 4..], seeds);
                 let groups = chunk.groups.iter().filter(|group| group.contact == index);
                 for load in groups.flat_map(|group| group.first..group.first + group.count) {
-                    let (found, twin) = (&records[load as usize], &twins[load as usize]);
-                    let load = &chunk.loads[load as usize];
-                    loads += 1;
-                    other_status += usize::from(found.status != twin.status);
-                    let same = found.best == twin.best;
-                    other_twist += usize::from(!same);
-                    let has_bounds = |status: u32| matches!(status, BOUNDED | COUPLED);
-                    if !(has_bounds(found.status) && has_bounds(twin.status)) {
-                        continue;
-                    }
-                    bounded += 1;
-                    let [f3, m1, m2] = [load.f3, load.m1, load.m2].map(f64::from);
-                    let gradients = exact.gradients(f3, m1, m2);
-                    let w = DVec3::from(load.wrench.map(f64::from));
-                    let value = lower(w, &gradients, seeds);
-                    bounds[0].add(found.lower, twin.lower, value, value);
-                    let value = upper(w, &gradients, seeds, found.best as usize);
-                    if same {
-                        bounds[1].add(found.upper, twin.upper, value, value);
-                        for m in 0..3 {
-                            bounds[2].add(found.twist[m], twin.twist[m], 0.0, 1.0);
-                        }
-                    } else {
-                        bounds[1].add(found.upper, found.upper, value, value);
-                    }
+                    let load = load as usize;
+                    compared.load(
+                        &exact,
+                        &chunk.loads[load],
+                        [&records[load], &twins[load]],
+                        seeds,
+                    );
                 }
             }
         }
-        let largest = bounds[..2]
-            .iter()
-            .map(|most| most.from_exact.max(most.twin_from_exact))
-            .fold(0.0, f64::max);
-        let deviations = vec![
-            basis[0].of("fill_basis", "dissipation, relative", true),
-            basis[1].of("fill_basis", "weight 1, of the area", true),
-            basis[2].of("fill_basis", "weights x1 and x2, of the area", true),
-            bounds[0].of("search", "lower bound, relative", true),
-            bounds[1].of("search", "upper bound, relative", true),
-            bounds[2].of("search", "interpolated twist, absolute", false),
-        ];
-        Ok(KernelCheck {
-            deviations,
-            other_twist,
-            other_status,
-            loads,
-            bounded,
-            tolerance: F32_TOLERANCE,
-            largest,
-        })
+        Ok(compared.check())
     }
 
     /// The records of a chunk, and the basis that the first kernel left.
@@ -342,7 +385,7 @@ impl Gpu {
         &self,
         chunk: &Chunk,
         seeds: &SeedSet,
-    ) -> Result<(Vec<super::SeedRecord>, Vec<f32>)> {
+    ) -> Result<(Vec<SeedRecord>, Vec<f32>)> {
         let mut state = State::default();
         let ticket = self.submit(&mut state, 0, chunk, seeds, std::time::Instant::now())?;
         let records = self.collect(&ticket, &mut ChunkSpans::default())?;

@@ -324,6 +324,27 @@ impl Gpu {
         }
     }
 
+    /// The twists on the device, unless they are there.
+    fn keep_seeds(&self, state: &mut State, seeds: &SeedSet) {
+        if state.seeds.as_ref().is_some_and(|(known, ..)| known == seeds) {
+            return;
+        }
+        let upload = |name: &str, bytes: &[u8]| {
+            let buffer = self.buffer(
+                name,
+                bytes.len() as u64,
+                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            );
+            self.queue.write_buffer(&buffer, 0, bytes);
+            buffer
+        };
+        let (twists, rings) = (
+            upload("twists", bytemuck::cast_slice(seeds.twists())),
+            upload("rings", bytemuck::cast_slice(seeds.rings())),
+        );
+        state.seeds = Some((seeds.clone(), twists, rings));
+    }
+
     fn encode(
         &self,
         state: &mut State,
@@ -334,22 +355,7 @@ impl Gpu {
         let (device, queue) = (&self.device, &self.queue);
         let timed = self.has_timestamps() && self.clock().is_some();
         let copies = timed && self.times_copies();
-        if state.seeds.as_ref().is_none_or(|(known, ..)| known != seeds) {
-            let upload = |name: &str, bytes: &[u8]| {
-                let buffer = self.buffer(
-                    name,
-                    bytes.len() as u64,
-                    wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-                );
-                queue.write_buffer(&buffer, 0, bytes);
-                buffer
-            };
-            let (twists, rings) = (
-                upload("twists", bytemuck::cast_slice(seeds.twists())),
-                upload("rings", bytemuck::cast_slice(seeds.rings())),
-            );
-            state.seeds = Some((seeds.clone(), twists, rings));
-        }
+        self.keep_seeds(state, seeds);
         let State { seeds: known, slots } = state;
         let slot = &mut slots[slot];
         let records = (chunk.loads.len() * size_of::<SeedRecord>()) as u64;
@@ -409,44 +415,26 @@ impl Gpu {
                 (rings, size_of_val(seeds.rings()) as u64),
             );
             let [contacts, edges, loads, groups] = [0, 1, 2, 3].map(|i| (&inputs[i], lengths[i]));
-            let fan = self.fan.bind(
-                device,
-                &[
-                    contacts,
-                    edges,
-                    twists,
-                    (&basis, basis_bytes),
-                    (&self.gauss, size_of_val(&GAUSS) as u64),
-                ],
-            );
-            let search = self.search.bind(
-                device,
-                &[
-                    contacts,
-                    edges,
-                    twists,
-                    rings,
-                    (&basis, basis_bytes),
-                    loads,
-                    groups,
-                    (&found, records),
-                ],
-            );
-            {
-                let mut pass = encoder.begin_compute_pass(&pass(clock::BASIS));
-                pass.set_pipeline(&self.fan.pipeline);
-                pass.set_bind_group(0, &fan, &[]);
-                pass.dispatch_workgroups(
-                    seeds.len().div_ceil(super::layout::BASIS_GROUP) as u32,
-                    chunk.contacts.len() as u32,
-                    1,
-                );
-            }
-            let mut pass = encoder.begin_compute_pass(&pass(clock::SEARCH));
-            pass.set_pipeline(&self.search.pipeline);
-            pass.set_bind_group(0, &search, &[]);
+            let (basis, gauss) = ((&basis, basis_bytes), (&self.gauss, size_of_val(&GAUSS) as u64));
+            let fan = self.fan.bind(device, &[contacts, edges, twists, basis, gauss]);
+            let bound = [contacts, edges, twists, rings, basis, loads, groups, (&found, records)];
+            let search = self.search.bind(device, &bound);
+            let twists = seeds.len().div_ceil(super::layout::BASIS_GROUP) as u32;
             let count = chunk.groups.len() as u32;
-            pass.dispatch_workgroups(count.min(shader::GRID), count.div_ceil(shader::GRID), 1);
+            for (kernel, bound, place, [x, y]) in [
+                (&self.fan, fan, clock::BASIS, [twists, chunk.contacts.len() as u32]),
+                (
+                    &self.search,
+                    search,
+                    clock::SEARCH,
+                    [count.min(shader::GRID), count.div_ceil(shader::GRID)],
+                ),
+            ] {
+                let mut pass = encoder.begin_compute_pass(&pass(place));
+                pass.set_pipeline(&kernel.pipeline);
+                pass.set_bind_group(0, &bound, &[]);
+                pass.dispatch_workgroups(x, y, 1);
+            }
         }
         encoder.copy_buffer_to_buffer(&found, 0, &readback, 0, records);
         stamp(&mut encoder, clock::READBACK);

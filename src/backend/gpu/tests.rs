@@ -4,9 +4,10 @@ use super::super::job::Job;
 use super::super::layout::{BOUNDED, UNWRITTEN};
 use super::super::prepare::{Contacts, not_searched};
 use super::super::{Backend, Batch, Polish, Problem, ScoreOptions, SeedStatus, cpu};
+use super::check::Random;
 use super::*;
 use crate::model::{Contact, Patch, Polygon, Wrench};
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 /// Largest difference allowed between the processor's and the shader's records, relative to values
 /// of order one. Vulkan allows a logarithm 5e-7 off, fused products change the last bits, and a
@@ -29,30 +30,13 @@ fn gpu(strict: bool) -> Option<Gpu> {
     Some(gpu)
 }
 
-/// A small generator, so that the cases are the same everywhere.
-struct Random(u64);
-
 impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-
-    fn vector(&mut self) -> DVec3 {
-        DVec3::new(self.within(-1.0, 1.0), self.within(-1.0, 1.0), self.within(-1.0, 1.0))
-    }
-
     fn star(&mut self, size: f64) -> Patch {
         let (corners, centre) = (
-            3 + (self.next() * 8.0) as usize,
+            3 + (self.within(0.0, 1.0) * 8.0) as usize,
             DVec2::new(self.within(-0.01, 0.01), self.within(-0.01, 0.01)),
         );
-        let turn = self.next();
+        let turn = self.within(0.0, 1.0);
         let outer = (0..corners).map(|i| {
             let angle =
                 (i as f64 + turn + self.within(-0.2, 0.2)) / corners as f64 * std::f64::consts::TAU;
@@ -61,9 +45,9 @@ impl Random {
         vec![Polygon { outer: outer.collect(), holes: vec![] }]
     }
 
-    fn contact(&mut self) -> Arc<Contact> {
+    fn two_stars(&mut self) -> Arc<Contact> {
         let face_i = self.star(0.02);
-        let face_ii = if self.next() < 0.5 { face_i.clone() } else { self.star(0.02) };
+        let face_ii = if self.within(0.0, 1.0) < 0.5 { face_i.clone() } else { self.star(0.02) };
         Arc::new(Contact { face_i, face_ii })
     }
 }
@@ -139,13 +123,13 @@ fn shaders_give_the_records_of_the_processor() {
         let seeds = SeedSet::new(frequency).unwrap();
         let grips: Vec<_> = (0..150)
             .map(|_| {
-                let loads: Vec<Wrench> = (0..(random.next() * 150.0) as usize)
+                let loads: Vec<Wrench> = (0..(random.within(0.0, 1.0) * 150.0) as usize)
                     .map(|_| Wrench {
                         force: random.vector() * 10.0,
-                        moment: random.vector() * 0.1 * random.next(),
+                        moment: random.vector() * 0.1 * random.within(0.0, 1.0),
                     })
                     .collect();
-                (random.contact(), random.within(0.0, 0.1), loads)
+                (random.two_stars(), random.within(0.0, 0.1), loads)
             })
             .collect();
         let problems = grips
@@ -199,7 +183,7 @@ fn the_comparer_sees_one_wrong_number() {
 fn with_doomed_device<R>(mut gpu: Gpu, then: impl FnOnce(&Backend, &Batch<'_>) -> R) -> R {
     gpu.lose_before(3, 100);
     let mut random = Random(11);
-    let contact = random.contact();
+    let contact = random.two_stars();
     let wrenches: Vec<Wrench> = (0..350)
         .map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 })
         .collect();
@@ -272,7 +256,7 @@ fn a_record_that_was_not_written_is_an_error() {
     let Some(gpu) = gpu(true) else { return };
     let set = SeedSet::default();
     let mut random = Random(19);
-    let contact = random.contact();
+    let contact = random.two_stars();
     let wrenches: Vec<Wrench> = (0..130)
         .map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 })
         .collect();
@@ -338,7 +322,7 @@ fn the_clock_shows_every_chunk_and_changes_nothing() {
     let Backend::Gpu(gpu) = &backend else { panic!("the backend changed") };
     let set = SeedSet::new(8).unwrap();
     let mut random = Random(37);
-    let contact = random.contact();
+    let contact = random.two_stars();
     let wrenches: Vec<Wrench> = (0..9000)
         .map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 })
         .collect();
@@ -388,7 +372,7 @@ fn exact_answers_overlap_the_kernels_of_the_next_block() {
     let Backend::Gpu(gpu) = &backend else { panic!("the backend changed") };
     let set = SeedSet::new(8).unwrap();
     let mut random = Random(41);
-    let contact = random.contact();
+    let contact = random.two_stars();
     let wrenches: Vec<Wrench> = (0..3000)
         .map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 })
         .collect();

@@ -3,6 +3,8 @@
 use glam::{DVec2, DVec3};
 use gripfast::model::{Contact, Patch, Polygon, Wrench};
 
+use crate::support::random::Random;
+
 /// One contact pair under a load.
 #[derive(Debug, Clone)]
 pub(crate) struct Case {
@@ -10,49 +12,6 @@ pub(crate) struct Case {
     pub(crate) distance: f64,
     pub(crate) force: f64,
     pub(crate) wrench: Wrench,
-}
-
-/// SplitMix64 (Steele, Lea, Flood 2014).
-pub(crate) struct Random(u64);
-
-impl Random {
-    pub(crate) fn new(seed: u64) -> Self {
-        let mut random = Self(seed ^ 0x6a09_e667_f3bc_c908);
-        random.next();
-        random
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    pub(crate) fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub(crate) fn range(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    pub(crate) fn chance(&mut self, share: f64) -> bool {
-        self.unit() < share
-    }
-
-    /// Even on the scale of powers of ten.
-    pub(crate) fn power(&mut self, low: f64, high: f64) -> f64 {
-        10f64.powf(self.range(low, high))
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.unit() * n as f64) as usize
-    }
-
-    fn point(&mut self, reach: f64) -> DVec2 {
-        DVec2::new(self.range(-reach, reach), self.range(-reach, reach))
-    }
 }
 
 fn plain(outer: Vec<DVec2>) -> Patch {
