@@ -23,6 +23,7 @@
 //! # Ok::<(), gripfast::error::Error>(())
 //! ```
 
+mod ahead;
 mod assess;
 pub mod checkpoint;
 mod collect;
@@ -54,6 +55,7 @@ use crate::units::{Force, Length};
 use noise::Noise;
 use search::{Found, Search};
 
+pub use ahead::Ahead;
 pub use assess::{Assessor, Settings};
 pub use collect::{Collector, OUTRANKED};
 pub use output::{GLB_TOP, WHOLE, solve_every_load};

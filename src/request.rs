@@ -27,6 +27,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::error::{Error, Result};
+use crate::file;
 use crate::units::{Acceleration, Angle, Density, Force, Length, Mass, Memory, Time, Unit};
 
 pub use text::{Cone, EarlierWeights, Ground, PoseError, Region};
@@ -202,6 +203,8 @@ pub struct Output {
     pub json: bool,
     /// No progress bar and no notes (the program only).
     pub quiet: bool,
+    /// Start a long run without a question (the program only).
+    pub yes: bool,
     /// Resume the unfinished run whose state lies beside the result file; start at the first
     /// candidate when there is none.
     pub resume: bool,
@@ -295,6 +298,7 @@ impl Default for Output {
             report: None,
             json: false,
             quiet: false,
+            yes: false,
             resume: false,
             checkpoint: Time(30.0),
         }
@@ -327,7 +331,7 @@ impl Request {
     /// # Errors
     /// When the file cannot be read or is no request, naming line and field.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, "read", error))?;
+        let text = file::read_text(path)?;
         let place = path.display().to_string();
         if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json")) {
             serde_json::from_str(&text).map_err(|error| {

@@ -21,15 +21,26 @@ pub(crate) struct BackendArgs {
 
 /// Limits the processor to so many threads; all cores without a number.
 pub(crate) fn use_threads(threads: Option<usize>) -> anyhow::Result<()> {
-    if let Some(threads) = threads {
+    if let Some(threads) = threads.map(sensible) {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
     }
     Ok(())
 }
 
+/// A number of threads that the machine can use; said when it is less than asked for.
+fn sensible(threads: usize) -> usize {
+    let most = std::thread::available_parallelism().map_or(1, usize::from).max(16) * 4;
+    if threads > most {
+        crate::terminal::say(&format!(
+            "warning: {threads} threads are more than this machine can use: {most} run"
+        ));
+    }
+    threads.min(most)
+}
+
 /// So many threads of its own; one for each core without a number.
 pub(crate) fn pool(threads: Option<usize>) -> anyhow::Result<rayon::ThreadPool> {
-    Ok(rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build()?)
+    Ok(rayon::ThreadPoolBuilder::new().num_threads(threads.map_or(0, sensible)).build()?)
 }
 
 impl BackendArgs {

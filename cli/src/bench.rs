@@ -173,7 +173,7 @@ fn quick(args: &Args) -> anyhow::Result<ExitCode> {
             }
         }
     }
-    let mut out = std::io::stdout().lock();
+    let mut out = crate::terminal::answer(args.json);
     let threads = rayon::current_num_threads();
     if args.json {
         let report = json!({ "gripfast": env!("CARGO_PKG_VERSION"), "threads": threads, "software_adapter": software, "reason": selection.reason, "agreed": agreed, "results": rows });

@@ -20,7 +20,7 @@ pub(crate) struct Args {
 #[cfg(feature = "gpu")]
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let adapters = gripfast::backend::list_adapters();
-    let mut out = std::io::stdout().lock();
+    let mut out = crate::terminal::answer(args.json);
     if args.json {
         serde_json::to_writer_pretty(&mut out, &adapters)?;
         writeln!(out)?;

@@ -57,6 +57,10 @@ pub(crate) struct Args {
     /// Name of the part's frame (isaac_grasp, moveit).
     #[arg(long, value_name = "NAME", default_value = "part")]
     part_frame: String,
+    /// For a spreadsheet (csv): texts that begin like a formula (=, +, -, @) get an apostrophe
+    /// first, so that a name from a file is never calculated.
+    #[arg(long)]
+    spreadsheet: bool,
     /// The part's mesh (glb); the file named in the result when not given.
     #[arg(long, value_name = "FILE")]
     part: Option<PathBuf>,
@@ -112,7 +116,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         .with_joints(if joints.is_empty() { vec![Joint::default()] } else { joints })
         .with_pad_friction(args.pad_friction)
         .with_approach(length("--approach", &args.approach)?)
-        .with_part_frame(args.part_frame);
+        .with_part_frame(args.part_frame)
+        .with_spreadsheet(args.spreadsheet);
     let set = GripSet::read(&args.grips)?;
     let part = if format == Format::Glb {
         Some(read_part(&set, &args.grips, args.part.as_deref())?)

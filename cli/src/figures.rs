@@ -27,7 +27,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     std::fs::create_dir_all(&args.output)
         .map_err(|error| Error::io(&args.output, "make the folder", error))?;
-    let mut out = std::io::stdout().lock();
+    let mut out = crate::terminal::output();
     for figure in lab::figures::all()? {
         let drawing = args.output.join(figure.name).with_extension("svg");
         file::write(&drawing, |writer| writer.write_all(figure.svg.as_bytes()))?;

@@ -70,7 +70,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         scene.world_from_part.compose(&grip.grip.part_from_grip).compose(&tool)
     });
     let tool_frame = format!("{}, origin {origin}", convention.axes());
-    let mut out = std::io::stdout().lock();
+    let mut out = crate::terminal::answer(args.json);
     if args.json {
         let passed: Vec<_> = pick
             .passed

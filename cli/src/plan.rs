@@ -4,10 +4,11 @@ mod flags;
 mod table;
 mod watch;
 
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 
-use gripfast::plan::{Observer, Outcome, Plan};
+use anyhow::Context;
+use gripfast::plan::{Ahead, Observer, Outcome, Plan};
 
 use super::why;
 use crate::terminal;
@@ -28,6 +29,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         plan.warnings().iter().for_each(|text| watch.warning(text));
         return explain(&plan, text);
     }
+    if !plan.request().output.yes && !agreed(&plan.ahead()?)? {
+        return Ok(ExitCode::from(2));
+    }
     let interrupt = watch::Interrupt::watched()?;
     let outcome = plan.run(&mut watch, &interrupt.stop);
     watch.end();
@@ -41,11 +45,42 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     })
 }
 
+/// Runs that seem longer than this are asked about \[s\].
+const LONG: f64 = 3600.0;
+
+/// Whether to start: short runs start without a question.
+///
+/// # Errors
+/// When a long run is ahead and there is no terminal to ask on.
+fn agreed(ahead: &Ahead) -> anyhow::Result<bool> {
+    if ahead.seconds <= LONG {
+        return Ok(true);
+    }
+    let hours = ahead.seconds / 3600.0;
+    let work = format!(
+        "{} candidates under {} loads take some {hours:.0} hours on {} threads",
+        ahead.candidates, ahead.loads, ahead.threads
+    );
+    if !(std::io::stdin().is_terminal() && std::io::stderr().is_terminal()) {
+        anyhow::bail!(
+            "{work}\n  remedy: start with fewer loads, a coarser --spacing or --angle-step, or \
+             some --faces; or start it all the same with --yes"
+        );
+    }
+    terminal::say(&format!(
+        "{work}, and a result of up to {:.0} MB; start? [y/N]",
+        ahead.bytes / 1e6
+    ));
+    let mut answer = String::new();
+    std::io::stdin().read_line(&mut answer).context("the answer")?;
+    Ok(matches!(answer.trim(), "y" | "Y" | "yes"))
+}
+
 /// Why the pose of `--why` is a grip, or is not.
 fn explain(plan: &Plan, text: &str) -> anyhow::Result<ExitCode> {
     let (position, angle, site) = why::pose(text)?;
     let explanation = plan.explain(site, position, angle)?;
-    why::print(&mut std::io::stdout().lock(), &explanation)?;
+    why::print(&mut terminal::output(), &explanation)?;
     Ok(if explanation.rejection.is_none() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 

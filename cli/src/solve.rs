@@ -101,7 +101,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let options =
         Options { separation: args.separation, refiner: args.refiner, ..Options::default() };
-    let mut out = std::io::stdout().lock();
+    let mut out = crate::terminal::answer(args.json);
     let cases = case::read(&args.case)?;
     let mut any = false;
     for (index, case) in cases.iter().enumerate() {
@@ -190,6 +190,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 fn plot(path: &Path, name: &str, many: bool, case: &Case, score: &Score) -> anyhow::Result<()> {
     let path = if many {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        // A name from the file is no way to other folders.
+        let name = gripfast::text::shown(name).replace(['/', '\\', ':'], "_");
         path.with_file_name(format!("{stem}-{name}.svg"))
     } else {
         path.to_path_buf()

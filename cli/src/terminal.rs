@@ -10,6 +10,11 @@ pub(crate) fn output() -> Shown<StdoutLock<'static>> {
     Shown { inner: std::io::stdout().lock(), rest: Vec::new() }
 }
 
+/// Standard output for an answer as text, or as data that is written as it is.
+pub(crate) fn answer(data: bool) -> Box<dyn Write> {
+    if data { Box::new(std::io::stdout().lock()) } else { Box::new(output()) }
+}
+
 /// A line on standard error. Where that cannot be written there is no one to tell.
 pub(crate) fn say(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{}", shown_lines(text));

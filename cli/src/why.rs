@@ -52,7 +52,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         ranked.grip.face_ii,
         &ranked.grip.part_from_grip,
     )?;
-    let mut out = std::io::stdout().lock();
+    let mut out = crate::terminal::output();
     print(&mut out, &explanation)?;
     let worst = &ranked.worst;
     writeln!(

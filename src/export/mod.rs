@@ -149,6 +149,8 @@ pub struct Options {
     pub approach: f64,
     /// Name of the part frame (moveit, isaac_grasp).
     pub part_frame: String,
+    /// Texts of a CSV table that a spreadsheet would take for a formula get an apostrophe first.
+    pub spreadsheet: bool,
 }
 
 impl Default for Options {
@@ -162,6 +164,7 @@ impl Default for Options {
             pad_friction: None,
             approach: 0.1,
             part_frame: "part".into(),
+            spreadsheet: false,
         }
     }
 }
@@ -353,7 +356,7 @@ fn write_view(
                 set.write_json_lines(writer)
             }
         }
-        Format::Csv => table::write_csv(&table::from_view(view), writer),
+        Format::Csv => table::write_csv(&table::from_view(view), view.options.spreadsheet, writer),
         Format::Parquet => parquet::write(view, writer),
         Format::IsaacGrasp => isaac::write(view, writer),
         Format::GraspGen => graspgen::write(view, writer),

@@ -183,7 +183,20 @@ fn word(value: &impl serde::Serialize) -> String {
         .unwrap_or_default()
 }
 
-pub(super) fn write_csv(table: &Table, writer: &mut impl Write) -> std::io::Result<()> {
+/// A text that no spreadsheet takes for a formula.
+fn unformulated(text: &str) -> String {
+    if text.starts_with(['=', '+', '-', '@', '\t', '\r']) {
+        format!("'{text}")
+    } else {
+        text.into()
+    }
+}
+
+pub(super) fn write_csv(
+    table: &Table,
+    spreadsheet: bool,
+    writer: &mut impl Write,
+) -> std::io::Result<()> {
     let mut csv = csv::Writer::from_writer(writer);
     csv.write_record(table.columns.iter().map(|column| column.name))?;
     for row in 0..table.rows {
@@ -193,6 +206,7 @@ pub(super) fn write_csv(table: &Table, writer: &mut impl Write) -> std::io::Resu
             Values::Number(values) => {
                 values[row].map(|value| format!("{value:?}")).unwrap_or_default()
             }
+            Values::Text(values) if spreadsheet => unformulated(&values[row]),
             Values::Text(values) => values[row].clone(),
         }))?;
     }

@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DVec3};
 
 use crate::error::{Error, ErrorKind, Result};
+use crate::file;
 use crate::geometry::sphere;
 use crate::model::{Frame, LoadCase, Wrench};
 use crate::part::MassProperties;
@@ -239,7 +240,7 @@ impl LoadSet {
 
     /// Reads a list or a trajectory, by suffix and header.
     fn file(&self, path: &Path, mass: &MassProperties, cases: &mut Vec<LoadCase>) -> Result<()> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, "read", error))?;
+        let text = file::read_text(path)?;
         let place = path.display().to_string();
         let read = if path.extension().is_some_and(|suffix| suffix.eq_ignore_ascii_case("json")) {
             list::from_json(&place, &text, mass, &self.world_from_part)?

@@ -106,6 +106,13 @@ impl PlanBuilder {
                     .to_owned(),
             );
         }
+        if request.scoring.threads.is_some_and(|number| number > threads.current_num_threads()) {
+            warnings.push(format!(
+                "{} threads are more than this machine can use: {} run",
+                request.scoring.threads.unwrap_or_default(),
+                threads.current_num_threads()
+            ));
+        }
         let propose = ProposeOptions::from(&request.candidates);
         Ok(Plan {
             request,
@@ -124,8 +131,14 @@ impl PlanBuilder {
     }
 }
 
+/// More threads than this gain nothing and cost memory.
+fn most_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from).max(16) * 4
+}
+
 /// Threads of the plan's own.
 fn threads(number: Option<usize>) -> Result<ThreadPool> {
+    let number = number.map(|number| number.min(most_threads()));
     let named = ThreadPoolBuilder::new().thread_name(|index| format!("gripfast {index}"));
     named.num_threads(number.unwrap_or(0)).build().map_err(|error| {
         Error::new(

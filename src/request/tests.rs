@@ -63,6 +63,7 @@ output = "grips.json"
 report = "grips.html"
 json = true
 quiet = true
+yes = true
 resume = true
 checkpoint = "2min"
 "#;

@@ -219,6 +219,10 @@ struct OutputArgs {
 
 #[derive(Debug, ClapArgs)]
 struct LongArgs {
+    /// Starts a run of more than an hour without a question; without a terminal to ask on such a
+    /// run is refused unless this is given.
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
+    yes: Option<bool>,
     /// Resumes the unfinished run whose state lies beside the result file; starts at the first
     /// candidate when there is none.
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
@@ -298,7 +302,7 @@ impl Args {
         }
         let (long, group) = (self.long, &mut request.output);
         give!(flags => group; output, report, json, quiet);
-        give!(long => group; resume, checkpoint);
+        give!(long => group; yes, resume, checkpoint);
         if group.resume && group.output.is_none() {
             return Err(Error::input(
                 "--resume",
@@ -362,7 +366,7 @@ mod tests {
         --approach-distance 80mm --backend cpu --adapter 0 --seeds 200 --k1 2 --k2 3 \
         --pad-friction 0.7 --position-error 1mm --closing-friction 0.1 --separation discard \
         --polish all --refiner shanno --threads 2 --top 3 --diverse --merge-symmetric --keep 77 \
-        -o out.json --report out.html --json -q --resume --checkpoint 9s --pose-noise 1mm,2deg \
+        -o out.json --report out.html --json -q --yes --resume --checkpoint 9s --pose-noise 1mm,2deg \
         --noise-samples 9 --compare=1,2,3,4mm";
 
     fn args(line: &str) -> Args {

@@ -87,6 +87,85 @@ fn a_gripper_that_talks_to_the_terminal_is_shown_as_text() {
     assert!(!svg.contains("</script>") && !svg.contains(['\u{7}', '\u{202e}']));
 }
 
+const HEXAGON: &str = "data/parts/hex_nut.stl";
+
+/// A short plan with these loads.
+fn plan_with(loads: &str, more: &[&str]) -> Answer {
+    let part = crate::support::root().join(HEXAGON).display().to_string();
+    let mut arguments = vec![
+        "plan",
+        &part,
+        "--gripper",
+        "generic",
+        "--mass",
+        "20g",
+        "--spacing",
+        "9mm",
+        "--angle-step",
+        "90deg",
+        "--loads",
+        loads,
+    ];
+    arguments.extend(more);
+    run(&arguments)
+}
+
+#[test]
+fn names_of_loads_are_shown_as_text() {
+    let (Some(escapes), Some(formulas)) = (sample("esc.csv"), sample("evil.csv")) else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).display().to_string();
+    for loads in [&escapes, &formulas] {
+        let (grips, page) = (file("grips.json"), file("page.html"));
+        let answer = plan_with(loads, &["-o", &grips, "--report", &page]);
+        assert!(matches!(answer.code, Some(0 | 1)), "{}", answer.errors);
+        plain(&answer);
+        let html = std::fs::read_to_string(&page).unwrap();
+        assert!(!html.contains("<img src=x") && !html.contains('\u{1b}'));
+        let id = serde_json::from_slice::<serde_json::Value>(&std::fs::read(&grips).unwrap());
+        let id = id.unwrap()["grips"][0]["id"].to_string();
+        plain(&run(&["why", &grips, &id]));
+        for format in ["isaac_grasp", "moveit"] {
+            let yaml = file("grips.yaml");
+            assert_eq!(run(&["export", &grips, "--format", format, "-o", &yaml]).code, Some(0));
+            assert!(!std::fs::read_to_string(&yaml).unwrap().contains('\u{1b}'));
+        }
+    }
+}
+
+#[test]
+fn a_table_for_a_spreadsheet_has_no_formula() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).display().to_string();
+    let (loads, grips) = (file("loads.csv"), file("grips.json"));
+    std::fs::write(&loads, "name,fx[N],fy[N],fz[N]\n=cmd|' /C calc'!A0,0,9,0\n").unwrap();
+    assert!(matches!(plan_with(&loads, &["-o", &grips]).code, Some(0 | 1)));
+    let cells = |more: &[&str]| {
+        let mut arguments = vec!["export", &grips, "--format", "csv", "-o", "-"];
+        arguments.extend(more);
+        run(&arguments).output
+    };
+    assert!(cells(&[]).contains(",=cmd|' /C calc'!A0,"));
+    let safe = cells(&["--spreadsheet"]);
+    assert!(safe.contains(",'=cmd|' /C calc'!A0,") && !safe.contains(",=cmd"), "{safe}");
+}
+
+#[test]
+fn a_long_run_is_not_started_by_accident() {
+    let started = std::time::Instant::now();
+    let answer = plan_with("ball:20000", &["--spacing", "0.03mm", "--angle-step", "1deg"]);
+    assert_eq!(answer.code, Some(2), "{}", answer.errors);
+    assert!(
+        answer.errors.contains("hours") && answer.errors.contains("--yes"),
+        "{}",
+        answer.errors
+    );
+    assert!(started.elapsed() < Duration::from_secs(50));
+    let many = plan_with("gravity", &["--threads", "100000"]);
+    assert!(many.errors.contains("warning: 100000 threads"), "{}", many.errors);
+    assert!(matches!(many.code, Some(0 | 1)));
+}
+
 #[test]
 fn the_memory_allowed_is_a_flag() {
     let folder = tempfile::tempdir().unwrap();
