@@ -68,6 +68,20 @@
 //! | `Delta_d` | [`results::RankedGrip::delta_d`]: opening that twists the part out | m | 2 |
 //! | `k1, k2` | [`rank::Weights`] of the score `k1/mu_s + k2 alpha` | 1, 1/rad | 5.3 |
 
+/// A method for each option that sets it: `Options::default().with_top(Some(10))`.
+macro_rules! setters {
+    ($type:ty { $($with:ident: $field:ident: $value:ty),+ $(,)? }) => {
+        impl $type {$(
+            #[doc = concat!("The same with this `", stringify!($field), "`.")]
+            #[must_use]
+            pub fn $with(mut self, $field: $value) -> Self {
+                self.$field = $field;
+                self
+            }
+        )+}
+    };
+}
+
 /// Vectors and matrices of this crate's interface, in the version that it uses.
 pub use glam;
 

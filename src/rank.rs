@@ -3,7 +3,6 @@
 
 use std::collections::BTreeMap;
 
-use derive_setters::Setters;
 use glam::DVec3;
 
 use crate::model::{Patch, Status};
@@ -48,8 +47,7 @@ impl Weights {
 }
 
 /// What [`rank`] keeps.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Setters)]
-#[setters(prefix = "with_")]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Options {
     /// Weights of the score.
@@ -66,6 +64,14 @@ pub struct Options {
     /// ones.
     pub diverse: bool,
 }
+
+setters!(Options {
+    with_weights: weights: Weights,
+    with_keep_flips: keep_flips: bool,
+    with_merge_duplicates: merge_duplicates: bool,
+    with_top: top: Option<usize>,
+    with_diverse: diverse: bool,
+});
 
 /// The ordered grips and what became of the others.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -17,8 +17,6 @@ mod yaml;
 use std::io::Write;
 use std::path::Path;
 
-use derive_setters::Setters;
-
 use crate::error::{Error, ErrorKind, Result};
 use crate::gripper::Gripper;
 use crate::model::Frame;
@@ -129,8 +127,7 @@ impl Format {
 }
 
 /// How to export.
-#[derive(Debug, Clone, PartialEq, Setters)]
-#[setters(prefix = "with_")]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Options {
     /// Axes of the tool frame; the format's own when absent.
@@ -152,6 +149,18 @@ pub struct Options {
     /// Texts of a CSV table that a spreadsheet would take for a formula get an apostrophe first.
     pub spreadsheet: bool,
 }
+
+setters!(Options {
+    with_convention: convention: Option<Convention>,
+    with_origin: origin: Origin,
+    with_top: top: Option<usize>,
+    with_opening: opening: Option<f64>,
+    with_joints: joints: Vec<Joint>,
+    with_pad_friction: pad_friction: Option<f64>,
+    with_approach: approach: f64,
+    with_part_frame: part_frame: String,
+    with_spreadsheet: spreadsheet: bool,
+});
 
 impl Default for Options {
     fn default() -> Self {

@@ -6,7 +6,6 @@
 
 use std::path::{Path, PathBuf};
 
-use derive_setters::Setters;
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -129,8 +128,7 @@ pub struct FacePair {
 }
 
 /// How to read a part.
-#[derive(Debug, Clone, Default, PartialEq, Setters)]
-#[setters(prefix = "with_")]
+#[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct ReadOptions {
     /// Unit of the file's numbers. `None`: the file's own where it states one (3MF, glTF),
@@ -142,6 +140,12 @@ pub struct ReadOptions {
     /// Whether a glTF file may name buffers outside of its own folder.
     pub outside_buffers: bool,
 }
+
+setters!(ReadOptions {
+    with_unit: unit: Option<Unit>,
+    with_max_memory: max_memory: Option<u64>,
+    with_outside_buffers: outside_buffers: bool,
+});
 
 /// A part, read and checked.
 #[derive(Debug, Clone, PartialEq)]

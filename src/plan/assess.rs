@@ -1,6 +1,5 @@
 //! Grips of one part under one set of loads, from pose to numbers.
 
-use derive_setters::Setters;
 use rayon::prelude::*;
 
 use crate::backend::{Backend, Batch, Best, Problem, ScoreOptions, Scored, SeedSet};
@@ -17,8 +16,7 @@ use crate::request::{Polish, Request};
 use crate::results::{LoadCase, LoadScore, RankedGrip};
 
 /// What decides the answer, beside part, gripper and loads.
-#[derive(Debug, Clone, PartialEq, Setters)]
-#[setters(prefix = "with_")]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Settings {
     /// Gripping force \[N\].
@@ -34,6 +32,15 @@ pub struct Settings {
     /// How loads are solved.
     pub score: ScoreOptions,
 }
+
+setters!(Settings {
+    with_force: force: f64,
+    with_weights: weights: Weights,
+    with_delta: delta: f64,
+    with_mu_c: mu_c: f64,
+    with_pad_friction: pad_friction: Option<f64>,
+    with_score: score: ScoreOptions,
+});
 
 impl Settings {
     /// This gripping force \[N\], a pad friction that is not known, and defaults.

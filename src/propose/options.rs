@@ -1,6 +1,5 @@
 //! What to propose, and the reasons for which a candidate falls.
 
-use derive_setters::Setters;
 use glam::DVec3;
 use serde::Serialize;
 
@@ -18,8 +17,7 @@ pub use crate::request::{Cone, Ground};
 /// let options = ProposeOptions::default().with_spacing(Some(0.004)).with_flips(true);
 /// assert_eq!(options.spacing, Some(0.004));
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Setters)]
-#[setters(prefix = "with_")]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ProposeOptions {
     /// Step of the position grid \[m\]; `None`: a fifth of the pad's shorter side.
@@ -67,6 +65,28 @@ pub struct ProposeOptions {
     /// Candidates per chunk, about.
     pub chunk: usize,
 }
+
+setters!(ProposeOptions {
+    with_spacing: spacing: Option<f64>,
+    with_angle_step: angle_step: f64,
+    with_edge_angles: edge_angles: bool,
+    with_min_contact: min_contact: f64,
+    with_min_pad_share: min_pad_share: f64,
+    with_max_offset: max_offset: Option<f64>,
+    with_approach_cone: approach_cone: Option<Cone>,
+    with_keep_out: keep_out: Vec<[DVec3; 2]>,
+    with_ground: ground: Option<Ground>,
+    with_faces: faces: Option<Vec<u32>>,
+    with_faces_in: faces_in: Vec<[DVec3; 2]>,
+    with_outside: outside: bool,
+    with_inside: inside: bool,
+    with_flips: flips: bool,
+    with_opening: opening: f64,
+    with_min_opening: min_opening: f64,
+    with_clearance: clearance: f64,
+    with_approach: approach: f64,
+    with_chunk: chunk: usize,
+});
 
 impl Default for ProposeOptions {
     /// Those of a request that says nothing.
