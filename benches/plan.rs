@@ -36,13 +36,16 @@ fn plan(gripper: &Gripper, loads: &LoadSet, seeds: &SeedSet) -> u64 {
         Assessor { loads: &cases, mass, settings: &settings, backend: &Backend::Cpu, seeds };
     let mut collector = Collector::default();
     for chunk in Proposer::new(&part, gripper, &ProposeOptions::default()).unwrap() {
-        collector.add(assessor.assess(chunk.grips).unwrap(), 10_000, weights);
+        collector.add(assessor.assess(chunk.grips).unwrap(), 10_000, weights, settings.pads);
     }
     let (low, high) = part.mesh.bounding_box();
     let mut ranking = collector.finish(
         mass.centre_of_mass,
         (high - low).length(),
-        &rank::Options::default().with_weights(weights).with_top(Some(10_000)),
+        &rank::Options::default()
+            .with_weights(weights)
+            .with_pads(settings.pads)
+            .with_top(Some(10_000)),
     );
     assessor.finish(&mut ranking.grips);
     ranking.ranked

@@ -37,7 +37,7 @@ fn main() -> Result<()> {
     request.candidates.spacing = Some(Length(0.008));
     let plan = Plan::builder(request).part(part).loads(loads).build()?;
     let outcome = plan.run(&mut (), &AtomicBool::new(false))?;
-    println!("{} grips hold", outcome.set.summary.ranked);
+    println!("{} grips hold", outcome.set.holding().unwrap_or_default());
     if let Some(best) = outcome.set.grips.first() {
         println!(
             "the best needs a friction of {:.3} under '{}' and {:.1} N with its own pads",

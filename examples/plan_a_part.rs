@@ -15,7 +15,7 @@ struct Watch;
 impl Observer for Watch {
     fn progress(&mut self, progress: Progress) {
         let Progress { done, total, grips, .. } = progress;
-        println!("{done} of {total} candidates looked at, {grips} grips hold");
+        println!("{done} of {total} candidates looked at, {grips} grips");
     }
 
     fn warning(&mut self, text: &str) {

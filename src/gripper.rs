@@ -13,7 +13,8 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-use crate::model::{Frame, Grip, Ring};
+use crate::geometry::{patch_area, ring_area};
+use crate::model::{Contact, Frame, Grip, Ring};
 
 pub use catalogue::find;
 pub use check::check;
@@ -28,8 +29,16 @@ pub struct Gripper {
     pub name: String,
     /// Smallest and largest distance of the pads \[m\].
     pub stroke: [f64; 2],
-    /// Smallest and largest gripping force \[N\].
+    /// Smallest and largest gripping force of one jaw \[N\].
     pub force: [f64; 2],
+    /// Largest mass that it may carry \[kg\], where stated: a load whose force exceeds its weight is
+    /// not carried.
+    #[serde(default)]
+    pub payload: Option<f64>,
+    /// Largest moments of a load about `x1`, `x2`, `x3` at the pads, both jaws together [N m], where
+    /// stated.
+    #[serde(default)]
+    pub moment: Option<[f64; 3]>,
     /// Pad outline in `(x1, x2)`, counter-clockwise, convex \[m\]; the same on both jaws.
     pub pad: Ring,
     /// Friction coefficient of the pad material, where stated.
@@ -249,6 +258,12 @@ impl Gripper {
         let mut place = jaw.at(offset);
         place.origin.x = self.travel.advance(2.0 * offset) - self.travel.advance(gap);
         place
+    }
+
+    /// Share of the pad that touches, on the face where it is less.
+    pub fn pad_share(&self, contact: &Contact) -> f64 {
+        let area = patch_area(&contact.face_i).min(patch_area(&contact.face_ii));
+        area / ring_area(&self.pad)
     }
 
     /// Distance of the pads in a grip \[m\]: the faces' own, or less by the fingers where these

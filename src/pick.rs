@@ -15,7 +15,7 @@ use crate::clash::{Course, MeshObstacle, Nearby, Room, Volumes};
 use crate::error::{Error, Result};
 use crate::gripper::Gripper;
 use crate::model::{Frame, Grip};
-use crate::results::GripSet;
+use crate::results::{GripSet, Verdict};
 
 pub use crate::clash::Phase;
 pub use scene::{Obstacle, Opening, Reach, Retreat, Scene, Solid};
@@ -27,6 +27,8 @@ const PIECE: usize = 64;
 /// Why a grip was passed over.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reason {
+    /// The pads do not hold it; their friction over that needed with the safety asked for.
+    Slips(f64),
     /// Its approach lies outside the cone, by its angle to the axis \[rad\].
     Cone(f64),
     /// The flange (or, without one, the grip) is this far from the robot's base \[m\].
@@ -68,6 +70,7 @@ enum Ready {
 pub struct Picker<'a> {
     set: &'a GripSet,
     scene: &'a Scene,
+    allow_slip: bool,
     gripper: Gripper,
     obstacles: Vec<Ready>,
     /// Of the meshes among them.
@@ -103,6 +106,7 @@ impl<'a> Picker<'a> {
         let mut picker = Self {
             set,
             scene,
+            allow_slip: false,
             gripper,
             obstacles,
             nearby,
@@ -121,6 +125,13 @@ impl<'a> Picker<'a> {
             picker.volumes_of.push(*entry);
         }
         Ok(picker)
+    }
+
+    /// Takes grips too that slip, see [`GripSet::verdict`]; they are passed over otherwise.
+    #[must_use]
+    pub fn allow_slip(mut self, allow: bool) -> Self {
+        self.allow_slip = allow;
+        self
     }
 
     /// The gripper's motion for a grip, or the distance of the pads that its stroke does not reach.
@@ -202,6 +213,11 @@ impl<'a> Picker<'a> {
 
     /// Why a grip is not free, cheapest questions first.
     fn reason(&self, index: usize, world_from_part: &Frame, room: &mut Room) -> Option<Reason> {
+        if !self.allow_slip
+            && let Verdict::Slips { margin } = self.set.verdict(&self.set.grips[index])
+        {
+            return Some(Reason::Slips(margin));
+        }
         let world_from_grip = world_from_part.compose(&self.set.grips[index].grip.part_from_grip);
         let approach = world_from_grip.rotation.x_axis;
         if let Some((axis, half_angle)) = self.scene.cone {
@@ -286,6 +302,13 @@ impl<'a> Picker<'a> {
     /// A reason in words.
     pub fn describe(&self, reason: &Reason) -> String {
         match *reason {
+            Reason::Slips(margin) => {
+                format!(
+                    "slips: the pads have {:.0} % of the friction it needs at {} N per jaw",
+                    (margin * 100.0).floor(),
+                    self.set.provenance.resolved.force.0
+                )
+            }
             Reason::Cone(angle) => {
                 format!("approach {:.1} deg off the cone's axis", angle.to_degrees())
             }
@@ -311,6 +334,7 @@ impl<'a> Picker<'a> {
     /// A reason in one or two words, for counting.
     pub fn category(&self, reason: &Reason) -> String {
         match *reason {
+            Reason::Slips(_) => "slips".into(),
             Reason::Cone(_) => "approach cone".into(),
             Reason::Reach(_) => "reach".into(),
             Reason::Stroke(_) => "stroke".into(),

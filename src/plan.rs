@@ -27,6 +27,7 @@ mod ahead;
 mod assess;
 pub mod checkpoint;
 mod collect;
+mod limits;
 pub mod noise;
 mod output;
 mod prepare;
@@ -58,6 +59,7 @@ use search::{Found, Search};
 pub use ahead::Ahead;
 pub use assess::{Assessor, Settings};
 pub use collect::{Collector, OUTRANKED};
+pub use limits::Limits;
 pub use output::{GLB_TOP, WHOLE, solve_every_load};
 pub use prepare::PlanBuilder;
 
@@ -87,7 +89,7 @@ pub struct Progress {
     pub done: u64,
     /// Candidates in all.
     pub total: u64,
-    /// Grips that hold so far.
+    /// Grips with a limit state so far.
     pub grips: u64,
 }
 
@@ -210,6 +212,9 @@ impl Plan {
 
     fn run_here(&self, observer: &mut dyn Observer, stop: &AtomicBool) -> Result<Outcome> {
         self.warnings.iter().for_each(|text| observer.warning(text));
+        if let Some(outcome) = self.finished(observer)? {
+            return Ok(outcome);
+        }
         let scoring = &self.request.scoring;
         let selection = select(scoring.backend, scoring.adapter.as_deref())?;
         observer.note(&format!("backend {}", selection.reason));
@@ -222,6 +227,7 @@ impl Plan {
             assessor: &assessor,
             keep: self.request.kept(),
             race: scoring.polish == Polish::Top,
+            ids: self.request.selection.ids.as_deref(),
             partial: partial.as_ref(),
             resume: self.request.output.resume,
         };
@@ -264,17 +270,12 @@ impl Plan {
         for (reason, count) in &ranking.rejections {
             *rejections.entry(reason.clone()).or_default() += count;
         }
-        let mut grips = ranking.grips;
+        let mut grips = self.kept(ranking.grips, size);
         assessor.finish(&mut grips);
         let comparison = selection
             .compare
             .map(|weights| compare::compare(&mut grips, centre, self.settings.force, &weights));
-        let shown: Vec<u64> = if selection.diverse {
-            let chosen = rank::choose_diverse(&grips, selection.top, size);
-            chosen.into_iter().map(|ranked| ranked.grip.id).collect()
-        } else {
-            grips.iter().take(selection.top).map(|ranked| ranked.grip.id).collect()
-        };
+        let shown = self.shown(&grips, size);
         self.add_noise(proposer, assessor, &mut grips, &shown)?;
         self.solve_other_loads(assessor, &mut grips, &shown)?;
         let set = GripSet {
@@ -288,6 +289,7 @@ impl Plan {
                 pairs: proposer.tally().pairs,
                 candidates: proposer.tally().candidates,
                 ranked: ranking.ranked,
+                holding: self.settings.pads.value.map(|_| ranking.holding),
                 rejections,
                 comparison,
             },
@@ -296,9 +298,68 @@ impl Plan {
         Ok((set, shown))
     }
 
+    /// What a finished run of the same request has left, where this one resumes it.
+    fn finished(&self, observer: &mut dyn Observer) -> Result<Option<Outcome>> {
+        let output = &self.request.output;
+        let native = matches!(self.format, Some(Format::Json | Format::JsonLines));
+        let Some(path) = output.output.as_deref().filter(|path| output.resume && path.is_file())
+        else {
+            return Ok(None);
+        };
+        let unfinished = self.partial()?.is_some_and(|partial| partial.is_there());
+        let Some(set) = GripSet::read(path).ok().filter(|_| native && !unfinished) else {
+            return Ok(None);
+        };
+        let mut request = set.provenance.request.clone();
+        request.output.clone_from(output);
+        request.scoring.threads = self.request.scoring.threads;
+        let (low, high) = self.part.mesh.bounding_box();
+        let same = set.provenance.complete
+            && set.provenance.gripfast == env!("CARGO_PKG_VERSION")
+            && request == self.request
+            && set.part == self.part_summary([low, high])
+            && set.gripper == output::gripper_json(&self.gripper)?
+            && set.loads == self.loads;
+        if !same {
+            return Ok(None);
+        }
+        observer.note(&format!("{} holds this run, finished: nothing to resume", path.display()));
+        let shown = self.shown(&set.grips, (high - low).length());
+        let mut written = Vec::new();
+        if let Some(page) = &output.report {
+            crate::report::write(&set, Some(&self.part.mesh), page)?;
+            written.push(page.clone());
+        }
+        Ok(Some(Outcome { set, shown, checkpoint: None, written }))
+    }
+
+    /// Ids of the grips to show, best first.
+    fn shown(&self, grips: &[RankedGrip], size: f64) -> Vec<u64> {
+        let selection = &self.request.selection;
+        if selection.diverse {
+            let chosen = rank::choose_diverse(grips, selection.top, size);
+            chosen.into_iter().map(|ranked| ranked.grip.id).collect()
+        } else {
+            grips.iter().take(selection.top).map(|ranked| ranked.grip.id).collect()
+        }
+    }
+
+    /// The grips for the list: all, or as many that differ as the request wants to keep.
+    fn kept(&self, grips: Vec<RankedGrip>, size: f64) -> Vec<RankedGrip> {
+        let selection = &self.request.selection;
+        match selection.keep.filter(|_| selection.diverse) {
+            None => grips,
+            Some(keep) => {
+                let keep = keep.max(selection.top).max(1);
+                rank::choose_diverse(&grips, keep, size).into_iter().cloned().collect()
+            }
+        }
+    }
+
     fn rank_options(&self) -> rank::Options {
         rank::Options {
             weights: self.settings.weights,
+            pads: self.settings.pads,
             keep_flips: self.propose.flips,
             merge_duplicates: self.request.selection.merge_symmetric,
             top: Some(self.request.kept()),
@@ -346,7 +407,8 @@ impl Plan {
         let resolved = Resolved {
             force: Force(self.settings.force),
             spacing: Length(self.propose.spacing(&self.gripper)),
-            pad_friction: self.settings.pad_friction,
+            pad_friction: self.settings.pads.value,
+            safety: self.settings.pads.safety,
             seeds: self.seeds.len(),
             keep: self.request.kept(),
         };

@@ -1,13 +1,17 @@
 //! The order of the grips: score, ties, flips, duplicates by symmetry, and a choice of grips that
 //! differ.
 
+mod filter;
+
 use std::collections::BTreeMap;
 
 use glam::DVec3;
 
 use crate::model::{Patch, Status};
 use crate::request::Scoring;
-use crate::results::RankedGrip;
+use crate::results::{PadFriction, RankedGrip};
+
+pub use filter::Filter;
 
 /// Scores that differ by less than this share count as equal, and other things decide (see [`rank`]):
 /// final answers agree to this across backends and refiners, and the order shall not depend on which
@@ -52,6 +56,8 @@ impl Weights {
 pub struct Options {
     /// Weights of the score.
     pub weights: Weights,
+    /// What the pads give and what is asked of them: grips that slip come after the others.
+    pub pads: PadFriction,
     /// Keeps grips that are another one with the jaws exchanged (`flip_of`).
     pub keep_flips: bool,
     /// Keeps one of the grips that score the same with the same geometry in the grip frame, as
@@ -67,6 +73,7 @@ pub struct Options {
 
 setters!(Options {
     with_weights: weights: Weights,
+    with_pads: pads: PadFriction,
     with_keep_flips: keep_flips: bool,
     with_merge_duplicates: merge_duplicates: bool,
     with_top: top: Option<usize>,
@@ -82,15 +89,17 @@ pub struct Ranking {
     pub grips: Vec<RankedGrip>,
     /// Grips that were ranked, before `top`.
     pub ranked: u64,
+    /// Of these, those that do not slip.
+    pub holding: u64,
     /// Grips left out, by reason: the status (`twisted_out`, ...), `not_finite`, `flip`,
     /// `duplicate`.
     pub rejections: BTreeMap<String, u64>,
 }
 
-/// Scores and orders `grips`; their `rank` and `score` are set here. `centre_of_mass` and `size`
+/// Scores and orders `grips`; their `rank`, `score` and `holds` are set here. `centre_of_mass` and `size`
 /// (the diagonal of the bounding box) are the part's \[m\], in the part frame.
 ///
-/// The order is that of falling score. Among scores within [`TIE`] of each other the grip nearest to
+/// Grips that hold come first, then those that slip, and both in the order of falling score. Among scores within [`TIE`] of each other the grip nearest to
 /// the centre of mass comes first, then the one whose contacts are more symmetric about the plane in
 /// which the jaws close and more alike, then the lower id. The order depends neither on that in which
 /// the grips come nor on differences below [`TIE`].
@@ -119,6 +128,7 @@ pub fn rank(
             continue;
         }
         grip.score = score.is_finite().then_some(score);
+        grip.holds = options.pads.verdict(grip.friction_needed()).holds();
         kept.push((score, grip));
     }
     order(&mut kept, centre_of_mass);
@@ -130,6 +140,7 @@ pub fn rank(
         }
     }
     ranking.ranked = kept.len() as u64;
+    ranking.holding = kept.iter().filter(|(_, grip)| !slips(grip)).count() as u64;
     let mut grips: Vec<RankedGrip> = kept.into_iter().map(|(_, grip)| grip).collect();
     for (place, grip) in grips.iter_mut().enumerate() {
         grip.rank = place as u64 + 1;
@@ -150,6 +161,24 @@ pub fn rank(
     ranking
 }
 
+/// Whether a ranked grip is known to slip.
+pub(crate) fn slips(grip: &RankedGrip) -> bool {
+    grip.holds == Some(false)
+}
+
+/// Far beyond any score.
+const FAR: f64 = 1e150;
+
+/// A number that orders grips as [`rank`] does but for ties: it rises with the score, and that of
+/// every grip that slips lies below that of every other.
+pub fn merit(score: f64, slips: bool) -> f64 {
+    match slips {
+        false => score,
+        true if score >= 0.0 => -FAR / (1.0 + score),
+        true => -FAR * (1.0 - score),
+    }
+}
+
 /// The status as the result file spells it.
 pub fn status_name(status: Status) -> String {
     match serde_json::to_value(status) {
@@ -164,13 +193,16 @@ pub(crate) fn ties(a: f64, b: f64) -> bool {
     a == b || ((a - b).is_finite() && (a - b).abs() <= TIE * a.abs().max(b.abs()))
 }
 
-/// Falling score, runs of scores that tie by [`preference`].
+/// Those that do not slip first, then falling score, runs of scores that tie by [`preference`].
 ///
 /// A run ends at a gap between neighbours, not at a distance from its first member: two equal grips
 /// stay together whatever lies between them.
 fn order(grips: &mut [(f64, RankedGrip)], centre_of_mass: DVec3) {
-    grips.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.grip.id.cmp(&b.1.grip.id)));
-    for run in grips.chunk_by_mut(|a, b| ties(a.0, b.0)) {
+    grips.sort_by(|a, b| {
+        let score = b.0.total_cmp(&a.0);
+        slips(&a.1).cmp(&slips(&b.1)).then(score).then(a.1.grip.id.cmp(&b.1.grip.id))
+    });
+    for run in grips.chunk_by_mut(|a, b| slips(&a.1) == slips(&b.1) && ties(a.0, b.0)) {
         run.sort_by_cached_key(|grip| preference(&grip.1, centre_of_mass));
     }
 }
@@ -225,7 +257,12 @@ fn merge(grips: Vec<(f64, RankedGrip)>, centre_of_mass: DVec3) -> Vec<(f64, Rank
     let mut kept: Vec<(f64, RankedGrip)> = Vec::with_capacity(grips.len());
     let mut shapes: Vec<[f64; 8]> = Vec::with_capacity(grips.len());
     let mut near = 0; // the first kept grip whose score is not clearly larger
+    let mut slipping = false;
     for (score, mut grip) in grips {
+        if slips(&grip) && !slipping {
+            // The scores start anew.
+            (near, slipping) = (kept.len(), true);
+        }
         let larger = |other: f64| {
             other != score && (other.is_infinite() || other - score > SAME_SCORE * other.abs())
         };
@@ -256,9 +293,18 @@ pub fn choose_diverse(grips: &[RankedGrip], top: usize, size: f64) -> Vec<&Ranke
         .collect()
 }
 
-/// Marks `top` grips of an ordered list that differ: each lies at least a distance from every one
-/// chosen before it, and the distance is lowered step by step until enough are found.
+/// Marks `top` grips of an ordered list that differ; those that slip only where the others are not
+/// enough.
 fn diverse(grips: &[RankedGrip], top: usize, size: f64) -> Vec<bool> {
+    let (holding, slipping) = grips.split_at(grips.partition_point(|grip| !slips(grip)));
+    let mut chosen = apart(holding, top, size);
+    chosen.extend(apart(slipping, top.saturating_sub(holding.len()), size));
+    chosen
+}
+
+/// Marks `top` grips of an ordered list: each lies at least a distance from every one chosen before
+/// it, and the distance is lowered step by step until enough are found.
+fn apart(grips: &[RankedGrip], top: usize, size: f64) -> Vec<bool> {
     let mut chosen = vec![false; grips.len()];
     let mut list: Vec<usize> = Vec::new();
     // 0.5: half the part's size, or a right angle of approach. Below 1 % grips are neighbours of a

@@ -30,7 +30,7 @@ use crate::error::{Error, Result};
 use crate::file;
 use crate::units::{Acceleration, Angle, Density, Force, Length, Mass, Memory, Time, Unit};
 
-pub use text::{Cone, EarlierWeights, Ground, PoseError, Region};
+pub use text::{Cone, EarlierWeights, Ground, InertiaMatrix, PoseError, Position, Region};
 pub use words::{Choice, Polish, Refiner, Separation, Side};
 
 /// The main job: which part, gripper and loads, and how to rank.
@@ -57,7 +57,13 @@ pub struct Request {
     /// Density of the part's material, instead of the mass.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density: Option<Density>,
-    /// Gripping force; absent: the gripper's largest.
+    /// Centre of mass in the part frame, of an assembly say; absent: that of a uniform solid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub com: Option<Position>,
+    /// Inertia about the centre of mass, part axes; absent: that of a uniform solid of this mass.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inertia: Option<InertiaMatrix>,
+    /// Gripping force of one jaw; absent: the gripper's largest.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force: Option<Force>,
     /// Sources of load cases, see [`crate::load::LoadSet::parse`]; a text in which commas join them
@@ -149,6 +155,8 @@ pub struct Scoring {
     /// gripper's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pad_friction: Option<f64>,
+    /// Safety factor: a grip holds where `mu_s` times this is at most the pads' friction.
+    pub safety: f64,
     /// Uncertainty of the part's position along the pads, for alpha.
     pub position_error: Length,
     /// Pad friction while closing, for alpha.
@@ -175,7 +183,11 @@ pub struct Selection {
     pub diverse: bool,
     /// List one of the grips that a symmetry of the part maps to each other, for all of them.
     pub merge_symmetric: bool,
-    /// Best grips to keep; absent: see [`Request::kept`].
+    /// Only the candidates with these numbers are scored; absent: all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ids: Option<Vec<u64>>,
+    /// Best grips to keep; absent: see [`Request::kept`]. With `diverse`, that many of these that
+    /// differ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub keep: Option<usize>,
     /// Try each shown grip at poses off by up to this.
@@ -223,6 +235,8 @@ impl Default for Request {
             gripper: String::new(),
             mass: None,
             density: None,
+            com: None,
+            inertia: None,
             force: None,
             loads: vec!["gravity".to_owned()],
             accel: None,
@@ -267,6 +281,7 @@ impl Default for Scoring {
             k1: 1.0,
             k2: 1.0,
             pad_friction: None,
+            safety: 1.0,
             position_error: Length(0.0),
             closing_friction: 0.0,
             separation: Separation::Solve,
@@ -283,6 +298,7 @@ impl Default for Selection {
             top: 10,
             diverse: false,
             merge_symmetric: false,
+            ids: None,
             keep: None,
             pose_noise: None,
             noise_samples: 64,
@@ -322,7 +338,8 @@ impl Request {
     pub fn kept(&self) -> usize {
         let Selection { top, diverse, merge_symmetric, keep, .. } = self.selection;
         let few = self.scoring.polish == Polish::Top && !diverse && !merge_symmetric;
-        keep.unwrap_or(if few { 0 } else { KEEP }).max(top).max(1)
+        let choice = if diverse { KEEP } else { 0 };
+        keep.unwrap_or(if few { 0 } else { KEEP }).max(top).max(choice).max(1)
     }
 
     /// Reads a stored request: JSON where the file's name ends in `.json`, else TOML. Paths in it
@@ -376,6 +393,14 @@ impl Request {
         not_negative("closing_friction", closing_friction)?;
         if let Some(friction) = pad_friction {
             not_negative("pad_friction", friction)?;
+        }
+        let safety = self.scoring.safety;
+        if !(safety.is_finite() && safety > 0.0) {
+            return Err(Error::input("safety", format!("is {safety}"), "give a number above zero")
+                .with_options(&["safety"]));
+        }
+        if let Some(inertia) = self.inertia {
+            inertia.check()?;
         }
         if polish == Polish::Top && k1 < 0.0 {
             return Err(Error::input(

@@ -5,6 +5,7 @@
 //! that are not finite are null.
 
 mod file;
+mod verdict;
 mod version1;
 
 use std::collections::BTreeMap;
@@ -18,6 +19,7 @@ use crate::request::Request;
 use crate::units::{Force, Length};
 
 pub use crate::model::LoadCase;
+pub use verdict::{ForceRange, PadFriction, Verdict};
 
 /// Marks a native result file.
 pub const FORMAT: &str = "gripfast-grips";
@@ -42,7 +44,7 @@ pub struct GripSet {
     pub loads: Vec<LoadCase>,
     /// What was proposed, and why the others fell.
     pub summary: Summary,
-    /// Best first.
+    /// Best first: those that hold, then those that slip.
     pub grips: Vec<RankedGrip>,
 }
 
@@ -83,7 +85,7 @@ impl Provenance {
 }
 
 /// The values of options whose default depends on the gripper or on other options.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Resolved {
     /// Gripping force.
@@ -92,10 +94,21 @@ pub struct Resolved {
     pub spacing: Length,
     /// Friction coefficient of the pads; `None` where neither request nor gripper states one.
     pub pad_friction: Option<f64>,
+    /// Factor by which it must exceed `mu_s` for a grip to hold.
+    #[serde(default = "one")]
+    pub safety: f64,
     /// Slip twists tried for each load.
     pub seeds: usize,
     /// Best grips kept, at most.
     pub keep: usize,
+}
+
+impl Default for Resolved {
+    /// Nothing but a safety of 1.
+    fn default() -> Self {
+        let (force, spacing) = (Force::default(), Length::default());
+        Self { force, spacing, pad_friction: None, safety: one(), seeds: 0, keep: 0 }
+    }
 }
 
 /// The part as the result file carries it.
@@ -124,6 +137,9 @@ pub struct Summary {
     pub candidates: u64,
     /// Grips left in the ranking.
     pub ranked: u64,
+    /// Of these, those that hold; `None` where the friction of the pads is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub holding: Option<u64>,
     /// Rejected candidates by reason.
     pub rejections: BTreeMap<String, u64>,
     /// Against the earlier evaluation function, when asked for.
@@ -197,6 +213,10 @@ pub struct RankedGrip {
     pub grip: Grip,
     /// `k1/mu_s + k2 alpha`, larger is better; `mu_s = 0` gives infinity, written as null.
     pub score: Option<f64>,
+    /// Whether the pads hold it, see [`PadFriction::verdict`]; `None` where their friction is not
+    /// known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub holds: Option<bool>,
     /// Answer under the worst load.
     pub worst: LoadScore,
     /// Angle by which the part may be tilted before the closing jaws no longer right it \[rad\].
@@ -209,7 +229,8 @@ pub struct RankedGrip {
     pub twist_margin: f64,
     /// Pad friction over `mu_s`; `None` when the gripper states no pad friction or `mu_s = 0`.
     pub safety: Option<f64>,
-    /// Gripping force at which `mu_s` of the worst load equals the pad friction \[N\].
+    /// Gripping force of one jaw at which `mu_s` of the worst load equals the pad friction over the
+    /// safety \[N\].
     pub force_needed: Option<f64>,
     /// Ids of the grips left out because a symmetry of the part maps them to this one, where they
     /// were merged.
@@ -239,6 +260,7 @@ impl RankedGrip {
             rank: 0,
             grip,
             score: None,
+            holds: None,
             worst,
             alpha: 0.0,
             delta_d: 0.0,
@@ -275,6 +297,55 @@ pub struct LoadScore {
     /// Largest scaled residual of the seven equations.
     #[serde(with = "crate::model::null_is_infinite")]
     pub residual: f64,
+}
+
+/// The safety where nobody asks for one.
+fn one() -> f64 {
+    1.0
+}
+
+impl RankedGrip {
+    /// Friction needed under the worst load; `None` where no limit state holds it.
+    pub fn friction_needed(&self) -> Option<f64> {
+        self.worst.mu_s.filter(|_| self.worst.status.holds())
+    }
+}
+
+impl GripSet {
+    /// What the pads of this result give, and what is asked of them.
+    pub fn pads(&self) -> PadFriction {
+        let Resolved { pad_friction: value, safety, .. } = self.provenance.resolved;
+        PadFriction { value, safety }
+    }
+
+    /// Whether the pads hold a grip of this set.
+    pub fn verdict(&self, ranked: &RankedGrip) -> Verdict {
+        self.pads().verdict(ranked.friction_needed())
+    }
+
+    /// How many of the ranked grips hold, [`Summary::holding`]; of a file that does not say, how
+    /// many of those in it. `None` where the friction of the pads is not known.
+    pub fn holding(&self) -> Option<u64> {
+        self.pads().value?;
+        let holds = |ranked: &&RankedGrip| self.verdict(ranked).holds() == Some(true);
+        Some(self.summary.holding.unwrap_or_else(|| self.grips.iter().filter(holds).count() as u64))
+    }
+
+    /// Whether there is something to grip with: a grip that holds, or one at all where the friction
+    /// of the pads is not known.
+    pub fn any_holds(&self) -> bool {
+        self.grips.iter().any(|ranked| self.verdict(ranked).holds() != Some(false))
+    }
+
+    /// Least and largest gripping force of the gripper \[N\]; `None` where it does not say.
+    pub fn gripper_force(&self) -> Option<[f64; 2]> {
+        serde_json::from_value(self.gripper.get("force")?.clone()).ok()
+    }
+
+    /// Where the force that a grip needs lies in what the gripper has.
+    pub fn force_range(&self, ranked: &RankedGrip) -> Option<ForceRange> {
+        Some(ForceRange::of(ranked.force_needed?, self.gripper_force()?))
+    }
 }
 
 /// A rotation as a quaternion `[x, y, z, w]` of a proper rotation matrix.

@@ -25,6 +25,8 @@ pub enum Quantity {
     Force,
     /// Newton metres inside.
     Moment,
+    /// Kilogram square metres inside.
+    Inertia,
     /// Radians inside.
     Angle,
     /// Metres per second squared inside.
@@ -72,6 +74,7 @@ impl Quantity {
             Self::Moment => {
                 &[("Nm", 1.0), ("Nmm", 1e-3), ("mNm", 1e-3), ("lbfin", 0.112_984_829_027_616_7)]
             }
+            Self::Inertia => &[("kgm2", 1.0), ("kgmm2", 1e-6), ("gcm2", 1e-7), ("gmm2", 1e-9)],
             Self::Angle => &[("rad", 1.0), ("deg", std::f64::consts::PI / 180.0)],
             Self::Acceleration => {
                 &[("m/s2", 1.0), ("m/s^2", 1.0), ("mm/s2", 1e-3), ("g", STANDARD_GRAVITY)]
@@ -129,6 +132,14 @@ impl Quantity {
         };
         let value: f64 = text[..split].trim_end().parse().unwrap_or(f64::NAN);
         let unit = text[split..].trim();
+        if let Some(rest) =
+            unit.strip_prefix(',').filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
+        {
+            return Err((
+                format!("'{text}' has a decimal comma"),
+                format!("write a point: {}.{rest}", text[..split].trim_end()),
+            ));
+        }
         if unit.is_empty() {
             return Err((format!("'{text}' has no unit"), format!("add one of: {}", self.list())));
         }
@@ -239,6 +250,8 @@ quantities! {
     Mass, "g";
     /// A force \[N\]; `80N` as a text.
     Force, "N";
+    /// A moment of inertia [kg m^2]; `90kgmm2` as a text.
+    Inertia, "kgmm2";
     /// An angle \[rad\]; `15deg` as a text.
     Angle, "deg";
     /// An acceleration [m/s^2]; `2g` as a text.

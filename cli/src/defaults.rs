@@ -10,8 +10,8 @@ use clap::Command;
 /// Name of the file, looked for in the current folder.
 pub(crate) const FILE: &str = "gripfast.toml";
 
-/// The command line with the file's flags put right after the subcommand, where flags given by the
-/// user override them.
+/// The command line with the file's flags put right after the subcommand, less those that the user
+/// gives.
 pub(crate) fn apply(
     command: &Command,
     arguments: Vec<OsString>,
@@ -59,11 +59,16 @@ pub(crate) fn apply(
     let Some(defaults) = defaults.as_table() else {
         bail!("{}: [{name}] is not a table", file.display())
     };
+    let given = given(command, &arguments);
     let mut flags = Vec::new();
     for (key, value) in defaults {
         let at = || format!("{}: [{name}] {key}", file.display());
-        if !subcommand.get_arguments().any(|argument| argument.get_long() == Some(key)) {
+        let Some(flag) = subcommand.get_arguments().find(|flag| flag.get_long() == Some(key))
+        else {
             bail!("{}: `{name}` has no flag --{key}; see `gripfast {name} --help`", at());
+        };
+        if given.iter().any(|id| id == flag.get_id().as_str()) {
+            continue;
         }
         // A list gives the flag once for each of its values.
         for value in value.as_array().map_or(std::slice::from_ref(value), Vec::as_slice) {
@@ -80,6 +85,18 @@ pub(crate) fn apply(
     let mut out = arguments;
     out.splice(place + 1..place + 1, flags.into_iter().map(OsString::from));
     Ok(out)
+}
+
+/// The flags that stand on a command line, by their ids; of one that is wrong, those before the
+/// mistake.
+fn given(command: &Command, line: &[OsString]) -> Vec<String> {
+    let parsed = command.clone().ignore_errors(true).try_get_matches_from(line);
+    let Ok(matches) = parsed else { return Vec::new() };
+    let Some((_, matches)) = matches.subcommand() else { return Vec::new() };
+    let typed = |id: &&clap::Id| {
+        matches.value_source(id.as_str()) == Some(clap::parser::ValueSource::CommandLine)
+    };
+    matches.ids().filter(typed).map(ToString::to_string).collect()
 }
 
 #[cfg(test)]
@@ -104,12 +121,26 @@ mod tests {
         let got =
             applied("[solve]\njson = true\nsafety = 2\n", "gripfast solve case.json --safety 3")
                 .unwrap();
-        assert_eq!(
-            got,
-            ["gripfast", "solve", "--json", "--safety=2", "case.json", "--safety", "3"]
-        );
+        assert_eq!(got, ["gripfast", "solve", "--json", "case.json", "--safety", "3"]);
         use clap::Parser;
         assert!(super::super::Cli::try_parse_from(got).is_ok());
+        // A short name is the same flag, also where it stands several times in the file.
+        let got =
+            applied("[plan]\ngripper = [\"a\", \"b\"]\nmass = \"1kg\"\n", "gripfast plan x -gc");
+        assert_eq!(got.unwrap(), ["gripfast", "plan", "--mass=1kg", "x", "-gc"]);
+    }
+
+    #[test]
+    fn a_flag_given_twice_is_refused() {
+        use clap::Parser;
+        for line in [
+            "gripfast plan x -g a --mass 1kg --mass 2kg",
+            "gripfast plan x -g a --mass 1kg --force 1N --force 2N",
+            "gripfast export g.json -o a.csv -o b.csv",
+        ] {
+            let error = super::super::Cli::try_parse_from(line.split(' ')).unwrap_err();
+            assert!(error.to_string().contains("multiple times"), "{error}");
+        }
     }
 
     #[test]

@@ -8,20 +8,25 @@ use clap::Args as ClapArgs;
 use gripfast::export::{self, Convention, Format, Joint, Options, Origin};
 use gripfast::part::{Part, ReadOptions, Unit};
 use gripfast::plan::GLB_TOP;
-use gripfast::results::GripSet;
+use gripfast::results::{GripSet, PadFriction};
 use gripfast::units::Quantity;
+
+use crate::choice::ChoiceArgs;
 
 /// Writes a result file in the format of another program.
 #[derive(Debug, ClapArgs)]
 #[command(
     after_help = "EXAMPLES:\n  gripfast export grips.json -o grips.csv\n  gripfast export grips.json -o grips.npz --top 1000\n  \
+gripfast export a.json b.json -o all.csv --holding --diverse --top 20\n  \
 gripfast export grips.json --format isaac_grasp -o grips.yaml --joint panda_finger_joint1:0.5 --origin 103.4mm\n  \
 gripfast export grips.json --format moveit -o - --origin flange\n\nFORMATS (docs/formats.md describes each field):\n  \
 json, jsonl   native          csv, parquet  a table\n  isaac_grasp   YAML            graspgen      JSON\n  moveit        YAML            graspnet      .npz\n  acronym       HDF5            glb           part with grippers, to look at"
 )]
 pub(crate) struct Args {
-    /// Result file written by `gripfast plan -o`, JSON or JSON Lines.
-    grips: PathBuf,
+    /// Result file written by `gripfast plan -o`, JSON or JSON Lines. Several go into one table (csv,
+    /// parquet).
+    #[arg(required = true)]
+    grips: Vec<PathBuf>,
     /// Format; by the ending of -o when not given.
     #[arg(long, value_name = "NAME")]
     format: Option<String>,
@@ -37,9 +42,8 @@ pub(crate) struct Args {
     /// pads.
     #[arg(long, value_name = "ORIGIN", default_value = "pads")]
     origin: String,
-    /// Write only the best N (glb: 10 when not given).
-    #[arg(long, value_name = "N")]
-    top: Option<usize>,
+    #[command(flatten)]
+    choice: ChoiceArgs,
     /// Distance of the pads before closing; as planned when not given.
     #[arg(long, value_name = "LENGTH")]
     opening: Option<String>,
@@ -47,13 +51,15 @@ pub(crate) struct Args {
     /// metres + OFFSET (isaac_grasp, moveit). Give it once for each joint.
     #[arg(long, value_name = "JOINT", allow_hyphen_values = true)]
     joint: Vec<String>,
-    /// Friction of the pads on the part, for formats that hold pass or fail; the gripper's when not
-    /// given.
+    /// Friction of the pads on the part, for what holds and how well; the result's when not given.
     #[arg(long, value_name = "MU")]
     pad_friction: Option<f64>,
+    /// Safety factor on that friction; the result's when not given.
+    #[arg(long, value_name = "FACTOR")]
+    safety: Option<f64>,
     /// Straight way of approach and retreat (moveit).
     #[arg(long, value_name = "LENGTH", default_value = "100mm")]
-    approach: String,
+    approach_distance: String,
     /// Name of the part's frame (isaac_grasp, moveit).
     #[arg(long, value_name = "NAME", default_value = "part")]
     part_frame: String,
@@ -98,6 +104,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             "give a number of zero or more"
         ));
     }
+    if let Some(safety) = args.safety
+        && !(safety.is_finite() && safety > 0.0)
+    {
+        anyhow::bail!(gripfast::error::Error::input(
+            "--safety",
+            format!("{safety} is no safety factor"),
+            "give a number above zero"
+        ));
+    }
     let joints = args
         .joint
         .iter()
@@ -111,30 +126,56 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
                 .transpose()?,
         )
         .with_origin(Origin::parse("--origin", &args.origin)?)
-        .with_top(args.top.or((format == Format::Glb).then_some(GLB_TOP)))
+        .with_top((format == Format::Glb && args.choice.top.is_none()).then_some(GLB_TOP))
         .with_opening(args.opening.as_deref().map(|text| length("--opening", text)).transpose()?)
         .with_joints(if joints.is_empty() { vec![Joint::default()] } else { joints })
         .with_pad_friction(args.pad_friction)
-        .with_approach(length("--approach", &args.approach)?)
-        .with_part_frame(args.part_frame)
+        .with_safety(args.safety)
+        .with_approach(length("--approach-distance", &args.approach_distance)?)
+        .with_part_frame(args.part_frame.clone())
         .with_spreadsheet(args.spreadsheet);
-    let set = GripSet::read(&args.grips)?;
-    let part = if format == Format::Glb {
-        Some(read_part(&set, &args.grips, args.part.as_deref())?)
-    } else {
-        None
-    };
-    let mesh = part.as_ref().map(|part| &part.mesh);
-    if to_stdout {
-        let mut output = std::io::stdout();
-        export::write_to(&set, format, &mut output, &options, mesh)?;
-        output.flush()?;
-    } else {
-        export::write(&set, format, &args.output, &options, mesh)?;
-        let count = options.top.unwrap_or(usize::MAX).min(set.grips.len());
+    let mut filter = args.choice.filter();
+    let mut sets = Vec::with_capacity(args.grips.len());
+    for file in &args.grips {
+        let mut set = GripSet::read(file)?;
+        let PadFriction { value, safety } = set.pads();
+        filter.pads = Some(PadFriction {
+            value: args.pad_friction.or(value),
+            safety: args.safety.unwrap_or(safety),
+        });
+        filter.apply(&mut set)?;
+        sets.push(set);
+    }
+    write(&args, &sets, format, &options)?;
+    if !to_stdout {
+        let most = options.top.unwrap_or(usize::MAX);
+        let count: usize = sets.iter().map(|set| set.grips.len().min(most)).sum();
         crate::terminal::say(&format!("{}: {count} grips", args.output.display()));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes one result, or a table of several.
+fn write(args: &Args, sets: &[GripSet], format: Format, options: &Options) -> anyhow::Result<()> {
+    let to_stdout = args.output.as_os_str() == "-";
+    let mut output = std::io::stdout();
+    let ([set], [file]) = (sets, &args.grips[..]) else {
+        if to_stdout {
+            export::write_tables_to(sets, format, &mut output, options)?;
+            return Ok(output.flush()?);
+        }
+        return Ok(export::write_tables(sets, format, &args.output, options)?);
+    };
+    let part = match format {
+        Format::Glb => Some(read_part(set, file, args.part.as_deref())?),
+        _ => None,
+    };
+    let mesh = part.as_ref().map(|part| &part.mesh);
+    if to_stdout {
+        export::write_to(set, format, &mut output, options, mesh)?;
+        return Ok(output.flush()?);
+    }
+    Ok(export::write(set, format, &args.output, options, mesh)?)
 }
 
 /// The part of a result: the file given, or the one named in it, from the working folder or beside

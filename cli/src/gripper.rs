@@ -69,8 +69,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 fn list() -> anyhow::Result<()> {
-    let mut table =
-        new_table(&["gripper", "name", "stroke", "force", "pad x1 x x2", "friction", "unverified"]);
+    let mut table = new_table(&[
+        "gripper",
+        "name",
+        "stroke",
+        "force per jaw",
+        "pad x1 x x2",
+        "friction",
+        "unverified",
+    ]);
     for (short, _) in catalogue::CATALOGUE {
         let gripper = gripper::find(short)?;
         let pad = Bounds2::of(&gripper.pad).size() * 1e3;
@@ -106,7 +113,13 @@ fn describe(gripper: &Gripper) -> String {
         table.add_row([key, value, source].map(|text| shown(&text).into_owned()));
     };
     row("stroke".into(), range(gripper.stroke, 1e3, "mm"));
-    row("force".into(), range(gripper.force, 1.0, "N"));
+    row("force".into(), range(gripper.force, 1.0, "N per jaw"));
+    if let Some(payload) = gripper.payload {
+        row("payload".into(), format!("{} kg", short_number(payload)));
+    }
+    if let Some(moment) = gripper.moment {
+        row("moment".into(), format!("{} Nm (x1, x2, x3)", moment.map(short_number).join(", ")));
+    }
     let pad = Bounds2::of(&gripper.pad).size() * 1e3;
     row(
         "pad.size".into(),

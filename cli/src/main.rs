@@ -15,6 +15,7 @@ macro_rules! words {
 
 mod backend;
 mod bench;
+mod choice;
 mod defaults;
 mod devices;
 mod export;
@@ -39,7 +40,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 /// Finds and ranks every two-finger grip (grasp) on a CAD part by the smallest friction coefficient
 /// that holds it.
 #[derive(Debug, Parser)]
-#[command(name = "gripfast", version, about, propagate_version = true, args_override_self = true)]
+#[command(name = "gripfast", version, about, propagate_version = true)]
 #[command(
     after_help = "EXAMPLES:\n  gripfast plan bracket.stl --gripper robotiq-2f85 --mass 350g --accel 2g -o grips.json --report bracket.html\n  \
 gripfast why grips.json 962\n  gripfast export grips.json -o grips.csv\n  gripfast pick grips.json --scene cell.toml\n\nEXIT CODES:\n  0  done    1  done, but nothing found    2  bad input, bad usage or a failed run\n\n\
@@ -94,8 +95,44 @@ fn command() -> clap::Command {
 /// Parses the command line, or says what is wrong with it and ends.
 fn parse(line: Vec<std::ffi::OsString>) -> Cli {
     let mut command = command();
-    let matches = command.try_get_matches_from_mut(line).unwrap_or_else(|error| error.exit());
+    let matches =
+        command.try_get_matches_from_mut(line).unwrap_or_else(|error| plain(error).exit());
     Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut command).exit())
+}
+
+/// An error of the command line with advice that helps: a value that begins with a dash is joined to
+/// its flag, and a file is no subcommand.
+fn plain(mut error: clap::Error) -> clap::Error {
+    use clap::error::{ContextKind, ContextValue, ErrorKind};
+    let text = |error: &clap::Error, kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => text.clone(),
+        _ => String::new(),
+    };
+    let advice = match error.kind() {
+        ErrorKind::UnknownArgument => {
+            let argument = text(&error, ContextKind::InvalidArg);
+            let value = argument.strip_prefix('-').is_some_and(|rest| {
+                rest.starts_with(|sign: char| sign.is_ascii_digit() || sign == '.')
+            });
+            error.remove(ContextKind::Suggested);
+            match value {
+                true => "join a value that begins with a dash to its flag, e.g. --mass=-350g",
+                false => return error,
+            }
+        }
+        ErrorKind::InvalidSubcommand
+            if Path::new(&text(&error, ContextKind::InvalidSubcommand)).exists() =>
+        {
+            error.remove(ContextKind::Suggested);
+            error.remove(ContextKind::SuggestedSubcommand);
+            "say what to do with this file, e.g. gripfast plan PART --gripper generic --mass 350g, \
+             or gripfast part PART"
+        }
+        _ => return error,
+    };
+    let advice = clap::builder::StyledStr::from(advice);
+    error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice]));
+    error
 }
 
 /// Parses the command line and runs the subcommand.

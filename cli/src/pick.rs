@@ -12,6 +12,9 @@ use gripfast::pick::{Picker, Scene};
 use gripfast::results::{GripSet, quaternion_xyzw};
 use serde_json::json;
 
+use crate::flags::warning;
+use crate::terminal::say;
+
 /// Passed-over grips that are listed in words; the rest is counted.
 const LISTED: usize = 10;
 
@@ -29,6 +32,9 @@ pub(crate) struct Args {
     /// Scene file: the part's pose, obstacles, limits of the robot.
     #[arg(long, value_name = "FILE")]
     scene: PathBuf,
+    /// Take grips too that slip with the friction of the pads; they are passed over otherwise.
+    #[arg(long)]
+    allow_slip: bool,
     /// Print JSON, with the reason for every grip passed over.
     #[arg(long)]
     json: bool,
@@ -48,7 +54,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let origin = Origin::parse("--origin", &args.origin)?;
     let set = GripSet::read(&args.grips)?;
     let scene = Scene::read(&args.scene)?;
-    let picker = Picker::new(&set, &scene)?;
+    let picker = Picker::new(&set, &scene)?.allow_slip(args.allow_slip);
+    let warnings = &set.provenance.warnings;
+    warnings.iter().for_each(|text| say(&format!("warning: {}", warning(text))));
     let grip_from_tool = grip_from_tool(convention, origin, Some(picker.gripper()))?;
     let started = Instant::now();
     let pick = picker.pick(&scene.world_from_part);
@@ -85,6 +93,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
                 "id": grip.grip.id,
                 "mu_s": grip.worst.mu_s,
                 "score": grip.score,
+                "verdict": set.verdict(grip).name(),
                 "width_m": grip.grip.width,
                 "opened_m": picker.opened(&grip.grip),
                 "world_from_tool": {"position": pose.origin, "quaternion_xyzw": quaternion_xyzw(pose.rotation)},
@@ -95,7 +104,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         });
         serde_json::to_writer(
             &mut out,
-            &json!({"chosen": chosen, "passed": passed, "counts": counts, "grips": set.grips.len(), "seconds": seconds}),
+            &json!({"chosen": chosen, "passed": passed, "counts": counts, "grips": set.grips.len(), "warnings": warnings, "seconds": seconds}),
         )?;
         writeln!(out)?;
     } else {
@@ -115,15 +124,27 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             }
         }
         match chosen.zip(pose) {
-            None => writeln!(out, "no grip of {} is free", set.grips.len())?,
+            None => {
+                let slips = match counts.contains_key("slips") {
+                    true => " and holds (--allow-slip takes those that slip too)",
+                    false => "",
+                };
+                writeln!(out, "no grip of {} is free{slips}", set.grips.len())?;
+            }
             Some((grip, pose)) => {
                 // Rounded first: no negative zeros.
                 let tidy = |value: f64, step: f64| (value * step).round() / step + 0.0;
                 let [x, y, z] = (pose.origin * 1e3).to_array().map(|value| tidy(value, 1e3));
                 let [qx, qy, qz, qw] = quaternion_xyzw(pose.rotation).map(|value| tidy(value, 1e6));
-                writeln!(out, "free: rank {}, id {}", grip.rank, grip.grip.id)?;
+                let slips = match set.verdict(grip).holds() {
+                    Some(false) => ", but it slips",
+                    _ => "",
+                };
+                writeln!(out, "free: rank {}, id {}{slips}", grip.rank, grip.grip.id)?;
                 if let Some(mu_s) = grip.worst.mu_s {
-                    writeln!(out, "  smallest friction that holds  {mu_s:.4}")?;
+                    let pads = set.pads().value.map(|pads| format!(", the pads have {pads}"));
+                    let pads = pads.unwrap_or_default();
+                    writeln!(out, "  smallest friction that holds  {mu_s:.4}{pads}")?;
                 }
                 writeln!(
                     out,

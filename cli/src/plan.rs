@@ -1,24 +1,41 @@
 //! `gripfast plan`: from a part to ranked grips.
 
 mod flags;
+mod layout;
+mod several;
 mod table;
 mod watch;
 
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::Context;
+use gripfast::error::Error;
 use gripfast::plan::{Ahead, Observer, Outcome, Plan};
 
 use super::why;
 use crate::terminal;
 use watch::Watch;
 
-pub(crate) use flags::{Args, with_defaults};
+pub(crate) use flags::{Args, share, with_defaults};
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (why, print) = (args.why(), args.print_request);
+    let grippers = args.grippers().to_vec();
     let request = args.request()?;
+    if grippers.len() > 1 {
+        if why.is_some() || print {
+            let flag = if print { "--print-request" } else { "--why" };
+            return Err(Error::input(
+                flag,
+                "is about one gripper, and several are given",
+                "give one",
+            )
+            .into());
+        }
+        return several::run(&request, &grippers);
+    }
     if print {
         write!(terminal::output(), "{}", request.to_toml())?;
         return Ok(ExitCode::SUCCESS);
@@ -38,10 +55,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let outcome = outcome?;
     print_answer(&plan, &outcome)?;
     notes(&plan, &outcome);
+    let output = &plan.request().output;
+    let watched = std::io::stdout().is_terminal() && std::io::stderr().is_terminal();
+    if watched && !output.quiet && !output.json {
+        terminal::say(&hint(&outcome, output.output.as_deref()));
+    }
     Ok(match interrupt.code() {
         Some(code) if !outcome.set.provenance.complete => ExitCode::from(code),
-        _ if outcome.set.grips.is_empty() => ExitCode::from(1),
-        _ => ExitCode::SUCCESS,
+        _ if outcome.set.any_holds() => ExitCode::SUCCESS,
+        _ => ExitCode::from(1),
     })
 }
 
@@ -92,7 +114,8 @@ fn print_answer(plan: &Plan, outcome: &Outcome) -> anyhow::Result<()> {
         return Ok(());
     }
     drop(out);
-    table::print(&mut terminal::output(), &outcome.set, &outcome.shown(), plan.gripper())
+    let (mut out, width) = (terminal::output(), layout::width());
+    table::print(&mut out, &outcome.set, &outcome.shown(), plan.gripper(), width)
 }
 
 /// What became of the files, and of an interrupted run.
@@ -110,5 +133,25 @@ fn notes(plan: &Plan, outcome: &Outcome) {
     }
     for path in &outcome.written {
         terminal::say(&format!("wrote {}", path.display()));
+    }
+}
+
+/// The commands to run next.
+fn hint(outcome: &Outcome, file: Option<&Path>) -> String {
+    let Some(best) = outcome.set.grips.first() else {
+        return "next: --report page.html shows the reasons and what would help".to_owned();
+    };
+    match file.filter(|file| file.extension().is_none_or(|ending| ending == "json")) {
+        Some(file) => {
+            let file = file.display();
+            format!(
+                "next: gripfast why {file} {}; gripfast report {file}; gripfast export {file} -o \
+                 grips.csv; gripfast pick {file} --scene cell.toml",
+                best.grip.id
+            )
+        }
+        None => "next: -o grips.json keeps the grips for `gripfast why`, `report`, `export` and \
+                 `pick`; --report page.html shows them"
+            .to_owned(),
     }
 }

@@ -11,13 +11,15 @@ use gripfast::plan::{WHOLE, solve_every_load};
 use gripfast::report;
 use gripfast::results::{GripSet, PartSummary};
 
+use crate::choice::ChoiceArgs;
+
 /// Corners of the bounding box may differ by this share of its diagonal from the result's.
 const SAME_BOX: f64 = 1e-6;
 
 /// Writes a result file as one HTML page with the part in three dimensions, which needs no network.
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "EXAMPLES:\n  gripfast report grips.json\n  gripfast report grips.json --part bracket.stl -o bracket.html\n\n\
+    after_help = "EXAMPLES:\n  gripfast report grips.json\n  gripfast report grips.json --part bracket.stl -o bracket.html\n  gripfast report grips.json --diverse --top 8 -o eight.html\n\n\
 Without --part the part file that the result names is used: as written there, or else beside the result file.\n\
 When neither exists, the part is drawn as its bounding box.\n\n\
 The friction over all loads is shown for the best 20 grips, and for others whose loads the result keeps (plan --polish all)."
@@ -28,6 +30,8 @@ pub(crate) struct Args {
     /// The part file, when it is no longer where the result names it.
     #[arg(long, value_name = "FILE")]
     part: Option<PathBuf>,
+    #[command(flatten)]
+    choice: ChoiceArgs,
     /// Page to write. Default: the result file's name with .html.
     #[arg(short, long, value_name = "FILE.html")]
     output: Option<PathBuf>,
@@ -35,6 +39,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut set = GripSet::read(&args.grips)?;
+    args.choice.filter().apply(&mut set)?;
     let output = args.output.unwrap_or_else(|| args.grips.with_extension("html"));
     if output == args.grips {
         return Err(Error::input(

@@ -9,7 +9,7 @@ use gripfast::error::{Error, Result};
 use gripfast::gripper::Gripper;
 use gripfast::part::{Part, ReadOptions, Unit};
 use gripfast::propose::{Explanation, ProposeOptions, Proposer};
-use gripfast::results::{GripSet, RankedGrip};
+use gripfast::results::{ForceRange, GripSet, RankedGrip};
 use gripfast::units::Quantity;
 
 /// Explains one grip of a result file: every test with body and place, and what its score is made
@@ -44,7 +44,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         .map_err(|error| Error::input(&file, format!("gripper: {error}"), "make the file again"))?;
     let path = args.part.unwrap_or_else(|| PathBuf::from(&set.part.file));
     let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == set.part.unit_m);
-    let part = Part::read(&path, &ReadOptions::default().with_unit(unit))?;
+    let mut part = Part::read(&path, &ReadOptions::default().with_unit(unit))?;
+    part.set_centre_of_mass(set.part.mass.centre_of_mass);
     let options = ProposeOptions::from(&set.provenance.request.candidates);
     let proposer = Proposer::new(&part, &gripper, &options)?;
     let explanation = proposer.explain_pose(
@@ -103,9 +104,19 @@ fn limits(out: &mut impl Write, ranked: &RankedGrip, set: &GripSet) -> std::io::
     {
         let friction = set.provenance.resolved.pad_friction;
         let friction = friction.map_or(String::new(), |friction| format!(" {friction}"));
+        let asked = match set.pads().safety {
+            1.0 => String::new(),
+            safety => format!(" for a safety of {safety}"),
+        };
+        let range = match set.force_range(ranked) {
+            Some(ForceRange::Above) => " (more than the gripper has)",
+            Some(ForceRange::Below) => " (less than its least)",
+            _ => "",
+        };
         writeln!(
             out,
-            "  with the pads' friction{friction}: safety {safety:.2}, gripping force needed {needed:.2} N, held up to {multiple:.2} times this load"
+            "  {} with the pads' friction{friction}: safety {safety:.2}, gripping force needed{asked} {needed:.2} N per jaw{range}, held up to {multiple:.2} times this load",
+            set.verdict(ranked).name()
         )?;
     }
     if let Some(noise) = ranked.pose_noise {

@@ -54,17 +54,19 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
         .iter()
         .flat_map(|grip| super::matrix(&view.pose(grip)).into_iter().flatten())
         .collect();
+    let warnings: Vec<String> = view.warnings().collect();
     grasps
         .create_dataset("transforms")
         .with_f64_data(&transforms)
         .with_shape(&[count, 4, 4])
-        .set_attr("tool_frame", AttrValue::String(view.tool_frame()));
+        .set_attr("tool_frame", AttrValue::String(view.tool_frame()))
+        .set_attr("warnings", AttrValue::String(warnings.join("\n")));
     let mut qualities = grasps.create_group("qualities");
     let mut flex = qualities.create_group("flex");
     let held: Vec<i64> = grips.iter().map(|grip| i64::from(view.holds(grip))).collect();
     flex.create_dataset("object_in_gripper").with_i64_data(&held).set_attr(
         "source",
-        AttrValue::String("computed: mu_s <= pad friction; not simulated".into()),
+        AttrValue::String("computed: mu_s x safety <= pad friction; not simulated".into()),
     );
     qualities.add_group(flex.finish());
     let mut own = qualities.create_group("gripfast");

@@ -129,7 +129,7 @@ pub(super) fn write(
             "name": id,
             "matrix": columns(&view.pose(grip)),
             "children": [gripper],
-            "extras": {"rank": grip.rank, "id": grip.grip.id, "width_m": grip.grip.width, "mu_s": grip.worst.mu_s, "score": grip.score, "tool_frame": view.tool_frame()},
+            "extras": {"rank": grip.rank, "id": grip.grip.id, "width_m": grip.grip.width, "mu_s": grip.worst.mu_s, "score": grip.score, "verdict": view.verdict(grip).name(), "tool_frame": view.tool_frame()},
         })));
     }
     let material = |name: &str, colour: [f64; 4]| {
@@ -140,7 +140,7 @@ pub(super) fn write(
     let mut document = json!({
         "asset": {"version": "2.0", "generator": format!("gripfast {}", env!("CARGO_PKG_VERSION"))},
         "scene": 0,
-        "scenes": [{"name": "grips"}],
+        "scenes": [{"name": "grips", "extras": {"warnings": view.set.provenance.warnings}}],
         "materials": [
             material("part", [0.62, 0.66, 0.70, 1.0]),
             material("best grip", [0.10, 0.60, 0.30, 1.0]),

@@ -34,6 +34,8 @@ struct Notes<'a> {
     tool_frame: String,
     gripper: Option<&'a str>,
     version: &'a str,
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    warnings: &'a [String],
 }
 
 pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result<()> {
@@ -51,6 +53,7 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
             tool_frame: view.tool_frame(),
             gripper: view.gripper.as_ref().map(|gripper| gripper.name.as_str()),
             version: &view.set.provenance.gripfast,
+            warnings: &view.set.provenance.warnings,
         },
     };
     serde_json::to_writer(&mut *writer, &file)?;

@@ -5,9 +5,9 @@ use std::io::Write;
 
 use glam::DQuat;
 
+use super::View;
 use super::table::positive;
 use super::yaml::{number, string};
-use super::{View, quality};
 
 pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result<()> {
     let gripper = view.gripper.as_ref().map_or("gripper", |gripper| gripper.name.as_str());
@@ -18,6 +18,9 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
         "# position: metres; orientation: unit quaternion; both of the gripper frame in the part frame."
     )?;
     writeln!(writer, "# gripper frame: {}", view.tool_frame())?;
+    for warning in view.warnings() {
+        writeln!(writer, "# warning: {warning}")?;
+    }
     writeln!(
         writer,
         "object_frame: {}\ngripper_frame: {}\n",
@@ -31,7 +34,7 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
         let [x, y, z] = pose.origin.to_array().map(number);
         let [qx, qy, qz, qw] = positive(DQuat::from_mat3(&pose.rotation)).to_array().map(number);
         writeln!(writer, "  {}:", string(&format!("grasp_{}", grip.grip.id)))?;
-        writeln!(writer, "    confidence: {}", number(quality(grip)))?;
+        writeln!(writer, "    confidence: {}", number(view.quality(grip)))?;
         writeln!(writer, "    position: [{x}, {y}, {z}]")?;
         writeln!(writer, "    orientation: {{w: {qw}, xyz: [{qx}, {qy}, {qz}]}}")?;
         for (name, width) in

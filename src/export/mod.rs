@@ -17,14 +17,19 @@ mod yaml;
 use std::io::Write;
 use std::path::Path;
 
+use glam::DVec3;
+
 use crate::error::{Error, ErrorKind, Result};
 use crate::gripper::Gripper;
 use crate::model::Frame;
 use crate::part::Mesh;
-use crate::results::{GripSet, RankedGrip};
+use crate::results::{GripSet, PadFriction, RankedGrip, Verdict};
 
 pub use table::{Column, Table, Values, table};
 pub use tool::{Convention, Joint, Origin, Stated, grip_from_tool};
+
+/// Coordinates \[m\] and components of unit vectors below this are rounding.
+const ROUNDING: f64 = 1e-15;
 
 /// A file format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -140,8 +145,10 @@ pub struct Options {
     pub opening: Option<f64>,
     /// Joints of the gripper as functions of the pads' distance.
     pub joints: Vec<Joint>,
-    /// Pad friction for formats that hold pass or fail; the gripper's when absent.
+    /// Pad friction for what holds and how well; the result's when absent.
     pub pad_friction: Option<f64>,
+    /// Safety asked of it; the result's when absent.
+    pub safety: Option<f64>,
     /// Straight way of the approach and the retreat \[m\].
     pub approach: f64,
     /// Name of the part frame (moveit, isaac_grasp).
@@ -157,6 +164,7 @@ setters!(Options {
     with_opening: opening: Option<f64>,
     with_joints: joints: Vec<Joint>,
     with_pad_friction: pad_friction: Option<f64>,
+    with_safety: safety: Option<f64>,
     with_approach: approach: f64,
     with_part_frame: part_frame: String,
     with_spreadsheet: spreadsheet: bool,
@@ -171,6 +179,7 @@ impl Default for Options {
             opening: None,
             joints: vec![Joint::default()],
             pad_friction: None,
+            safety: None,
             approach: 0.1,
             part_frame: "part".into(),
             spreadsheet: false,
@@ -235,7 +244,15 @@ impl<'a> View<'a> {
 
     /// The tool frame in the part frame.
     fn pose(&self, grip: &RankedGrip) -> Frame {
-        grip.grip.part_from_grip.compose(&self.grip_from_tool(grip))
+        let mut pose = grip.grip.part_from_grip.compose(&self.grip_from_tool(grip));
+        let axes = [
+            &mut pose.rotation.x_axis,
+            &mut pose.rotation.y_axis,
+            &mut pose.rotation.z_axis,
+            &mut pose.origin,
+        ];
+        axes.into_iter().for_each(|vector| *vector = tidy(*vector));
+        pose
     }
 
     /// Distance of the pads in the grip \[m\].
@@ -258,14 +275,48 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Whether the pads' friction holds the worst load; without a known friction, whether any
-    /// would.
+    /// What the pads give and what is asked of them.
+    fn pads(&self) -> PadFriction {
+        let PadFriction { value, safety } = self.set.pads();
+        PadFriction {
+            value: self.options.pad_friction.or(value),
+            safety: self.options.safety.unwrap_or(safety),
+        }
+    }
+
+    fn verdict(&self, grip: &RankedGrip) -> Verdict {
+        self.pads().verdict(grip.friction_needed())
+    }
+
+    /// Whether it holds; without a known friction, whether any friction would do.
     fn holds(&self, grip: &RankedGrip) -> bool {
-        let friction = self
-            .options
-            .pad_friction
-            .or_else(|| self.gripper.as_ref().and_then(|gripper| gripper.pad_friction));
-        grip.worst.mu_s.is_some_and(|mu_s| friction.is_none_or(|friction| mu_s <= friction))
+        self.verdict(grip).holds() != Some(false)
+    }
+
+    /// See [`PadFriction::quality`].
+    fn quality(&self, grip: &RankedGrip) -> f64 {
+        self.pads().quality(grip.friction_needed())
+    }
+
+    /// What a user should know before relying on the numbers, a line each.
+    fn warnings(&self) -> impl Iterator<Item = String> {
+        let one_line = |text: &String| text.split_whitespace().collect::<Vec<_>>().join(" ");
+        self.set.provenance.warnings.iter().map(one_line)
+    }
+
+    /// The gripper's name; empty where the result states none.
+    fn name(&self) -> &str {
+        self.set.gripper.get("name").and_then(serde_json::Value::as_str).unwrap_or_default()
+    }
+
+    /// What a table's file says beside the rows.
+    fn notes(&self) -> serde_json::Value {
+        serde_json::json!({
+            "tool_frame": self.tool_frame(),
+            "part": self.set.part,
+            "provenance": self.set.provenance,
+            "loads": self.set.loads,
+        })
     }
 
     /// The tool frame in words.
@@ -274,10 +325,9 @@ impl<'a> View<'a> {
     }
 }
 
-/// A quality in (0, 1] that falls with `mu_s`: 1 when no friction is needed, 1/2 at `mu_s = 1`, 0
-/// when no friction holds.
-fn quality(grip: &RankedGrip) -> f64 {
-    grip.worst.mu_s.map_or(0.0, |mu_s| 1.0 / (1.0 + mu_s))
+/// Components that are nothing but rounding are zeros.
+fn tidy(vector: DVec3) -> DVec3 {
+    vector.map(|value| if value.abs() < ROUNDING { 0.0 } else { value })
 }
 
 /// Rows of the homogeneous matrix of a frame.
@@ -327,6 +377,71 @@ pub fn write_to(
         .map_err(|error| Error::io(Path::new("standard output"), "write", error))
 }
 
+/// Writes the grips of several results into one table, CSV or Parquet: the rows of the first, then
+/// those of the next; whole or not at all.
+///
+/// # Errors
+/// When the format is no table, and as [`write()`].
+pub fn write_tables(
+    sets: &[GripSet],
+    format: Format,
+    path: &Path,
+    options: &Options,
+) -> Result<()> {
+    let tables = joined(sets, format, options)?;
+    crate::file::write(path, |writer| write_table(&tables, format, options.spreadsheet, writer))
+}
+
+/// As [`write_tables`], to a writer.
+///
+/// # Errors
+/// As [`write_tables`].
+pub fn write_tables_to(
+    sets: &[GripSet],
+    format: Format,
+    writer: &mut (impl Write + Send),
+    options: &Options,
+) -> Result<()> {
+    write_table(&joined(sets, format, options)?, format, options.spreadsheet, writer)
+        .map_err(|error| Error::io(Path::new("standard output"), "write", error))
+}
+
+/// The table of several results with what a file says of them.
+fn joined(
+    sets: &[GripSet],
+    format: Format,
+    options: &Options,
+) -> Result<(Table, serde_json::Value)> {
+    check(format)?;
+    if !matches!(format, Format::Csv | Format::Parquet) {
+        return Err(Error::input(
+            "results",
+            format!("{} of them do not go into one file of this format", sets.len()),
+            "write csv or parquet, or a file for each",
+        ));
+    }
+    let mut all = Table::default();
+    let mut notes = Vec::new();
+    for set in sets {
+        let view = View::new(set, format, options)?;
+        all.append(table::from_view(&view));
+        notes.push(view.notes());
+    }
+    Ok((all, serde_json::json!({ "results": notes })))
+}
+
+fn write_table(
+    (table, notes): &(Table, serde_json::Value),
+    format: Format,
+    spreadsheet: bool,
+    writer: &mut (impl Write + Send),
+) -> std::io::Result<()> {
+    match format {
+        Format::Parquet => parquet::write(table, notes, writer),
+        _ => table::write_csv(table, spreadsheet, writer),
+    }
+}
+
 /// Refuses a format that this build lacks, before anything is computed or written.
 ///
 /// # Errors
@@ -366,7 +481,7 @@ fn write_view(
             }
         }
         Format::Csv => table::write_csv(&table::from_view(view), view.options.spreadsheet, writer),
-        Format::Parquet => parquet::write(view, writer),
+        Format::Parquet => parquet::write(&table::from_view(view), &view.notes(), writer),
         Format::IsaacGrasp => isaac::write(view, writer),
         Format::GraspGen => graspgen::write(view, writer),
         Format::MoveIt => moveit::write(view, writer),

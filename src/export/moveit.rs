@@ -4,9 +4,9 @@ use std::io::Write;
 
 use glam::{DQuat, DVec3};
 
+use super::View;
 use super::table::positive;
 use super::yaml::{number, string};
-use super::{View, quality};
 
 /// Share of the approach and retreat that must be free: half of them.
 const LEAST_SHARE: f64 = 0.5;
@@ -42,6 +42,9 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
     };
     writeln!(writer, "# moveit_msgs/Grasp, best first. Poses in metres in the frame of the part.")?;
     writeln!(writer, "# Tool frame: {}", view.tool_frame())?;
+    for warning in view.warnings() {
+        writeln!(writer, "# Warning: {warning}")?;
+    }
     let grips = view.grips();
     if grips.is_empty() {
         return writeln!(writer, "[]");
@@ -63,7 +66,7 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
             "  grasp_pose:\n    header: {header}\n    pose:\n      position: {{x: {x}, y: {y}, z: {z}}}"
         )?;
         writeln!(writer, "      orientation: {{x: {qx}, y: {qy}, z: {qz}, w: {qw}}}")?;
-        writeln!(writer, "  grasp_quality: {}", number(quality(grip)))?;
+        writeln!(writer, "  grasp_quality: {}", number(view.quality(grip)))?;
         writeln!(writer, "  pre_grasp_approach:\n{}", translation(approach))?;
         writeln!(writer, "  post_grasp_retreat:\n{}", translation(-approach))?;
         writeln!(writer, "  post_place_retreat:\n{}", translation(-approach))?;

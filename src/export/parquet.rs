@@ -1,12 +1,18 @@
-//! The table as Apache Parquet (Zstandard), with the tool frame and the provenance among the file's
+//! A table as Apache Parquet (Zstandard), with the tool frame and the provenance among the file's
 //! key-value pairs.
 
 use std::io::Write;
 
-use super::View;
+use serde_json::Value;
+
+use super::Table;
 
 #[cfg(feature = "parquet")]
-pub(super) fn write(view: &View<'_>, writer: &mut (impl Write + Send)) -> std::io::Result<()> {
+pub(super) fn write(
+    table: &Table,
+    notes: &Value,
+    writer: &mut (impl Write + Send),
+) -> std::io::Result<()> {
     use std::collections::HashMap;
     use std::sync::Arc;
 
@@ -18,30 +24,25 @@ pub(super) fn write(view: &View<'_>, writer: &mut (impl Write + Send)) -> std::i
 
     use super::Values;
 
-    let table = super::table::from_view(view);
     let mut fields = Vec::new();
     let mut arrays: Vec<ArrayRef> = Vec::new();
-    for column in table.columns {
-        let (kind, nullable, array): (_, _, ArrayRef) = match column.values {
+    for column in &table.columns {
+        let (kind, nullable, array): (_, _, ArrayRef) = match &column.values {
             Values::Integer(values) => {
-                (DataType::UInt64, false, Arc::new(UInt64Array::from(values)))
+                (DataType::UInt64, false, Arc::new(UInt64Array::from(values.clone())))
             }
             Values::Number(values) => {
-                (DataType::Float64, true, Arc::new(Float64Array::from(values)))
+                (DataType::Float64, true, Arc::new(Float64Array::from(values.clone())))
             }
-            Values::Text(values) => (DataType::Utf8, false, Arc::new(StringArray::from(values))),
+            Values::Text(values) => {
+                (DataType::Utf8, false, Arc::new(StringArray::from(values.clone())))
+            }
         };
         fields.push(Field::new(column.name, kind, nullable));
         arrays.push(array);
     }
     // In the schema's metadata, where readers by way of Arrow see it; the writer repeats it as a
     // key-value pair of the file. One key: the order of several would change from run to run.
-    let notes = serde_json::json!({
-        "tool_frame": view.tool_frame(),
-        "part": view.set.part,
-        "provenance": view.set.provenance,
-        "loads": view.set.loads,
-    });
     let notes = HashMap::from([("gripfast".to_owned(), notes.to_string())]);
     let schema = Arc::new(Schema::new_with_metadata(fields, notes));
     let batch = RecordBatch::try_new(Arc::clone(&schema), arrays).map_err(std::io::Error::other)?;
@@ -56,6 +57,10 @@ pub(super) fn write(view: &View<'_>, writer: &mut (impl Write + Send)) -> std::i
 }
 
 #[cfg(not(feature = "parquet"))]
-pub(super) fn write(_view: &View<'_>, _writer: &mut impl Write) -> std::io::Result<()> {
+pub(super) fn write(
+    _table: &Table,
+    _notes: &Value,
+    _writer: &mut impl Write,
+) -> std::io::Result<()> {
     Err(std::io::ErrorKind::Unsupported.into())
 }

@@ -4,11 +4,11 @@ use std::io::Write;
 
 use glam::{DQuat, DVec3};
 
-use super::{Format, Options, View};
+use super::{Format, Options, View, tidy};
 use crate::error::Result;
 use crate::geometry::patch_area;
 use crate::model::Slip;
-use crate::results::{GripSet, RankedGrip};
+use crate::results::{ForceRange, GripSet, PadFriction, RankedGrip};
 
 /// A column with its name, which ends in the unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,12 +31,74 @@ pub enum Values {
 }
 
 /// Columns of equal length.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table {
     /// In the order in which they are written.
     pub columns: Vec<Column>,
     /// Number of grips.
     pub rows: usize,
+}
+
+impl Values {
+    fn len(&self) -> usize {
+        match self {
+            Self::Integer(values) => values.len(),
+            Self::Number(values) => values.len(),
+            Self::Text(values) => values.len(),
+        }
+    }
+
+    /// Adds the values of a column of this kind, and before and after them what stands for none.
+    fn fill(&mut self, length: usize, more: Option<Self>) {
+        match (self, more) {
+            (Self::Integer(all), more) => {
+                all.resize(length, 0);
+                if let Some(Self::Integer(more)) = more {
+                    all.extend(more);
+                }
+            }
+            (Self::Number(all), more) => {
+                all.resize(length, None);
+                if let Some(Self::Number(more)) = more {
+                    all.extend(more);
+                }
+            }
+            (Self::Text(all), more) => {
+                all.resize(length, String::new());
+                if let Some(Self::Text(more)) = more {
+                    all.extend(more);
+                }
+            }
+        }
+    }
+}
+
+impl Table {
+    /// Adds the rows of another table below; a column that only one of them has is empty in the
+    /// rows of the other.
+    pub(super) fn append(&mut self, other: Self) {
+        let rows = self.rows;
+        for column in other.columns {
+            match self.columns.iter_mut().find(|known| known.name == column.name) {
+                Some(known) => known.values.fill(rows, Some(column.values)),
+                None => {
+                    let mut values = match &column.values {
+                        Values::Integer(_) => Values::Integer(Vec::new()),
+                        Values::Number(_) => Values::Number(Vec::new()),
+                        Values::Text(_) => Values::Text(Vec::new()),
+                    };
+                    values.fill(rows, Some(column.values));
+                    self.columns.push(Column { name: column.name, values });
+                }
+            }
+        }
+        self.rows += other.rows;
+        for column in &mut self.columns {
+            if column.values.len() < self.rows {
+                column.values.fill(self.rows, None);
+            }
+        }
+    }
 }
 
 /// The table of a set.
@@ -79,6 +141,7 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
         number("score", &|grip| grip.score),
         number("mu_s", &|grip| grip.worst.mu_s),
         text("status", &|grip| word(&grip.worst.status)),
+        text("verdict", &|grip| view.verdict(grip).name().to_owned()),
         integer("load", &|grip| u64::from(grip.worst.load)),
         text("load_name", &|grip| {
             view.set
@@ -100,10 +163,10 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
             .map(|(index, name)| number(name, &|grip| Some(quaternion(grip)[index]))),
     );
     columns.extend(vector(["approach_x", "approach_y", "approach_z"], &|grip| {
-        grip.grip.part_from_grip.rotation.x_axis
+        tidy(grip.grip.part_from_grip.rotation.x_axis)
     }));
     columns.extend(vector(["closing_x", "closing_y", "closing_z"], &|grip| {
-        grip.grip.part_from_grip.rotation.z_axis
+        tidy(grip.grip.part_from_grip.rotation.z_axis)
     }));
     columns.extend([
         text("tool_frame", &|_| view.tool_frame()),
@@ -112,12 +175,18 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
         number("angle_rad", &|grip| Some(grip.grip.angle)),
         number("area_i_m2", &|grip| Some(patch_area(&grip.grip.contact.face_i))),
         number("area_ii_m2", &|grip| Some(patch_area(&grip.grip.contact.face_ii))),
+        number("pad_share", &|grip| {
+            view.gripper.as_ref().map(|gripper| gripper.pad_share(&grip.grip.contact))
+        }),
         number("contact_share", &|grip| Some(grip.contact_share)),
         number("twist_margin", &|grip| Some(grip.twist_margin)),
         number("alpha_rad", &|grip| Some(grip.alpha)),
         number("delta_d_m", &|grip| Some(grip.delta_d)),
         number("safety", &|grip| grip.safety),
         number("force_needed_n", &|grip| grip.force_needed),
+        text("force_range", &|grip| {
+            view.set.force_range(grip).map_or("", ForceRange::name).to_owned()
+        }),
         number("load_multiple", &|grip| grip.load_multiple),
         text("slip", &|grip| match grip.worst.slip {
             Some(Slip::Rotation { .. }) => "rotation".into(),
@@ -138,6 +207,16 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
         number("mu_lower", &|grip| grip.worst.bounds.map(|bounds| bounds.lower)),
         number("mu_upper", &|grip| grip.worst.bounds.map(|bounds| bounds.upper)),
         number("residual", &|grip| Some(grip.worst.residual)),
+    ]);
+    // What the whole result is about, so that rows of several can stand in one table.
+    let PadFriction { value: friction, safety } = view.pads();
+    columns.extend([
+        text("part", &|_| view.set.part.file.clone()),
+        text("gripper", &|_| view.name().to_owned()),
+        number("mass_kg", &|_| Some(view.set.part.mass.mass)),
+        number("force_n", &|_| Some(view.set.provenance.resolved.force.0)),
+        number("pad_friction", &|_| friction),
+        number("safety_asked", &|_| Some(safety)),
     ]);
     // Only where they were asked for.
     if grips.iter().any(|grip| grip.pose_noise.is_some()) {

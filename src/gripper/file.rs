@@ -18,6 +18,8 @@ struct File {
     name: String,
     stroke: [String; 2],
     force: [String; 2],
+    payload: Option<String>,
+    moment: Option<[String; 3]>,
     pad: Pad,
     #[serde(default)]
     finger: Vec<Solid>,
@@ -138,6 +140,22 @@ pub fn read(path: &Path) -> Result<Gripper> {
     parse_in(&text, &place, path.parent())
 }
 
+/// What TOML's reader says of a value of another shape, with the shapes that this file has.
+fn shape(message: &str) -> String {
+    let hint = if message.contains("expected an array of length 2") {
+        "give two texts with units, e.g. stroke = [\"0mm\", \"85mm\"] or force = [\"20N\", \"235N\"]"
+    } else if message.contains("expected an array of length 3") {
+        "give three texts with units along x1, x2, x3, e.g. [\"40mm\", \"20mm\", \"8mm\"]"
+    } else if message.contains("expected a sequence") {
+        "bodies stand in double brackets, one table for each: [[finger]], [[palm]]"
+    } else if message.contains("expected a string") {
+        "give a text with its unit, e.g. \"12mm\""
+    } else {
+        return message.to_string();
+    };
+    format!("{message}: {hint}")
+}
+
 /// Parses the text of a gripper file; `place` names it in messages. Such a text cannot name mesh
 /// files.
 ///
@@ -157,7 +175,7 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
         });
         Error::format(
             format!("{place}{line}"),
-            error.message().to_string(),
+            shape(error.message()),
             "compare with a shipped file: `gripfast gripper show generic`",
         )
     })?;
@@ -168,9 +186,17 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
     let stroke = reader.range("stroke", Quantity::Length, &file.stroke)?;
     let force = reader.range("force", Quantity::Force, &file.force)?;
     let pad = reader.pad(&file.pad)?;
+    let moment = match &file.moment {
+        None => None,
+        Some([x1, x2, x3]) => {
+            let value = |text| reader.positive("moment", Quantity::Moment, text);
+            Some([value(x1)?, value(x2)?, value(x3)?])
+        }
+    };
     let optional = |field: &str, quantity, text: &Option<String>| {
         text.as_deref().map(|text| reader.positive(field, quantity, text)).transpose()
     };
+    let payload = optional("payload", Quantity::Mass, &file.payload)?;
     let pad_thickness = optional("pad.thickness", Quantity::Length, &file.pad.thickness)?;
     let pad_modulus = optional("pad.modulus", Quantity::Pressure, &file.pad.modulus)?;
     let outer_pad = optional("pad.outer_face", Quantity::Length, &file.pad.outer_face)?;
@@ -195,6 +221,8 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
     let mut known: Vec<String> = [
         "stroke",
         "force",
+        "payload",
+        "moment",
         "pad.size",
         "pad.thickness",
         "pad.modulus",
@@ -233,6 +261,8 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
         name: file.name,
         stroke,
         force,
+        payload,
+        moment,
         pad,
         pad_friction: file.pad.friction,
         pad_thickness,

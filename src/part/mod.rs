@@ -295,6 +295,12 @@ impl Part {
         curves::coaxial_groups(&self.curved)
     }
 
+    /// Puts the centre of mass elsewhere than a uniform density does \[m, part frame\]: that of an
+    /// assembly.
+    pub fn set_centre_of_mass(&mut self, centre: DVec3) {
+        self.unit_mass.centre_of_mass = centre;
+    }
+
     /// All reachable antiparallel face pairs that the jaws can close on, with widths in
     /// `min_width..=max_width` \[m\], by falling overlap area. `face_i < face_ii`.
     pub fn pairs(&self, min_width: f64, max_width: f64) -> Vec<FacePair> {

@@ -1,5 +1,7 @@
 //! Grips of one part under one set of loads, from pose to numbers.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
 use crate::backend::{Backend, Batch, Best, Problem, ScoreOptions, Scored, SeedSet};
@@ -8,12 +10,14 @@ use crate::geometry::patch_area;
 use crate::gripper::Gripper;
 use crate::load::wrench_in_grip;
 use crate::mechanics::twist_out::{self, TwistOut};
-use crate::mechanics::{Options, Pads, Search, inverse, refused};
+use crate::mechanics::{Options, Pads, inverse, refused};
 use crate::model::{Grip, Patch, Status, Wrench};
 use crate::part::MassProperties;
-use crate::rank::Weights;
+use crate::rank::{self, Weights};
 use crate::request::{Polish, Request};
-use crate::results::{LoadCase, LoadScore, RankedGrip};
+use crate::results::{LoadCase, LoadScore, PadFriction, RankedGrip};
+
+use super::limits::Limits;
 
 /// What decides the answer, beside part, gripper and loads.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,8 +31,10 @@ pub struct Settings {
     pub delta: f64,
     /// Pad friction while closing, for alpha.
     pub mu_c: f64,
-    /// Pad friction, for safety and the force needed.
-    pub pad_friction: Option<f64>,
+    /// Friction of the pads and the safety asked for, for what holds and the force needed.
+    pub pads: PadFriction,
+    /// What the gripper may carry.
+    pub limits: Limits,
     /// How loads are solved.
     pub score: ScoreOptions,
 }
@@ -38,7 +44,8 @@ setters!(Settings {
     with_weights: weights: Weights,
     with_delta: delta: f64,
     with_mu_c: mu_c: f64,
-    with_pad_friction: pad_friction: Option<f64>,
+    with_pads: pads: PadFriction,
+    with_limits: limits: Limits,
     with_score: score: ScoreOptions,
 });
 
@@ -50,9 +57,17 @@ impl Settings {
             weights: Weights::default(),
             delta: 0.0,
             mu_c: 0.0,
-            pad_friction: None,
+            pads: PadFriction::default(),
+            limits: Limits::default(),
             score: ScoreOptions::default(),
         }
+    }
+
+    /// The same with this friction of the pads.
+    #[must_use]
+    pub fn with_pad_friction(mut self, friction: Option<f64>) -> Self {
+        self.pads.value = friction;
+        self
     }
 
     /// Those of a request with this gripper. Only the worst loads are solved: the others of grips
@@ -67,7 +82,11 @@ impl Settings {
             weights: Weights { k1: scoring.k1, k2: scoring.k2 },
             delta: scoring.position_error.0,
             mu_c: scoring.closing_friction,
-            pad_friction: scoring.pad_friction.or(gripper.pad_friction),
+            pads: PadFriction {
+                value: scoring.pad_friction.or(gripper.pad_friction),
+                safety: scoring.safety,
+            },
+            limits: Limits::from(gripper),
             score: ScoreOptions {
                 polish: Polish::Worst,
                 separation: scoring.separation,
@@ -117,6 +136,20 @@ const LOADS_AT_ONCE: usize = 1 << 20;
 const ANSWERS_AT_ONCE: usize = 1 << 17;
 
 impl Assessor<'_> {
+    /// The grips without those under a load that the gripper may not carry, and how many fell to
+    /// which limit.
+    pub fn carried(&self, mut grips: Vec<Grip>) -> (Vec<Grip>, BTreeMap<String, u64>) {
+        let (limits, mut over) = (&self.settings.limits, BTreeMap::new());
+        if !limits.is_empty() {
+            let reasons: Vec<Option<String>> =
+                grips.par_iter().map(|grip| limits.exceeded(&self.wrenches(grip))).collect();
+            let mut of_grip = reasons.iter();
+            grips.retain(|_| of_grip.next().is_some_and(Option::is_none));
+            reasons.into_iter().flatten().for_each(|reason| *over.entry(reason).or_default() += 1);
+        }
+        (grips, over)
+    }
+
     /// Scores every grip under its worst load, in order. The answers depend neither on the number
     /// of threads nor on the backend.
     ///
@@ -166,7 +199,11 @@ impl Assessor<'_> {
                     .par_iter()
                     .map(|grip| self.alpha(grip, &TwistOut::new(&grip.contact)).0)
                     .collect();
-                let merit = |index: usize, mu: f64| self.settings.weights.score(mu, alphas[index]);
+                let Settings { weights, pads, .. } = self.settings;
+                let merit = |index: usize, mu: f64| {
+                    let slips = pads.verdict(Some(mu)).holds() == Some(false);
+                    rank::merit(weights.score(mu, alphas[index]), slips)
+                };
                 self.backend.score_best(&batch, self.seeds, &self.settings.score, best, &merit)?
             }
         };
@@ -219,13 +256,15 @@ impl Assessor<'_> {
         RankedGrip {
             rank: 0,
             score: None,
+            holds: None,
             alpha,
             delta_d: twist_out::delta_d(grip.width, least),
             contact_share,
             twist_margin: lever.margin(self.settings.force, &wrench),
             safety: self
                 .settings
-                .pad_friction
+                .pads
+                .value
                 .zip(score.mu_s)
                 .filter(|(_, mu)| *mu > 0.0)
                 .map(|(friction, mu)| friction / mu),
@@ -277,28 +316,22 @@ impl Assessor<'_> {
         Ok(())
     }
 
-    /// Adds what only the grips of the final list need: the gripping force needed and the largest
-    /// multiple under the worst load.
+    /// Adds what only the grips of the final list need: the gripping force needed for the friction
+    /// with the safety asked for, and the largest multiple under the worst load. Both are those of
+    /// [`inverse`], all limit states looked for.
     pub fn finish(&self, grips: &mut [RankedGrip]) {
-        let Some(friction) = self.settings.pad_friction else { return };
-        // For thousands of grips only limit states on the branch from d = 0 count, which errs
-        // towards more force.
-        let options = Options {
-            separation: self.settings.score.separation,
-            search: Search::Off,
-            ..Options::default()
-        };
+        let PadFriction { value: Some(friction), safety } = self.settings.pads else { return };
+        let ScoreOptions { separation, refiner, .. } = self.settings.score;
+        let options = Options { separation, refiner, ..Options::default() };
+        let force = self.settings.force;
         grips.par_iter_mut().for_each(|ranked| {
-            let grip = &ranked.grip;
-            let Some(pads) = Pads::new(&grip.contact) else { return };
-            ranked.force_needed = inverse::force_needed(
-                &pads,
-                grip.distance(),
-                &ranked.worst.wrench,
-                friction,
-                &options,
-            );
-            let multiple = ranked.force_needed.map_or(0.0, |needed| self.settings.force / needed);
+            let (distance, wrench) = (ranked.grip.distance(), &ranked.worst.wrench);
+            let Some(pads) = Pads::new(&ranked.grip.contact) else { return };
+            let needed =
+                |friction| inverse::force_needed(&pads, distance, wrench, friction, &options);
+            ranked.force_needed = needed(friction / safety);
+            let plain = if safety == 1.0 { ranked.force_needed } else { needed(friction) };
+            let multiple = plain.map_or(0.0, |needed| force / needed);
             ranked.load_multiple = multiple.is_finite().then_some(multiple);
         });
     }

@@ -19,7 +19,7 @@ use crate::results::LoadCase;
 /// Marks the file of an unfinished run.
 const FORMAT: &str = "gripfast-unfinished";
 /// Version of the layout of [`Checkpoint`].
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// All that a run has found after some chunk, and what it was asked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -6,7 +6,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::rank::{self, Ranking, Weights};
-use crate::results::RankedGrip;
+use crate::results::{PadFriction, RankedGrip};
 
 /// Among the rejections of a run: grips left unsolved because their bounds put them behind the best
 /// ones kept.
@@ -22,19 +22,29 @@ pub struct Collector {
     /// Number of kept grips at which the next cut is worth it.
     full: usize,
     ranked: u64,
+    /// Of these, those that do not slip.
+    holding: u64,
     rejections: BTreeMap<String, u64>,
 }
 
 impl Collector {
     /// Takes a chunk; afterwards at most `2 keep` grips, those that tie with them, and the chunk
-    /// are held.
-    pub fn add(&mut self, grips: Vec<RankedGrip>, keep: usize, weights: Weights) {
+    /// are held. Grips that slip fall first.
+    pub fn add(
+        &mut self,
+        grips: Vec<RankedGrip>,
+        keep: usize,
+        weights: Weights,
+        pads: PadFriction,
+    ) {
         for mut grip in grips {
             match grip.worst.mu_s.filter(|_| grip.worst.status.holds()) {
                 Some(mu) => {
                     let score = weights.score(mu, grip.alpha);
                     grip.score = score.is_finite().then_some(score);
+                    grip.holds = pads.verdict(Some(mu)).holds();
                     self.ranked += 1;
+                    self.holding += u64::from(!rank::slips(&grip));
                     self.kept.push(grip);
                 }
                 None => {
@@ -43,13 +53,12 @@ impl Collector {
             }
         }
         if self.kept.len() > keep.saturating_mul(2).max(self.full) {
-            let value = |grip: &RankedGrip| grip.score.unwrap_or(f64::INFINITY);
-            self.kept.sort_by(|a, b| value(b).total_cmp(&value(a)).then(a.grip.id.cmp(&b.grip.id)));
+            self.kept.sort_by(|a, b| merit(b).total_cmp(&merit(a)).then(a.grip.id.cmp(&b.grip.id)));
             // Those that tie with the last one stay: the ranking orders them by other things, and
             // all of them must be there.
-            let last = self.kept.get(keep.max(1) - 1).map_or(f64::NEG_INFINITY, value);
+            let last = self.kept.get(keep.max(1) - 1).map_or(f64::NEG_INFINITY, merit);
             let least = if last.is_finite() { last - CLOSE * last.abs() } else { last };
-            self.kept.truncate(self.kept.partition_point(|grip| value(grip) >= least));
+            self.kept.truncate(self.kept.partition_point(|grip| merit(grip) >= least));
             self.full = 2 * self.kept.len();
         }
     }
@@ -61,9 +70,14 @@ impl Collector {
         }
     }
 
-    /// Scores of the best grips so far, infinite where no friction is needed.
-    pub fn scores(&self) -> impl Iterator<Item = f64> {
-        self.kept.iter().map(|grip| grip.score.unwrap_or(f64::INFINITY))
+    /// Counts grips that were left out for a reason.
+    pub fn reject(&mut self, reason: String, grips: u64) {
+        *self.rejections.entry(reason).or_default() += grips;
+    }
+
+    /// Merits of the best grips so far, see [`rank::merit`]; infinite where no friction is needed.
+    pub fn merits(&self) -> impl Iterator<Item = f64> {
+        self.kept.iter().map(merit)
     }
 
     /// Grips ranked so far.
@@ -73,11 +87,18 @@ impl Collector {
 
     /// The final order with counts; `size` is the diagonal of the part's bounding box \[m\].
     pub fn finish(self, centre_of_mass: DVec3, size: f64, options: &rank::Options) -> Ranking {
+        let held = self.kept.iter().filter(|grip| !rank::slips(grip)).count() as u64;
         let mut ranking = rank::rank(self.kept, centre_of_mass, size, options);
+        // Beside those kept, the ones that fell behind them.
+        ranking.holding += self.holding - held;
         for (reason, count) in self.rejections {
             *ranking.rejections.entry(reason).or_default() += count;
         }
         ranking.ranked = self.ranked - ranking.rejections.get("duplicate").copied().unwrap_or(0);
         ranking
     }
+}
+
+fn merit(grip: &RankedGrip) -> f64 {
+    rank::merit(grip.score.unwrap_or(f64::INFINITY), rank::slips(grip))
 }

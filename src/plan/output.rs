@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use super::limits::Limits;
 use super::{Assessor, Plan, Settings};
 use crate::backend::{Backend, ScoreOptions, SeedSet};
 use crate::error::{Error, ErrorKind, Result};
@@ -12,7 +13,7 @@ use crate::gripper::Gripper;
 use crate::rank::Weights;
 use crate::report;
 use crate::request::Polish;
-use crate::results::{GripSet, RankedGrip};
+use crate::results::{GripSet, PadFriction, RankedGrip};
 
 /// The best grips of a list, for which a page shows the friction over all loads.
 pub const WHOLE: usize = 20;
@@ -35,7 +36,6 @@ impl Plan {
                 _ => {
                     let options = export::Options {
                         top: (format == Format::Glb).then_some(GLB_TOP),
-                        pad_friction: self.settings.pad_friction,
                         ..export::Options::default()
                     };
                     export::write(set, format, path, &options, mesh)?;
@@ -63,6 +63,20 @@ fn interrupted(path: &Path) -> PathBuf {
     path.with_file_name(format!("{stem}.interrupted{ending}"))
 }
 
+/// Refuses a file whose folder is not there now rather than after the search; `place` names it.
+pub(super) fn folder(path: &Path, place: String, option: &'static str) -> Result<()> {
+    match path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
+        None => Ok(()),
+        Some(folder) => Err(Error::new(
+            ErrorKind::NotFound,
+            place,
+            format!("the folder '{}' is not there", folder.display()),
+            "make it first",
+        )
+        .with_options(&[option])),
+    }
+}
+
 /// The format of a result file by its ending, refused now rather than after the search.
 pub(super) fn format(path: &Path) -> Result<Format> {
     let place = || format!("result file {}", path.display());
@@ -74,17 +88,7 @@ pub(super) fn format(path: &Path) -> Result<Format> {
         )
         .with_options(&["json"]));
     }
-    if let Some(folder) =
-        path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir())
-    {
-        return Err(Error::new(
-            ErrorKind::NotFound,
-            place(),
-            format!("the folder '{}' is not there", folder.display()),
-            "make it first",
-        )
-        .with_options(&["output"]));
-    }
+    folder(path, place(), "output")?;
     if path.extension().is_none() {
         return Ok(Format::Json);
     }
@@ -120,7 +124,8 @@ pub fn solve_every_load(set: &mut GripSet, count: usize) -> Result<()> {
         weights: Weights::default(),
         delta: 0.0,
         mu_c: 0.0,
-        pad_friction: None,
+        pads: PadFriction::default(),
+        limits: Limits::default(),
         score: ScoreOptions {
             polish: Polish::All,
             separation: scoring.separation,

@@ -87,11 +87,17 @@ impl PlanBuilder {
         let sources = if loads.is_none() { Some(load_set(&request)?) } else { None };
         let seeds = SeedSet::with_at_least(request.scoring.seeds)?;
         let format = request.output.output.as_deref().map(output::format).transpose()?;
+        if let Some(page) = &request.output.report {
+            output::folder(page, format!("page {}", page.display()), "report")?;
+        }
         let threads = threads(request.scoring.threads)?;
-        let part = match part {
+        let mut part = match part {
             Some(part) => part,
             None => read_part(&request, &threads)?,
         };
+        if let Some(com) = &request.com {
+            part.set_centre_of_mass(com.0);
+        }
         let mass = mass(&request, &part, loads.is_some())?;
         let loads = match (loads, sources) {
             (Some(loads), _) => checked(loads)?,
@@ -99,6 +105,8 @@ impl PlanBuilder {
             (None, None) => Vec::new(),
         };
         let mut warnings = part.health.warnings.clone();
+        warnings.extend(doubts(&request, &part, &mass));
+        warnings.extend(settings.limits.doubt(&loads, &gripper));
         if !part.health.watertight {
             warnings.push(
                 "the surface is not watertight: volume, centre of mass and inertia are estimates \
@@ -189,8 +197,52 @@ fn checked(loads: Vec<LoadCase>) -> Result<Vec<LoadCase>> {
     Ok(loads)
 }
 
-/// Mass properties at the mass or density asked for.
+/// Densities beyond which a mass or a unit is hardly right [kg/m^3]: osmium has 22,600, the lightest
+/// foams some 10.
+const DENSITIES: [f64; 2] = [10.0, 23_000.0];
+
+/// What is doubtful about mass and centre of mass.
+fn doubts(request: &Request, part: &Part, mass: &MassProperties) -> Vec<String> {
+    let mut doubts = Vec::new();
+    let density = mass.mass / mass.volume;
+    let stated = request.mass.is_some() || request.density.is_some();
+    if stated && density > DENSITIES[1] {
+        doubts.push(format!(
+            "the part would be {:.*} g/cm3 dense, more than any metal: check its mass and the unit \
+             of its file",
+            usize::from(density < 1e6),
+            density / 1e3
+        ));
+    } else if stated && density < DENSITIES[0] {
+        doubts.push(format!(
+            "the part would be {density:.3} kg/m3 dense, less than any foam: check its mass and the \
+             unit of its file"
+        ));
+    }
+    let (low, high) = part.mesh.bounding_box();
+    let centre = mass.centre_of_mass;
+    if request.com.is_some() && (centre.cmplt(low) | centre.cmpgt(high)).any() {
+        doubts.push(format!(
+            "the centre of mass ({:.2}, {:.2}, {:.2}) mm lies outside of the part's bounding box",
+            centre.x * 1e3,
+            centre.y * 1e3,
+            centre.z * 1e3
+        ));
+    }
+    doubts
+}
+
+/// Mass properties at the mass or density asked for, with the inertia asked for.
 fn mass(request: &Request, part: &Part, own_loads: bool) -> Result<MassProperties> {
+    let mut mass = solid_mass(request, part, own_loads)?;
+    if let Some(inertia) = &request.inertia {
+        mass.inertia = inertia.matrix();
+    }
+    Ok(mass)
+}
+
+/// Those of the solid.
+fn solid_mass(request: &Request, part: &Part, own_loads: bool) -> Result<MassProperties> {
     let ball = |source: &String| source.trim().starts_with("ball");
     match (request.mass, request.density) {
         (Some(mass), _) => {

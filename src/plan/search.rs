@@ -8,10 +8,14 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use super::checkpoint::{self, Checkpoint};
-use super::{Assessor, Collector, Observer, Plan, Progress};
+use super::{Assessor, Collector, Observer, Plan, Progress, Settings};
 use crate::backend::Best;
 use crate::error::{Error, Result};
+use crate::model::Grip;
 use crate::propose::{self, Proposer};
+
+/// Among the rejections: free candidates that are not among the numbers asked for.
+const NOT_CHOSEN: &str = "not_chosen";
 
 /// A checkpoint costs at most one part in this many of the time.
 const LEAST_PAUSE: u32 = 20;
@@ -34,6 +38,11 @@ impl Partial {
         let mut name = output.as_os_str().to_owned();
         name.push(".partial");
         Some(name.into())
+    }
+
+    /// Whether there is an unfinished run.
+    pub(super) fn is_there(&self) -> bool {
+        self.path.exists()
     }
 
     /// Removes the file of a run that is finished.
@@ -85,12 +94,14 @@ impl Plan {
                 ("k2", json!(scoring.k2)),
                 ("position_error_m", json!(settings.delta)),
                 ("closing_friction", json!(settings.mu_c)),
-                ("pad_friction", json!(settings.pad_friction)),
+                ("pad_friction", json!(settings.pads.value)),
+                ("safety", json!(settings.pads.safety)),
                 ("separation", json!(scoring.separation)),
                 ("refiner", json!(scoring.refiner)),
                 ("polish", json!(scoring.polish)),
                 ("seeds", json!(self.seeds.len())),
                 ("keep", json!(self.request.kept())),
+                ("ids", json!(self.request.selection.ids)),
             ]
             .map(|(name, value)| (name.to_owned(), value)),
         )
@@ -115,6 +126,8 @@ pub(super) struct Search<'a> {
     pub(super) keep: usize,
     /// Whether grips that cannot be among them are left unsolved.
     pub(super) race: bool,
+    /// Only these candidates are scored.
+    pub(super) ids: Option<&'a [u64]>,
     pub(super) partial: Option<&'a Partial>,
     pub(super) resume: bool,
 }
@@ -144,7 +157,7 @@ impl Search<'_> {
         if let Some(partial) = self.partial {
             self.take_up(partial, proposer, observer, &mut found)?;
             if let Some(best) = &mut best {
-                found.collector.scores().for_each(|score| best.insert(score));
+                found.collector.merits().for_each(|merit| best.insert(merit));
             }
         }
         let progress = |done: &propose::Progress, found: &Found| Progress {
@@ -157,10 +170,11 @@ impl Search<'_> {
         let pause = self.partial.map_or(Duration::MAX, |partial| partial.every);
         let mut clock = Clock { saved: Instant::now(), pause };
         while let Some(chunk) = proposer.next() {
-            let proposed = chunk.grips.len();
+            let (grips, left_out) = self.chosen(chunk.grips);
+            let proposed = grips.len();
             let scored = match &mut best {
-                Some(best) => self.assessor.assess_best(chunk.grips, best),
-                None => self.assessor.assess(chunk.grips),
+                Some(best) => self.assessor.assess_best(grips, best),
+                None => self.assessor.assess(grips),
             };
             let scored = match scored {
                 Ok(scored) => scored,
@@ -174,7 +188,9 @@ impl Search<'_> {
             };
             observer.grips(&scored);
             found.collector.outrank((proposed - scored.len()) as u64);
-            found.collector.add(scored, self.keep, self.assessor.settings.weights);
+            left_out.into_iter().for_each(|(reason, n)| found.collector.reject(reason, n));
+            let Settings { weights, pads, .. } = *self.assessor.settings;
+            found.collector.add(scored, self.keep, weights, pads);
             done = proposer.progress();
             observer.progress(progress(&done, &found));
             if stop.load(Ordering::Relaxed) {
@@ -192,6 +208,20 @@ impl Search<'_> {
             found.checkpoint = self.save(&done, &found, observer);
         }
         Ok(found)
+    }
+
+    /// The grips to score, and the reasons for which the others fell.
+    fn chosen(&self, mut grips: Vec<Grip>) -> (Vec<Grip>, BTreeMap<String, u64>) {
+        let all = grips.len();
+        if let Some(ids) = self.ids {
+            grips.retain(|grip| ids.contains(&grip.id));
+        }
+        let others = (all - grips.len()) as u64;
+        let (grips, mut left_out) = self.assessor.carried(grips);
+        if others > 0 {
+            left_out.insert(NOT_CHOSEN.to_owned(), others);
+        }
+        (grips, left_out)
     }
 
     /// Resumes the unfinished run, where that is asked for and there is one.

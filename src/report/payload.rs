@@ -22,7 +22,7 @@ use crate::gripper::{Body, Gripper, Shape};
 use crate::model::{Contact, Frame, Slip};
 use crate::part::Mesh;
 use crate::request::Side;
-use crate::results::{GripSet, Provenance, RankedGrip};
+use crate::results::{GripSet, Provenance, RankedGrip, Verdict};
 
 /// Grips that the page lists; a longer ranking is cut there and the page says so.
 pub(super) const MAX_GRIPS: usize = 100_000;
@@ -95,6 +95,12 @@ impl Payload {
             ));
         }
         let statuses = poses_and_scores(&mut columns, grips);
+        let verdict = |grip| match set.verdict(grip) {
+            Verdict::Unknown => 0,
+            Verdict::Holds { .. } => 1,
+            Verdict::Slips { .. } => 2,
+        };
+        columns.add("verdict", "u8", &grips.iter().map(verdict).collect::<Vec<u8>>());
         contacts(&mut columns, grips);
         let by_load = loads(&mut columns, set, grips);
         let display = mesh
@@ -344,6 +350,7 @@ fn asked(set: &GripSet) -> Value {
     let (candidates, scoring) = (&request.candidates, &request.scoring);
     json!({
         "force": resolved.force.0, "pad_friction": resolved.pad_friction,
+        "safety": resolved.safety,
         "k1": scoring.k1, "k2": scoring.k2,
         "spacing": resolved.spacing.0, "angle_step": candidates.angle_step.0,
         "min_contact": candidates.min_contact,
@@ -386,6 +393,7 @@ fn gripper_json(gripper: &Gripper) -> Value {
     };
     json!({
         "name": gripper.name, "stroke": gripper.stroke, "force": gripper.force, "pad": gripper.pad,
+        "payload": gripper.payload, "moment": gripper.moment,
         "pad_friction": gripper.pad_friction, "pad_thickness": gripper.pad_thickness, "outer_pad": gripper.outer_pad,
         "flange": gripper.grip_from_flange.as_ref().map(matrix), "tool": gripper.grip_from_tool.as_ref().map(matrix),
         "fingers": gripper.fingers.iter().map(body).collect::<Vec<_>>(), "palm": gripper.palm.iter().map(body).collect::<Vec<_>>(),

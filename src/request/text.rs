@@ -3,11 +3,11 @@
 use std::fmt;
 use std::str::FromStr;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::error::{Error, Result};
-use crate::units::{Angle, Length, direction, direction_text};
+use crate::units::{Angle, Inertia, Length, direction, direction_text};
 
 /// Directions within an angle of an axis; `-z:45deg` as a text.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +34,49 @@ pub struct Region {
     pub low: DVec3,
     /// Largest coordinates \[m\].
     pub high: DVec3,
+}
+
+/// A place in the part frame \[m\]; `10mm,0mm,5mm` as a text.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Position(pub DVec3);
+
+/// A matrix of inertia by its elements xx, yy, zz, xy, yz, zx [kg m^2];
+/// `67kgmm2,107kgmm2,91kgmm2,0kgmm2,0kgmm2,30kgmm2` as a text.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InertiaMatrix(pub [f64; 6]);
+
+impl InertiaMatrix {
+    /// The symmetric matrix.
+    pub fn matrix(&self) -> DMat3 {
+        let [xx, yy, zz, xy, yz, zx] = self.0;
+        DMat3::from_cols_array(&[xx, xy, zx, xy, yy, yz, zx, yz, zz])
+    }
+
+    /// Refuses a matrix that no body has: the second moments of its mass, half the trace less the
+    /// matrix, must not be negative in any direction.
+    pub(super) fn check(&self) -> Result<()> {
+        let [xx, yy, zz, xy, yz, zx] = self.0;
+        let half = (xx + yy + zz) / 2.0;
+        let [a, b, c] = [half - xx, half - yy, half - zz];
+        let slack = -1e-9 * half.abs();
+        let minors = [a * b - xy * xy, b * c - yz * yz, a * c - zx * zx];
+        let moments = DMat3::from_diagonal(DVec3::splat(half)) - self.matrix();
+        let body = half > 0.0
+            && [a, b, c].iter().all(|moment| *moment >= slack)
+            && minors.iter().all(|minor| *minor >= slack * half)
+            && moments.determinant() >= slack * half * half;
+        if body && half.is_finite() {
+            return Ok(());
+        }
+        Err(Error::input(
+            "inertia",
+            format!("'{self}' is that of no body"),
+            "give xx,yy,zz,xy,yz,zx about the centre of mass: no principal moment may exceed the \
+             sum of the others, and the last three are elements of the matrix, products of inertia \
+             with a minus",
+        )
+        .with_options(&["inertia"]))
+    }
 }
 
 /// How far a pose may be off; `1mm,2deg` as a text.
@@ -102,6 +145,50 @@ impl FromStr for Ground {
 impl fmt::Display for Ground {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "{}:{}", direction_text(self.normal), Length(self.offset))
+    }
+}
+
+/// Values of one kind, joined by commas.
+fn values<const N: usize, T: FromStr<Err = Error>>(
+    option: &'static str,
+    text: &str,
+    form: &str,
+) -> Result<[T; N]> {
+    let values: Vec<T> = text.split(',').map(str::parse).collect::<Result<_>>()?;
+    values.try_into().map_err(|_| {
+        Error::input(option, format!("'{text}' is not {N} values"), format!("give {form}"))
+            .with_options(&[option])
+    })
+}
+
+impl FromStr for Position {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let values: [Length; 3] = values("com", text, "X,Y,Z with units, e.g. 10mm,0mm,5mm")?;
+        Ok(Self(DVec3::from_array(values.map(|length| length.0))))
+    }
+}
+
+impl fmt::Display for Position {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.0.to_array().map(|value| Length(value).to_string()).join(","))
+    }
+}
+
+impl FromStr for InertiaMatrix {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let form =
+            "xx,yy,zz,xy,yz,zx with units, e.g. 67kgmm2,107kgmm2,91kgmm2,0kgmm2,0kgmm2,30kgmm2";
+        Ok(Self(values::<6, Inertia>("inertia", text, form)?.map(|inertia| inertia.0)))
+    }
+}
+
+impl fmt::Display for InertiaMatrix {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.0.map(|value| Inertia(value).to_string()).join(","))
     }
 }
 
@@ -213,4 +300,4 @@ macro_rules! as_text {
     )+};
 }
 
-as_text!(Cone, Ground, Region, PoseError, EarlierWeights);
+as_text!(Cone, Ground, InertiaMatrix, Position, Region, PoseError, EarlierWeights);

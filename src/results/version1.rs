@@ -161,6 +161,7 @@ impl Old {
             force: Force(settings.force_n),
             spacing: Length(settings.spacing_m),
             pad_friction: settings.pad_friction,
+            safety: 1.0,
             seeds: settings.seeds,
             keep: settings.keep,
         };

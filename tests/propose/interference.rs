@@ -82,6 +82,8 @@ fn random_gripper(random: &mut Random) -> Gripper {
         name: "random".into(),
         stroke: [0.0, random.range(0.04, 0.09)],
         force: [1.0, 100.0],
+        payload: None,
+        moment: None,
         pad: rectangle(pad),
         pad_friction: None,
         pad_thickness: None,

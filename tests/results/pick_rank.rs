@@ -4,7 +4,7 @@ use crate::support::grips;
 use glam::{DMat3, DVec3};
 use gripfast::model::{Frame, Status};
 use gripfast::rank::{Options, Weights, rank};
-use gripfast::results::RankedGrip;
+use gripfast::results::{PadFriction, RankedGrip};
 use proptest::prelude::*;
 
 const SIZE: f64 = 0.075;
@@ -39,6 +39,34 @@ fn falling_score_and_the_count_of_what_was_left_out() {
         found.rejections.into_iter().collect::<Vec<_>>(),
         [("flip".to_owned(), 1), ("not_finite".to_owned(), 1), ("twisted_out".to_owned(), 1)]
     );
+}
+
+#[test]
+fn grips_that_slip_come_after_those_that_hold() {
+    let pads = PadFriction { value: Some(0.25), safety: 1.0 };
+    let options = Options::default().with_pads(pads);
+    let mut list: Vec<_> = [0.3, 0.1, 0.2, 0.25, 0.5]
+        .iter()
+        .enumerate()
+        .map(|(id, mu_s)| at(id as u64, DVec3::X * 0.01 * id as f64, *mu_s))
+        .collect();
+    // A large alpha makes up for friction in the score, not in the verdict.
+    list[4].alpha = 30.0;
+    let found = rank(list.clone(), DVec3::ZERO, SIZE, &options);
+    assert_eq!(ids(&found.grips), [1, 2, 3, 4, 0]);
+    assert_eq!((found.ranked, found.holding), (5, 3));
+    let holds: Vec<_> = found.grips.iter().map(|grip| grip.holds).collect();
+    assert_eq!(holds, [Some(true), Some(true), Some(true), Some(false), Some(false)]);
+    // A choice of grips that differ takes one that slips last, however far it lies away.
+    list[4].grip.part_from_grip.origin = DVec3::splat(1.0);
+    let few = options.with_top(Some(3)).with_diverse(true);
+    assert_eq!(ids(&rank(list.clone(), DVec3::ZERO, SIZE, &few).grips), [1, 2, 3]);
+    // Half the friction with a safety of 2; nothing is known without one.
+    let safe = options.with_pads(PadFriction { safety: 2.0, ..pads });
+    assert_eq!(ids(&rank(list.clone(), DVec3::ZERO, SIZE, &safe).grips), [1, 4, 2, 3, 0]);
+    let unknown = rank(list, DVec3::ZERO, SIZE, &Options::default());
+    assert_eq!(ids(&unknown.grips), [4, 1, 2, 3, 0]);
+    assert!(unknown.grips.iter().all(|grip| grip.holds.is_none()));
 }
 
 #[test]

@@ -78,6 +78,7 @@ pub(crate) fn grip(id: u64, part_from_grip: Frame, mu_s: f64) -> RankedGrip {
             residual: 1e-13,
         },
     );
+    ranked.holds = Some(mu_s <= 0.6);
     ranked.alpha = 0.25;
     ranked.delta_d = 0.001;
     ranked.contact_share = 0.9;
@@ -147,6 +148,7 @@ pub(crate) fn grip_set(count: u64) -> GripSet {
         pairs: 3,
         candidates: 100,
         ranked: count,
+        holding: Some(count.min(12)),
         rejections: BTreeMap::from([("twisted_out".to_owned(), 5)]),
         comparison: None,
     };

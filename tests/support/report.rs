@@ -80,7 +80,7 @@ pub(crate) fn plan(
     summary.ranked = grips.len() as u64;
     let (bbox_min, bbox_max) = part.mesh.bounding_box();
     let mut set = GripSet::new(
-        provenance(part, loads),
+        provenance(part, loads, gripper.pad_friction),
         PartSummary {
             file: part.file.display().to_string(),
             unit_m: part.unit_m,
@@ -97,11 +97,12 @@ pub(crate) fn plan(
     set
 }
 
-fn provenance(part: &Part, loads: &str) -> Provenance {
+fn provenance(part: &Part, loads: &str, friction: Option<f64>) -> Provenance {
     let mut request = Request::new(&part.file, "generic");
     request.loads = vec![loads.to_owned()];
     let mut resolved = Resolved::default();
     resolved.force = Force(FORCE);
+    resolved.pad_friction = friction;
     let mut provenance = Provenance::new(request, resolved);
     provenance.command = ["test", "fixture", "of", "the", "report"].map(String::from).to_vec();
     provenance

@@ -42,7 +42,7 @@ export class Report {
     this.column = column;
     this.n = header.grips.shown;
     /** What the run reckoned with; a friction that nobody stated is null. */
-    this.planned = { friction: header.asked.pad_friction ?? header.gripper?.pad_friction ?? null, force: header.asked.force ?? null, safety: 1 };
+    this.planned = { friction: header.asked.pad_friction ?? null, force: header.asked.force ?? null, safety: header.asked.safety ?? 1 };
     /** What is shown: as planned, until somebody asks what if. */
     this.now = { ...this.planned };
     this.known = new Map();
@@ -82,19 +82,35 @@ export class Report {
 
   /** Whether the pads hold grip `i` with the safety asked for; null where no friction is known. */
   holds(i) {
+    // As planned the program has decided, to all its digits.
+    if (!this.changed) return [null, true, false][this.column.verdict[i]];
     if (!this.friction) return null;
-    return this.column.mu[i] === 0 || this.safety(i) >= this.now.safety;
+    return this.column.mu[i] === 0 || this.safety(i) >= this.now.safety * (1 - 1e-6);
   }
 
   /** Whether `squeeze` is only an estimate: another friction or safety than planned. */
   get squeezeEstimate() {
-    return this.friction !== this.planned.friction || this.now.safety !== 1;
+    return this.friction !== this.planned.friction || this.now.safety !== this.planned.safety;
   }
 
-  /** Gripping force [N] that grip `i` needs under its worst load. */
+  /** Gripping force of one jaw [N] that grip `i` needs under its worst load. */
   squeeze(i) {
     const planned = this.column.force_needed[i];
-    return this.squeezeEstimate ? (planned * this.planned.friction * this.now.safety) / this.friction : planned;
+    return this.squeezeEstimate ? (planned * this.planned.friction * this.now.safety) / (this.friction * this.planned.safety) : planned;
+  }
+
+  /** Where that force lies in what the gripper has: `above`, `below`, `within`, or nothing where that is not known. */
+  forceRange(i) {
+    const [least, most] = this.header.gripper?.force ?? [];
+    const needed = this.squeeze(i);
+    if (!Number.isFinite(needed) || most === undefined) return '';
+    return needed > most * (1 + 1e-6) ? 'above' : needed < least * (1 - 1e-6) ? 'below' : 'within';
+  }
+
+  /** Quality as the program exports it: `m/(1 + m)` of the margin `m`, pads of unknown friction taken for 1. */
+  quality(i) {
+    const mu = this.column.mu[i];
+    return Number.isFinite(mu) ? 1 / (1 + (mu * this.planned.safety) / (this.planned.friction ?? 1)) : 0;
   }
 
   /** Score by which grips are ranked, at the force shown. */

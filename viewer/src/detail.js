@@ -20,9 +20,9 @@ export const statusOf = (name) => STATUS[name] ?? [words(name), 'fair', ''];
 /** What the status means with the pads' friction, where that is known: name, kind, explanation. */
 export function verdict(report, i) {
   const known = statusOf(report.status(i));
-  if (report.status(i) !== 'ok' || !report.friction) return known;
+  if (!['ok', 'ambiguous'].includes(report.status(i)) || report.holds(i) === null) return known;
   const about = report.estimate ? '\u2248 ' : '';
-  if (report.holds(i)) return [`${about}Holds`, 'good', ''];
+  if (report.holds(i)) return report.status(i) === 'ok' ? [`${about}Holds`, 'good', ''] : known;
   return [`${about}Slips`, 'bad', report.now.safety > 1 && report.safety(i) >= 1 ? 'It holds, but with less safety than is asked for.' : 'The worst load needs more friction than the pads have at this gripping force.'];
 }
 
@@ -93,10 +93,12 @@ export class Detail {
       place.querySelector('.note').textContent = note;
     };
     const about = this.report.estimate ? '\u2248\u2009' : '';
+    const asked = this.report.now.safety;
     tile('mu', `${about}${number(this.report.mu(i))}`, this.report.estimate ? `estimate at ${newtons(this.report.now.force)}` : 'at the worst load');
     const safety = this.report.safety(i);
-    tile('safety', Number.isFinite(safety) ? `${about}${number(safety)}\u00d7` : c.mu[i] === 0 ? '\u221e' : NONE, padFriction ? `pad friction ${chosen(padFriction)}` : 'pad friction not stated');
-    tile('squeeze', `${this.report.squeezeEstimate && Number.isFinite(c.force_needed[i]) ? '\u2248\u2009' : ''}${newtons(this.report.squeeze(i))}`, padFriction ? `for pad friction ${chosen(padFriction)}` : 'pad friction not stated');
+    tile('safety', Number.isFinite(safety) ? `${about}${number(safety)}\u00d7` : c.mu[i] === 0 ? '\u221e' : NONE, padFriction ? `pad friction ${chosen(padFriction)}${asked === 1 ? '' : `, ${chosen(asked)}\u00d7 asked`}` : 'pad friction not stated');
+    const range = { above: ' \u2013 more than the gripper has', below: ' \u2013 less than its least' }[this.report.forceRange(i)] ?? '';
+    tile('squeeze', `${this.report.squeezeEstimate && Number.isFinite(c.force_needed[i]) ? '\u2248\u2009' : ''}${newtons(this.report.squeeze(i))}`, padFriction ? `per jaw${range}` : 'pad friction not stated');
     tile('width', mm(c.width[i]), c.inside[i] ? 'from face to face, held from inside' : 'from face to face');
     this.find('.more').replaceChildren(
       facts([

@@ -34,7 +34,9 @@ async function start() {
   document.title = `${file}: ${count(header.grips.total)} grips`;
   $('#title').textContent = file;
   $('#title').title = header.part.file;
-  $('#subtitle').textContent = [header.gripper?.name, `${count(header.grips.total)} grips`, `${count(header.loads.length)} load${header.loads.length === 1 ? '' : 's'}`].filter(Boolean).join(' \u00b7 ');
+  const { holding, ranked } = header.summary;
+  const grips = holding === undefined ? `${count(header.grips.total)} grips` : `${count(holding)} of ${count(ranked)} grips hold`;
+  $('#subtitle').textContent = [header.gripper?.name, grips, `${count(header.loads.length)} load${header.loads.length === 1 ? '' : 's'}`].filter(Boolean).join(' \u00b7 ');
   const scale = frictionScale(Array.from(report.column.mu));
   let view = null;
   try {
@@ -147,7 +149,7 @@ async function start() {
     list.draw();
     const all = state.order.length === report.n;
     const slips = report.friction ? state.order.reduce((sum, i) => sum + (verdict(report, i)[1] === 'bad' ? 1 : 0), 0) : 0;
-    const hold = report.changed && report.friction ? `, ${report.estimate ? '\u2248\u2009' : ''}${count(state.order.length - slips)} hold` : '';
+    const hold = (report.changed || slips > 0) && report.friction ? `, ${report.estimate ? '\u2248\u2009' : ''}${count(state.order.length - slips)} hold` : '';
     $('#count').textContent = (all ? `${count(report.n)} grips` : `${count(state.order.length)} of ${count(report.n)} grips`) + hold;
     $('#empty').hidden = state.order.length > 0;
     $('#list').hidden = state.order.length === 0;

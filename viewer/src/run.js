@@ -69,7 +69,7 @@ export function drawRun(root, report) {
   const { summary, part, gripper, provenance, display } = header;
   const rejections = reasons(report);
   const fallen = rejections.reduce((sum, entry) => sum + (entry.pairs ? 0 : entry.n), 0);
-  const funnel = bars([['Candidates', summary.candidates], ['Rejected', fallen, 'bad'], ['Ranked', summary.ranked, 'good']], summary.candidates, 'From candidates to ranked grips');
+  const funnel = bars([['Candidates', summary.candidates], ['Rejected', fallen, 'bad'], ['Ranked', summary.ranked, 'good'], ...(summary.holding === undefined ? [] : [['Hold', summary.holding, 'good']])], summary.candidates, 'From candidates to ranked grips');
   root.append(section('From candidates to grips', node('p', `${count(summary.pairs)} pair${summary.pairs === 1 ? '' : 's'} of opposite faces within the stroke.`, { class: 'quiet' }), funnel));
   root.append(section('Why candidates were rejected', ...(rejections.length ? reasonBars(rejections) : [node('p', 'None was rejected.', { class: 'quiet' })])));
   if (provenance.warnings?.length) root.append(section('Warnings', ...provenance.warnings.map((text) => node('p', text))));
@@ -85,7 +85,8 @@ export function drawRun(root, report) {
     const [x, y] = pad.map((values) => chosen((Math.max(...values) - Math.min(...values)) * 1e3));
     root.append(
       section('Gripper', facts([
-        ['Name', gripper.name], ['Stroke', `${chosen(gripper.stroke[0] * 1e3)} to ${chosen(gripper.stroke[1] * 1e3)}\u00a0mm`], ['Force', `${chosen(gripper.force[0])} to ${chosen(gripper.force[1])}\u00a0N`],
+        ['Name', gripper.name], ['Stroke', `${chosen(gripper.stroke[0] * 1e3)} to ${chosen(gripper.stroke[1] * 1e3)}\u00a0mm`], ['Force per jaw', `${chosen(gripper.force[0])} to ${chosen(gripper.force[1])}\u00a0N`],
+        ['Payload', gripper.payload ? mass(gripper.payload) : null], ['Moments', gripper.moment ? `${gripper.moment.map((v) => chosen(v)).join(', ')}\u00a0N\u00b7m` : null],
         ['Pad (x\u2081 \u00d7 x\u2082)', `${x} \u00d7 ${y}\u00a0mm`], ['Pad friction', report.friction ? chosen(report.friction) : 'not stated'],
         ['Rubber', gripper.pad_thickness === null ? 'not stated' : `${chosen(gripper.pad_thickness * 1e3)}\u00a0mm`],
       ])),

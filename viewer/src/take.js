@@ -97,6 +97,13 @@ export function gaps(report, i) {
 export function table(report, indices, frame, origin) {
   const c = report.column;
   const words = frameWords(report, frame, origin);
+  const { part, gripper, asked } = report.header;
+  const forceRange = (i) => {
+    const [least, most] = gripper?.force ?? [];
+    const needed = c.force_needed[i];
+    if (!Number.isFinite(needed) || most === undefined) return '';
+    return needed > most * (1 + 1e-6) ? 'above' : needed < least * (1 - 1e-6) ? 'below' : 'within';
+  };
   const slips = { rotation: 'rotation', translation: 'translation', none: 'none', unknown: '' };
   const say = (value) => plain(value, DIGITS);
   const ring = (points) => Math.abs(points.reduce((sum, [x, y], k) => sum + (x * points[(k + 1) % points.length][1] - y * points[(k + 1) % points.length][0]) / 2, 0));
@@ -111,15 +118,16 @@ export function table(report, indices, frame, origin) {
     const of = (name) => short(c[name][i]);
     const vector = (names, values) => Object.fromEntries(names.map((name, k) => [name, say(values[k])]));
     return {
-      rank: String(c.rank[i]), id: String(c.id[i]), score: of('score'), mu_s: of('mu'), status: report.status(i), load: String(c.load[i]), load_name: report.load(i).name,
+      rank: String(c.rank[i]), id: String(c.id[i]), score: of('score'), mu_s: of('mu'), status: report.status(i), verdict: ['unknown', 'holds', 'slips'][c.verdict[i]], load: String(c.load[i]), load_name: report.load(i).name,
       width_m: of('width'), side: c.inside[i] ? 'inside' : 'outside', jaw_gap_m: say(gap), opened_gap_m: say(opened),
       ...vector(['x_m', 'y_m', 'z_m'], pose.origin), ...vector(['qx', 'qy', 'qz', 'qw'], q),
       ...vector(['approach_x', 'approach_y', 'approach_z'], grip.x1), ...vector(['closing_x', 'closing_y', 'closing_z'], grip.x3),
       tool_frame: words, face_i: String(c.face_i[i]), face_ii: String(c.face_ii[i]), angle_rad: of('angle'), area_i_m2: short(area[0]), area_ii_m2: short(area[1]),
-      contact_share: of('contact_share'), twist_margin: of('twist_margin'), alpha_rad: of('alpha'), delta_d_m: of('delta_d'), safety: of('safety'), force_needed_n: of('force_needed'), load_multiple: of('load_multiple'),
+      pad_share: short(report.cover(i)), contact_share: of('contact_share'), twist_margin: of('twist_margin'), alpha_rad: of('alpha'), delta_d_m: of('delta_d'), safety: of('safety'), force_needed_n: of('force_needed'), force_range: forceRange(i), load_multiple: of('load_multiple'),
       slip: slips[slip.type], slip_c1_m: slip.c ? short(slip.c[0]) : '', slip_c2_m: slip.c ? short(slip.c[1]) : '',
       ...Object.fromEntries(['force_1_n', 'force_2_n', 'force_3_n', 'moment_1_nm', 'moment_2_nm', 'moment_3_nm'].map((name, k) => [name, short(c.wrench[6 * i + k])])),
       mu_lower: short(c.bounds[2 * i]), mu_upper: short(c.bounds[2 * i + 1]), residual: of('residual'),
+      part: part.file, gripper: gripper?.name ?? '', mass_kg: say(part.mass.mass), force_n: say(asked.force), pad_friction: asked.pad_friction === null ? '' : say(asked.pad_friction), safety_asked: say(asked.safety),
     };
   });
 }
@@ -129,7 +137,7 @@ function csv(rows) {
   return [Object.keys(rows[0] ?? {}), ...rows.map(Object.values)].map((row) => `${row.map(quote).join(',')}\n`).join('');
 }
 
-const TEXTS = new Set(['status', 'load_name', 'side', 'tool_frame', 'slip']);
+const TEXTS = new Set(['status', 'verdict', 'load_name', 'side', 'tool_frame', 'slip', 'force_range', 'part', 'gripper']);
 
 function json(report, rows) {
   const value = ([name, text]) => [name, TEXTS.has(name) ? text : text === '' ? null : Number(text)];
@@ -142,8 +150,7 @@ function isaac(report, rows) {
   const lines = ['format: isaac_grasp', 'format_version: 1.0', '', '# position: metres; orientation: unit quaternion; both of the gripper frame in the part frame.',
     `# gripper frame: ${rows[0]?.tool_frame ?? ''}`, 'object_frame: "part"', `gripper_frame: ${quote(report.header.gripper?.name ?? 'gripper')}`, '', `grasps:${rows.length ? '' : ' {}'}`];
   for (const row of rows) {
-    const quality = row.mu_s === '' ? 0 : 1 / (1 + Number(row.mu_s));
-    lines.push(`  "grasp_${row.id}":`, `    confidence: ${plain(quality, DIGITS)}`, `    position: [${row.x_m}, ${row.y_m}, ${row.z_m}]`, `    orientation: {w: ${row.qw}, xyz: [${row.qx}, ${row.qy}, ${row.qz}]}`,
+    lines.push(`  "grasp_${row.id}":`, `    confidence: ${plain(report.quality(report.indexOfId.get(Number(row.id))), DIGITS)}`, `    position: [${row.x_m}, ${row.y_m}, ${row.z_m}]`, `    orientation: {w: ${row.qw}, xyz: [${row.qx}, ${row.qy}, ${row.qz}]}`,
       '    cspace_position:', `      "width": ${row.jaw_gap_m}`, '    pregrasp_cspace_position:', `      "width": ${row.opened_gap_m}`);
   }
   return `${lines.join('\n')}\n`;

@@ -10,7 +10,7 @@ export function whatIf(root, report, change) {
   const ranges = {
     friction: [Math.min(0.05, planned.friction ?? 1), Math.max(1.2, 2 * (planned.friction ?? 0)), planned.friction ?? 0.5, (value) => chosen(value, 3)],
     force: planned.force ? [Math.min(gripper?.force[0] || planned.force / 10, planned.force / 10), Math.max(gripper?.force[1] ?? 0, 2 * planned.force), planned.force, (value) => newtons(value)] : null,
-    safety: [1, 5, 1, (value) => `${chosen(value, 3)}\u00d7`],
+    safety: [Math.min(1, planned.safety), Math.max(5, 2 * planned.safety), planned.safety, (value) => `${chosen(value, 3)}\u00d7`],
   };
   const rows = [...root.querySelectorAll('[data-what]')].map((row) => {
     const name = row.dataset.what;
@@ -49,7 +49,7 @@ export function whatIf(root, report, change) {
     button.disabled = !report.changed;
     note.textContent = report.estimate
       ? 'Friction needed at another force: an estimate (\u2248), in proportion to load over force. It is exact only where no load presses, pulls or tilts the pads. For exact numbers make a new run with the command copied here.'
-      : friction || now.safety !== 1 ? 'Exact for holds and slips: the friction needed does not depend on the pads. A squeeze force marked \u2248 is an estimate.' : 'As planned.';
+      : friction || now.safety !== planned.safety ? 'Exact for holds and slips: the friction needed does not depend on the pads. A squeeze force marked \u2248 is an estimate.' : 'As planned.';
     again.disabled = !report.estimate;
     again.title = report.estimate ? command(report) : '';
   }
@@ -67,7 +67,7 @@ export function whatIf(root, report, change) {
 function command(report) {
   const { now, planned, header } = report;
   const quote = (word) => (/^[\w./:=+,@%-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
-  const drop = new Set(['--force', ...(now.friction === planned.friction ? [] : ['--pad-friction'])]);
+  const drop = new Set(['--force', ...(now.friction === planned.friction ? [] : ['--pad-friction']), ...(now.safety === planned.safety ? [] : ['--safety'])]);
   const words = [];
   const given = header.provenance.command;
   for (let k = 0; k < given.length; k++) {
@@ -76,5 +76,6 @@ function command(report) {
   }
   words.push('--force', `${now.force}N`);
   if (now.friction !== planned.friction && now.friction) words.push('--pad-friction', String(now.friction));
+  if (now.safety !== planned.safety) words.push('--safety', String(now.safety));
   return words.join(' ');
 }

@@ -56,6 +56,12 @@ export function reason(name, report) {
       `Larger pads, or places nearer to the centre of mass. ${moreForce(report)}`],
     separating: () => ['Pads lift off', 'Part of a pad lifts off under a load, and such grips were to be discarded.', 'Take the contact that is left: --separation solve.'],
     no_contact: () => ['No contact', 'A contact area is empty.', ''],
+    over_payload: () => ['Over the payload', `A load is larger than the weight of the ${(of ?? '').replaceAll('_', '\u00a0')} that the gripper file states. The largest of the ${count(loads.length)} loads is ${newtons(largestForce(report))}.`, 'A stronger gripper, or a lighter part and gentler motion (--mass, --accel).'],
+    over_moment: () => {
+      const [axis, most] = (of ?? '').split('_');
+      return [`Moment about ${axis} over the limit`, `A load turns the part about ${axis} at the pads with more than the ${most}\u00a0N\u00b7m that the gripper file states.`, 'Places nearer to the centre of mass (--max-offset), or a stronger gripper.'];
+    },
+    not_chosen: () => ['Not among the ids asked for', '', 'More of them: --ids.'],
     duplicate: () => ['Same as another by symmetry', 'Another grip of the list stands for it.', ''],
     outranked: () => ['Behind the best ones kept', 'Bounds put it behind the grips that are listed.', ''],
   }[kind];
@@ -92,7 +98,8 @@ function allSlip(report) {
   const smallest = (values) => indices.reduce((best, i) => (values[i] < (best < 0 ? Infinity : values[best]) ? i : best), -1);
   const [mu, force] = [smallest(c.mu), smallest(c.force_needed)];
   const help = [];
-  if (mu >= 0) help.push(`Pads with more friction: grip ${count(c.rank[mu])} needs ${number(c.mu[mu])}, the pads have ${chosen(report.friction)}.`);
+  const { safety } = report.planned;
+  if (mu >= 0) help.push(`Pads with more friction: grip ${count(c.rank[mu])} needs ${number(c.mu[mu] * safety)}${safety === 1 ? '' : ` with the safety of ${chosen(safety)}`}, the pads have ${chosen(report.friction)}.`);
   if (force >= 0 && gripper) {
     const needed = c.force_needed[force];
     help.push(needed <= gripper.force[1] ? `More force: grip ${count(c.rank[force])} holds its worst load with ${newtons(needed)} (--force).`
@@ -114,7 +121,7 @@ export function drawWhy(root, report) {
   if (report.n > 0) {
     const slip = allSlip(report);
     title = report.n === 1 ? 'The one grip slips' : `All ${count(report.n)} grips slip`;
-    lead = slip.mu >= 0 ? `The best of them needs a friction of ${number(report.column.mu[slip.mu])}; the pads have ${chosen(report.friction)}${Number.isFinite(slip.force) ? ` at ${newtons(slip.force)}` : ''}.` : '';
+    lead = slip.mu >= 0 ? `The best of them needs a friction of ${number(report.column.mu[slip.mu] * report.planned.safety)}${report.planned.safety === 1 ? '' : ` with the safety of ${chosen(report.planned.safety)}`}; the pads have ${chosen(report.friction)}${Number.isFinite(slip.force) ? ` at ${newtons(slip.force)}` : ''}.` : '';
     advice.clear();
     slip.help.forEach((text) => advice.add(text));
     if (fallen) lead += ` ${count(fallen)} other candidates fell before that:`;

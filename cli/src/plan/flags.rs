@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, Command};
 use gripfast::error::Error;
 use gripfast::request::{
-    Choice, Cone, EarlierWeights, Ground, Polish, PoseError, Refiner, Region, Request, Separation,
-    Side,
+    Choice, Cone, EarlierWeights, Ground, InertiaMatrix, Polish, PoseError, Position, Refiner,
+    Region, Request, Separation, Side,
 };
 use gripfast::units::{Acceleration, Angle, Density, Force, Length, Mass, Memory, Time, Unit};
 use serde_json::{Map, Value};
@@ -18,6 +18,7 @@ use serde_json::{Map, Value};
 gripfast plan bracket.stl --gripper my-gripper.toml --density 2700kg/m3 --force 80N --accel 2g -o grips.json\n  \
 gripfast plan bracket.stl --gripper franka-hand --mass 350g --loads ball:500 --top 20 --diverse --report bracket.html\n  \
 gripfast plan bracket.stl --gripper franka-hand --mass 350g --pose-noise 1mm,2deg --compare\n  \
+gripfast plan bracket.stl -g robotiq-2f85 -g onrobot-rg2 --mass 350g --safety 2 -o grips.json\n  \
 gripfast plan housing.stl --gripper wsg50-110 --mass 2kg --spacing 0.5mm --loads ball:500 -o housing.parquet --resume\n  \
 gripfast plan bracket.stl --gripper generic --mass 350g --print-request > bracket.toml; gripfast plan --request bracket.toml --force 40N\n  \
 for part in *.stl; do gripfast plan \"$part\" --gripper generic --density 2700kg/m3 -q -o \"${part%.stl}.json\" >\"${part%.stl}.txt\"; done\n\n\
@@ -29,16 +30,25 @@ pub(crate) struct Args {
     /// Part file: STL, OBJ, PLY, ...
     #[arg(required_unless_present = "request")]
     part: Option<PathBuf>,
-    /// Gripper from the catalogue, or a gripper file.
+    /// Gripper from the catalogue, or a gripper file. Given several times, each is planned with and
+    /// shown beside the others.
     #[arg(long, short, required_unless_present = "request")]
-    gripper: Option<String>,
+    gripper: Vec<String>,
     /// Mass of the part, e.g. 350g.
     #[arg(long, conflicts_with = "density")]
     mass: Option<Mass>,
     /// Density of the part's material, e.g. 2700kg/m3.
     #[arg(long)]
     density: Option<Density>,
-    /// Gripping force of one jaw, e.g. 80N [default: the gripper's largest].
+    /// Centre of mass in the part frame, for an assembly, e.g. 10mm,0mm,5mm [default: that of a
+    /// uniform solid].
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    com: Option<Position>,
+    /// Inertia about the centre of mass, for an assembly: XX,YY,ZZ,XY,YZ,ZX (elements of the matrix)
+    /// in kgm2, kgmm2, gcm2 or gmm2 [default: that of a uniform solid]. Trajectories use it.
+    #[arg(long, value_name = "INERTIA", allow_hyphen_values = true)]
+    inertia: Option<InertiaMatrix>,
+    /// Gripping force of one jaw, not the sum of both, e.g. 80N [default: the gripper's largest].
     #[arg(long)]
     force: Option<Force>,
     /// Unit of the part file's numbers [default: the file's own, else mm].
@@ -89,10 +99,10 @@ struct CandidateArgs {
     edge_angles: Option<bool>,
     /// Smallest contact area on either face, as a share of the most that the face pair allows (pad
     /// or overlap).
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", value_parser = share)]
     min_contact: Option<f64>,
     /// Smallest contact area on either face, as a share of the pad's area.
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", value_parser = share)]
     min_pad_share: Option<f64>,
     /// Largest distance of the grip from the centre of mass.
     #[arg(long, value_name = "LENGTH")]
@@ -155,11 +165,14 @@ struct ScoringArgs {
     /// Weight of alpha [1/rad] in the score.
     #[arg(long)]
     k2: Option<f64>,
-    /// Friction coefficient of the pads [default: the gripper's], for the safety, the force needed
+    /// Friction coefficient of the pads [default: the gripper's], for what holds, the force needed
     /// and the multiple of the worst load, all of it with its moments, that is held. Another load
     /// may end at a smaller multiple, where it twists the contact out.
     #[arg(long, value_name = "MU")]
     pad_friction: Option<f64>,
+    /// Safety factor: a grip holds where mu_s times this is at most the pads' friction.
+    #[arg(long, value_name = "FACTOR")]
+    safety: Option<f64>,
     /// Uncertainty of the part's position along the pads, for alpha.
     #[arg(long, value_name = "LENGTH")]
     position_error: Option<Length>,
@@ -193,8 +206,11 @@ struct OutputArgs {
     /// Lists one of the grips that a symmetry of the part maps to each other, for all of them.
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
     merge_symmetric: Option<bool>,
-    /// Best grips to keep in the result file [default: 10000; with --polish top as many as --top
-    /// prints].
+    /// Only the candidates with these ids, e.g. 3,17 from an earlier table of the same search.
+    #[arg(long, value_delimiter = ',', value_name = "IDS")]
+    ids: Option<Vec<u64>>,
+    /// Best grips to keep in the result file, and with --diverse that many that differ [default:
+    /// 10000; with --polish top as many as --top prints].
     #[arg(long, value_name = "N")]
     keep: Option<usize>,
     /// Result file; its ending says the format: .json (read by the other subcommands), .jsonl,
@@ -249,6 +265,16 @@ struct MoreArgs {
     compare: Option<EarlierWeights>,
 }
 
+/// A share as a number or in percent.
+pub(crate) fn share(text: &str) -> Result<f64, String> {
+    let (number, factor) =
+        text.trim().strip_suffix('%').map_or((text, 1.0), |number| (number, 100.0));
+    match number.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value / factor),
+        _ => Err("give a number such as 0.5, or 50%".to_owned()),
+    }
+}
+
 /// Sets the fields of a group for which a flag was given.
 macro_rules! give {
     ($flags:expr => $group:expr; $($field:ident),+ $(,)?) => {
@@ -264,7 +290,12 @@ impl Args {
         self.output.why.clone()
     }
 
-    /// The request that the flags make, over the stored one where there is one.
+    /// The grippers given.
+    pub(super) fn grippers(&self) -> &[String] {
+        &self.gripper
+    }
+
+    /// The request that the flags make, but for the gripper where several are given, over the stored one where there is one.
     pub(super) fn request(self) -> gripfast::error::Result<Request> {
         let mut request = match &self.request {
             Some(path) => Request::read(path)?,
@@ -278,7 +309,10 @@ impl Args {
             request.loads = loads.split(',').map(|source| source.trim().to_owned()).collect();
         }
         give!(self => request;
-            part, gripper, mass, density, force, unit, max_memory, outside_buffers, accel);
+            part, mass, density, com, inertia, force, unit, max_memory, outside_buffers, accel);
+        if let [gripper] = &self.gripper[..] {
+            request.gripper.clone_from(gripper);
+        }
         let (flags, group) = (self.candidates, &mut request.candidates);
         give!(flags => group;
             spacing, angle_step, edge_angles, min_contact, min_pad_share, max_offset, approach,
@@ -292,10 +326,10 @@ impl Args {
         }
         let (flags, group) = (self.scoring, &mut request.scoring);
         give!(flags => group;
-            backend, adapter, seeds, k1, k2, pad_friction, position_error, closing_friction,
+            backend, adapter, seeds, k1, k2, pad_friction, safety, position_error, closing_friction,
             separation, polish, refiner, threads);
         let (flags, more, group) = (self.output, self.more, &mut request.selection);
-        give!(flags => group; top, diverse, merge_symmetric, keep);
+        give!(flags => group; top, diverse, merge_symmetric, ids, keep);
         give!(more => group; pose_noise, noise_samples, compare);
         if more.noise_samples.is_some() && group.pose_noise.is_none() {
             return Err(Error::input("--noise-samples", "needs --pose-noise", "add that flag"));
@@ -364,7 +398,8 @@ mod tests {
         --keep-out 0mm,0mm,0mm:1mm,1mm,1mm --faces 0,2 --faces-in 0mm,0mm,0mm:1mm,1mm,1mm \
         --grips both --flips --opening 4mm --min-opening 1mm --clearance 1mm \
         --approach-distance 80mm --backend cpu --adapter 0 --seeds 200 --k1 2 --k2 3 \
-        --pad-friction 0.7 --position-error 1mm --closing-friction 0.1 --separation discard \
+        --pad-friction 0.7 --safety 2 --com 1mm,2mm,3mm \
+        --inertia 3gmm2,3gmm2,3gmm2,0gmm2,0gmm2,0gmm2 --ids 3,17 --position-error 1mm --closing-friction 0.1 --separation discard \
         --polish all --refiner shanno --threads 2 --top 3 --diverse --merge-symmetric --keep 77 \
         -o out.json --report out.html --json -q --yes --resume --checkpoint 9s --pose-noise 1mm,2deg \
         --noise-samples 9 --compare=1,2,3,4mm";

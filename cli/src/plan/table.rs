@@ -2,22 +2,23 @@
 
 use std::io::Write;
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::Table;
+use glam::DVec3;
 use gripfast::gripper::Gripper;
 use gripfast::lab::compare::places_by_score;
 use gripfast::model::{Slip, Status};
 use gripfast::plan::OUTRANKED;
-use gripfast::results::{Comparison, GripSet, RankedGrip};
+use gripfast::results::{Comparison, EarlierScore, ForceRange, GripSet, RankedGrip};
 
-/// A column: its name, whether numbers stand to the right, and the text of a grip.
-type Column<'a> = (&'static str, bool, Box<dyn Fn(&RankedGrip) -> String + 'a>);
+use super::layout::{Column, grid, number, words, wrapped};
 
-/// Summary and table; `shown` are grips of the set.
+/// Summary and table in lines of `width` signs; `shown` are grips of the set.
 pub(super) fn print(
     out: &mut impl Write,
     set: &GripSet,
     shown: &[&RankedGrip],
     gripper: &Gripper,
+    width: usize,
 ) -> anyhow::Result<()> {
     summary(out, set, gripper)?;
     if set.grips.is_empty() {
@@ -32,37 +33,86 @@ pub(super) fn print(
         }
         return Ok(());
     }
-    writeln!(out, "\n{}", grid(&columns(set, shown), shown))?;
-    writeln!(
-        out,
-        "\nmu_s: smallest friction coefficient that holds the worst load. Slip centre from the grip's middle in the pad plane."
-    )?;
-    if let Some(friction) = set.provenance.resolved.pad_friction {
-        writeln!(
-            out,
-            "Pads with a friction of {friction}: gripping force needed for the worst load, and the factor by which all of that load can grow (multiple)."
-        )?;
+    let (table, left_out) = grid(&columns(set, shown, gripper), shown, width);
+    writeln!(out, "\n{table}\n")?;
+    for text in legend(set, shown, gripper, &left_out, width) {
+        writeln!(out, "{}", wrapped(&text, width))?;
     }
-    writeln!(out, "Position of the grip's middle in the part frame.")?;
+    if let Some(comparison) = &set.summary.comparison {
+        compared(out, set, comparison, width)?;
+    }
+    Ok(())
+}
+
+/// What the columns mean, a paragraph each.
+fn legend(
+    set: &GripSet,
+    shown: &[&RankedGrip],
+    gripper: &Gripper,
+    left_out: &[&str],
+    width: usize,
+) -> Vec<String> {
+    let pads = set.pads();
+    let mut texts = vec![
+        "mu_s: smallest friction coefficient that holds the worst load. pad: share of the pad that \
+         touches; left: share of that contact left under the worst load. approach and position of \
+         the grip's middle in the part frame."
+            .to_owned(),
+    ];
+    match pads.value {
+        Some(friction) => {
+            let usable = match pads.safety {
+                1.0 => "just holds".to_owned(),
+                safety => format!("holds with a safety of {safety}"),
+            };
+            texts.push(format!(
+                "safety: the pads' friction {friction} over mu_s; a grip holds where it is at least \
+                 {}. force N: gripping force per jaw with which it {usable}{}. multiple: factor by \
+                 which all of the worst load can grow.",
+                pads.safety,
+                range_note(set, shown, gripper)
+            ));
+        }
+        None => texts.push(
+            "safety, force needed: not known without the friction of the pads (--pad-friction)."
+                .to_owned(),
+        ),
+    }
     if shown.iter().any(|grip| !grip.merged.is_empty()) {
-        writeln!(
-            out,
-            "Rank (+n): stands for n more grips that a symmetry of the part maps to it (`merged` in the result file)."
-        )?;
+        texts.push(
+            "Rank (+n): stands for n more grips that a symmetry of the part maps to it (`merged` in \
+             the result file)."
+                .to_owned(),
+        );
     }
     let selection = &set.provenance.request.selection;
     if let Some(noise) = selection.pose_noise {
         let (shift, turn, samples) =
             (noise.shift.0 * 1e3, noise.turn.0.to_degrees(), selection.noise_samples);
-        writeln!(
-            out,
-            "Noise: mu_s at {samples} poses off by up to {shift} mm along both pad axes and {turn:.3} deg about the closing axis; 95 % of them hold\nwith the first, all with the second; lost: no contact or no equilibrium. Interference is not tested again."
-        )?;
+        texts.push(format!(
+            "Noise: mu_s at {samples} poses off by up to {shift} mm along both pad axes and {turn:.3} \
+             deg about the closing axis; 95 % of them hold with the first, all with the second; lost: \
+             no contact or no equilibrium. Interference is not tested again."
+        ));
     }
-    if let Some(comparison) = &set.summary.comparison {
-        compared(out, set, comparison)?;
+    if !left_out.is_empty() {
+        texts.push(format!("Left out to fit {width} columns: {}.", left_out.join(", ")));
     }
-    Ok(())
+    texts
+}
+
+/// What the marks behind forces mean, where there are any.
+fn range_note(set: &GripSet, shown: &[&RankedGrip], gripper: &Gripper) -> String {
+    let is = |range| shown.iter().any(|grip| set.force_range(grip) == Some(range));
+    let [least, most] = gripper.force;
+    let above = format!("+ more than the gripper's {most} N");
+    let below = format!("- less than its least, {least} N");
+    match (is(ForceRange::Above), is(ForceRange::Below)) {
+        (true, true) => format!(" ({above}, {below})"),
+        (true, false) => format!(" ({above})"),
+        (false, true) => format!(" ({below})"),
+        (false, false) => String::new(),
+    }
 }
 
 fn summary(out: &mut impl Write, set: &GripSet, gripper: &Gripper) -> std::io::Result<()> {
@@ -70,11 +120,11 @@ fn summary(out: &mut impl Write, set: &GripSet, gripper: &Gripper) -> std::io::R
     let size = (set.part.bbox_max - set.part.bbox_min) * 1e3;
     writeln!(
         out,
-        "{}: {:.1} x {:.1} x {:.1} mm, {} triangles, {:.4} kg, centre of mass ({:.2}, {:.2}, {:.2}) mm",
+        "{}: {} x {} x {} mm, {} triangles, {:.4} kg, centre of mass ({:.2}, {:.2}, {:.2}) mm",
         set.part.file,
-        size.x,
-        size.y,
-        size.z,
+        length(size.x),
+        length(size.y),
+        length(size.z),
         set.part.triangles,
         mass.mass,
         mass.centre_of_mass.x * 1e3,
@@ -83,14 +133,14 @@ fn summary(out: &mut impl Write, set: &GripSet, gripper: &Gripper) -> std::io::R
     )?;
     writeln!(
         out,
-        "{} at {} N, {} loads, {} face pairs, {} candidates, {} grips hold",
+        "{} at {} N per jaw, {} loads, {} face pairs, {} candidates",
         gripper.name,
         set.provenance.resolved.force.0,
         set.loads.len(),
         set.summary.pairs,
         set.summary.candidates,
-        set.summary.ranked
     )?;
+    writeln!(out, "{}", verdict(set))?;
     if let Some(outranked) = set.summary.rejections.get(OUTRANKED) {
         writeln!(
             out,
@@ -115,118 +165,135 @@ fn summary(out: &mut impl Write, set: &GripSet, gripper: &Gripper) -> std::io::R
     Ok(())
 }
 
-fn columns<'a>(set: &'a GripSet, shown: &[&RankedGrip]) -> Vec<Column<'a>> {
-    let mut columns: Vec<Column<'a>> = vec![
-        ("rank", true, Box::new(rank)),
-        ("id", true, Box::new(|grip| grip.grip.id.to_string())),
-        (
-            "mu_s",
-            true,
-            Box::new(|grip| {
-                format!(
-                    "{}{}",
-                    option(grip.worst.mu_s, 5),
-                    if grip.worst.status == Status::Ambiguous { "?" } else { "" }
-                )
-            }),
-        ),
-        ("safety", true, Box::new(|grip| option(grip.safety, 2))),
-        (
-            "force needed",
-            true,
-            Box::new(|grip| {
-                grip.force_needed.map_or_else(|| "-".into(), |force| format!("{force:.2} N"))
-            }),
-        ),
-        ("multiple", true, Box::new(|grip| option(grip.load_multiple, 2))),
-        ("worst load", false, Box::new(|grip| set.loads[grip.worst.load as usize].name.clone())),
-        ("slip centre mm", false, Box::new(slip)),
-        ("contact", true, Box::new(|grip| format!("{:.0} %", grip.contact_share * 100.0))),
-        ("alpha", true, Box::new(|grip| format!("{:.1} deg", grip.alpha.to_degrees()))),
-        ("score", true, Box::new(|grip| option(grip.score, 3))),
-        (
-            "width mm",
-            true,
-            Box::new(|grip| {
-                format!(
-                    "{}{:.2}",
-                    if grip.grip.inside { "inside " } else { "" },
-                    grip.grip.width * 1e3
-                )
-            }),
-        ),
-        (
-            "position mm",
-            false,
-            Box::new(|grip| tuple(&(grip.grip.part_from_grip.origin * 1e3).to_array())),
-        ),
-    ];
+/// A length in millimetres to 0.1 mm, or to two digits where it is less than a millimetre.
+fn length(mm: f64) -> String {
+    let digits = if mm > 0.0 { (1.0 - mm.log10().floor()).clamp(1.0, 9.0) } else { 1.0 };
+    format!("{mm:.*}", digits as usize)
+}
+
+/// How many of the grips hold, with what, and what the best needs where none does.
+pub(super) fn verdict(set: &GripSet) -> String {
+    let (ranked, force) = (set.summary.ranked, set.provenance.resolved.force.0);
+    let pads = set.pads();
+    let (Some(holding), Some(friction)) = (set.holding(), pads.value) else {
+        return format!(
+            "{ranked} grips have a limit state at {force} N per jaw; which hold is not known: the \
+             friction of the pads is not stated (--pad-friction)"
+        );
+    };
+    let safety = match pads.safety {
+        1.0 => String::new(),
+        safety => format!(" and a safety of {safety}"),
+    };
+    let best = set.grips.iter().filter_map(|grip| grip.force_needed).fold(f64::INFINITY, f64::min);
+    let needs = match holding == 0 && best.is_finite() {
+        true => format!(" (the best needs {} N)", significant(best)),
+        false => String::new(),
+    };
+    format!(
+        "{holding} of {ranked} grips hold with the pads' {friction}{safety} at {force} N per \
+         jaw{needs}"
+    )
+}
+
+/// A number to three digits, all of those before the point.
+fn significant(value: f64) -> String {
+    let digits = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0);
+    format!("{value:.*}", digits as usize)
+}
+
+fn columns<'a>(set: &'a GripSet, shown: &[&RankedGrip], gripper: &'a Gripper) -> Vec<Column<'a>> {
+    let mut columns =
+        vec![number("rank", 0, rank), number("id", 0, |grip| grip.grip.id.to_string())];
+    if shown.iter().any(|grip| set.verdict(grip).holds() == Some(false)) {
+        columns.push(words("verdict", 0, |grip| set.verdict(grip).name().to_owned()));
+    }
+    columns.extend(measures(set, gripper));
+    columns.extend([
+        number("width mm", 2, |grip| {
+            let side = if grip.grip.inside { "inside " } else { "" };
+            format!("{side}{:.2}", grip.grip.width * 1e3)
+        }),
+        words("position mm", 5, |grip| {
+            tuple(&(grip.grip.part_from_grip.origin * 1e3).to_array(), 1)
+        }),
+        words("worst load", 6, |grip| set.loads[grip.worst.load as usize].name.clone()),
+        words("slip centre mm", 7, slip),
+        number("alpha", 9, |grip| format!("{:.1} deg", grip.alpha.to_degrees())),
+        number("score", 8, |grip| option(grip.score, 3)),
+    ]);
     if shown.iter().any(|grip| grip.pose_noise.is_some()) {
         let lost =
             |value: Option<f64>| value.map_or_else(|| "lost".into(), |mu| format!("{mu:.5}"));
-        columns.extend::<[Column<'a>; 3]>([
-            (
-                "noise 95 %",
-                true,
-                Box::new(move |grip| {
-                    grip.pose_noise.map_or_else(|| "-".into(), |noise| lost(noise.mu_s_95))
-                }),
-            ),
-            (
-                "worst",
-                true,
-                Box::new(move |grip| {
-                    grip.pose_noise.map_or_else(|| "-".into(), |noise| lost(noise.mu_s_worst))
-                }),
-            ),
-            (
-                "lost",
-                true,
-                Box::new(|grip| {
-                    grip.pose_noise
-                        .map_or_else(|| "-".into(), |noise| percent(noise.lost, noise.samples))
-                }),
-            ),
+        let of = |grip: &RankedGrip, value: &dyn Fn(&gripfast::results::PoseNoise) -> String| {
+            grip.pose_noise.as_ref().map_or_else(|| "-".into(), value)
+        };
+        columns.extend([
+            number("noise 95 %", 1, move |grip| of(grip, &|noise| lost(noise.mu_s_95))),
+            number("worst", 1, move |grip| of(grip, &|noise| lost(noise.mu_s_worst))),
+            number("lost", 1, move |grip| of(grip, &|noise| percent(noise.lost, noise.samples))),
         ]);
     }
     if shown.iter().any(|grip| grip.earlier.is_some()) {
-        columns.extend::<[Column<'a>; 2]>([
-            (
-                "earlier",
-                true,
-                Box::new(|grip| option(grip.earlier.as_ref().map(|earlier| earlier.evaluation), 3)),
-            ),
-            (
-                "place",
-                true,
-                Box::new(|grip| {
-                    grip.earlier
-                        .as_ref()
-                        .map_or_else(|| "-".into(), |earlier| earlier.place.to_string())
-                }),
-            ),
+        columns.extend([
+            number("earlier", 1, |grip| {
+                option(grip.earlier.as_ref().map(|earlier| earlier.evaluation), 3)
+            }),
+            number("place", 1, |grip| {
+                let place = grip.earlier.as_ref().map(|earlier| earlier.place.to_string());
+                place.unwrap_or_else(|| "-".into())
+            }),
         ]);
     }
     columns
 }
 
-fn grid(columns: &[Column<'_>], shown: &[&RankedGrip]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::NOTHING);
-    table.set_header(columns.iter().map(|column| column.0));
-    for grip in shown {
-        table.add_row(columns.iter().map(|column| (column.2)(grip)));
-    }
-    for (index, _) in columns.iter().enumerate().filter(|(_, column)| column.1) {
-        if let Some(column) = table.column_mut(index) {
-            column.set_cell_alignment(CellAlignment::Right);
+/// How well a grip holds, from where, and with how much of the pad.
+pub(super) fn measures<'a>(set: &'a GripSet, gripper: &'a Gripper) -> Vec<Column<'a>> {
+    let ambiguous = |grip: &RankedGrip| match grip.worst.status {
+        Status::Ambiguous => "?",
+        _ => "",
+    };
+    vec![
+        number("mu_s", 0, move |grip| format!("{}{}", option(grip.worst.mu_s, 5), ambiguous(grip))),
+        number("safety", 0, |grip| option(grip.safety, 2)),
+        number("force N", 0, |grip| {
+            let mark = match set.force_range(grip) {
+                Some(ForceRange::Above) => "+",
+                Some(ForceRange::Below) => "-",
+                _ => "",
+            };
+            format!("{}{mark}", option(grip.force_needed, 2))
+        }),
+        number("multiple", 4, |grip| option(grip.load_multiple, 2)),
+        words("approach", 0, |grip| direction(grip.grip.part_from_grip.rotation.x_axis)),
+        number("pad", 1, |grip| share(gripper.pad_share(&grip.grip.contact))),
+        number("left", 3, |grip| share(grip.contact_share)),
+    ]
+}
+
+/// A direction as `--approach` takes it, to two places.
+fn direction(direction: DVec3) -> String {
+    for (axis, name) in [(DVec3::X, 'x'), (DVec3::Y, 'y'), (DVec3::Z, 'z')] {
+        let along = direction.dot(axis);
+        if along.abs() > 1.0 - 1e-6 {
+            return format!("{}{name}", if along > 0.0 { '+' } else { '-' });
         }
     }
-    table
+    direction.to_array().map(|x| fixed(x, 2)).join("/")
+}
+
+fn share(value: f64) -> String {
+    format!("{:.0} %", value * 100.0)
 }
 
 /// How the earlier method orders the same grips, and where the two differ most.
-fn compared(out: &mut impl Write, set: &GripSet, comparison: &Comparison) -> std::io::Result<()> {
+fn compared(
+    out: &mut impl Write,
+    set: &GripSet,
+    comparison: &Comparison,
+    width: usize,
+) -> std::io::Result<()> {
     let Comparison { grips, k1, k2, k3, epsilon_m, spearman, kendall_tau_b, risen, fallen } =
         comparison;
     writeln!(
@@ -251,48 +318,10 @@ fn compared(out: &mut impl Write, set: &GripSet, comparison: &Comparison) -> std
     }
     let places = places_by_score(&set.grips);
     let find = |id: &u64| set.grips.iter().zip(&places).find(|(ranked, _)| ranked.grip.id == *id);
-    let columns: Vec<Column<'_>> = vec![
-        ("id", true, Box::new(|grip| grip.grip.id.to_string())),
-        (
-            "place",
-            true,
-            Box::new(|grip| {
-                find(&grip.grip.id).map_or_else(String::new, |(_, place)| place.to_string())
-            }),
-        ),
-        (
-            "earlier",
-            true,
-            Box::new(|grip| {
-                grip.earlier.as_ref().map_or_else(String::new, |earlier| earlier.place.to_string())
-            }),
-        ),
-        ("mu_s", true, Box::new(|grip| option(grip.worst.mu_s, 5))),
-        (
-            "earlier mu_s",
-            true,
-            Box::new(|grip| option(grip.earlier.as_ref().map(|earlier| earlier.mu_s), 5)),
-        ),
-        (
-            "slip centre moved",
-            true,
-            Box::new(|grip| {
-                moved(grip).map_or_else(|| "-".into(), |moved| format!("{:.2} mm", moved * 1e3))
-            }),
-        ),
-        (
-            "from centre of mass",
-            true,
-            Box::new(|grip| {
-                grip.earlier
-                    .as_ref()
-                    .map_or_else(String::new, |earlier| format!("{:.2} mm", earlier.distance * 1e3))
-            }),
-        ),
-        ("contact", true, Box::new(|grip| format!("{:.0} %", grip.contact_share * 100.0))),
-        ("alpha", true, Box::new(|grip| format!("{:.1} deg", grip.alpha.to_degrees()))),
-        ("worst load", false, Box::new(|grip| set.loads[grip.worst.load as usize].name.clone())),
-    ];
+    let place = |grip: &RankedGrip| {
+        find(&grip.grip.id).map_or_else(String::new, |(_, place)| place.to_string())
+    };
+    let columns = differing(set, &place);
     for (title, ids) in [
         ("ranked higher than by the earlier method", risen),
         ("ranked lower than by the earlier method", fallen),
@@ -300,10 +329,34 @@ fn compared(out: &mut impl Write, set: &GripSet, comparison: &Comparison) -> std
         let shown: Vec<&RankedGrip> =
             ids.iter().filter_map(|id| find(id).map(|(ranked, _)| ranked)).collect();
         if !shown.is_empty() {
-            writeln!(out, "\n{title}:\n{}", grid(&columns, &shown))?;
+            let table: Table = grid(&columns, &shown, width).0;
+            writeln!(out, "\n{title}:\n{table}")?;
         }
     }
     Ok(())
+}
+
+/// Columns of grips that the earlier method places elsewhere.
+fn differing<'a>(set: &'a GripSet, place: &'a dyn Fn(&RankedGrip) -> String) -> Vec<Column<'a>> {
+    let earlier = |grip: &RankedGrip, text: &dyn Fn(&EarlierScore) -> String| {
+        grip.earlier.as_ref().map_or_else(String::new, text)
+    };
+    vec![
+        number("id", 0, |grip| grip.grip.id.to_string()),
+        number("place", 0, place),
+        number("earlier", 0, move |grip| earlier(grip, &|score| score.place.to_string())),
+        number("mu_s", 0, |grip| option(grip.worst.mu_s, 5)),
+        number("earlier mu_s", 0, move |grip| earlier(grip, &|score| option(Some(score.mu_s), 5))),
+        number("slip centre moved", 0, |grip| {
+            moved(grip).map_or_else(|| "-".into(), |moved| format!("{:.2} mm", moved * 1e3))
+        }),
+        number("from centre of mass", 3, move |grip| {
+            earlier(grip, &|score| format!("{:.2} mm", score.distance * 1e3))
+        }),
+        number("left", 4, |grip| share(grip.contact_share)),
+        number("alpha", 5, |grip| format!("{:.1} deg", grip.alpha.to_degrees())),
+        words("worst load", 2, |grip| set.loads[grip.worst.load as usize].name.clone()),
+    ]
 }
 
 /// How far the slip centre lies from where the earlier method puts it \[m\]; infinite for a
@@ -332,7 +385,7 @@ const SLIDES: f64 = 1e3;
 fn slip(grip: &RankedGrip) -> String {
     match grip.worst.slip {
         Some(Slip::Rotation { c, .. }) if c[0].hypot(c[1]) > SLIDES => "slides".into(),
-        Some(Slip::Rotation { c, .. }) => tuple(&[c[0] * 1e3, c[1] * 1e3]),
+        Some(Slip::Rotation { c, .. }) => tuple(&[c[0] * 1e3, c[1] * 1e3], 2),
         Some(Slip::Translation { .. }) => "slides".into(),
         Some(Slip::Spin { rolls_on: Some(_), .. }) => "rolls".into(),
         Some(Slip::Spin { .. }) => "spins".into(),
@@ -348,12 +401,15 @@ fn percent(count: u32, all: u32) -> String {
     format!("{:.1} %", f64::from(count) / f64::from(all) * 100.0)
 }
 
-/// Numbers to two places in brackets, without negative zeros.
-fn tuple(numbers: &[f64]) -> String {
-    let text = numbers
-        .iter()
-        .map(|x| format!("{x:.2}"))
-        .map(|x| if x == "-0.00" { "0.00".into() } else { x })
-        .collect::<Vec<_>>();
+/// Numbers in brackets.
+fn tuple(numbers: &[f64], places: usize) -> String {
+    let text: Vec<String> = numbers.iter().map(|x| fixed(*x, places)).collect();
     format!("({})", text.join(", "))
+}
+
+/// A number to so many places, without negative zeros.
+fn fixed(number: f64, places: usize) -> String {
+    let text = format!("{number:.places$}");
+    let zero = text.trim_start_matches('-').chars().all(|sign| sign == '0' || sign == '.');
+    text[usize::from(zero && text.starts_with('-'))..].to_owned()
 }

@@ -91,7 +91,7 @@ fn standard_output_and_a_choice_of_the_best() {
             "-",
             "--joint",
             "finger:-9.41:0.8",
-            "--approach",
+            "--approach-distance",
             "0.2m",
         ],
     );

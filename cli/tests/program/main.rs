@@ -21,3 +21,4 @@ mod report_page;
 mod request;
 #[path = "../../../tests/support/mod.rs"]
 mod support;
+mod verdict;

@@ -85,7 +85,7 @@ fn the_load_multiple_is_where_the_pads_friction_or_the_contact_ends() {
         // Where the contact twists out first, the branch from d = 0 is followed to 1e-4 of its end.
         let (sharp, beyond) = (1e-7, if slips { 1e-7 } else { 1.01e-4 });
         assert!(
-            held(at(multiple * (1.0 - sharp))) && !held(by(Search::Off, multiple * (1.0 + beyond))),
+            held(at(multiple * (1.0 - sharp))) && !held(at(multiple * (1.0 + beyond))),
             "{}: {multiple}",
             ranked.grip.id
         );
