@@ -8,7 +8,7 @@ use anyhow::Context;
 use clap::Args as ClapArgs;
 use comfy_table::{CellAlignment, Table, presets};
 use glam::DVec3;
-use gripfast::part::{FacePair, Part, PlanarFace, ReadOptions, Unit, drawing};
+use gripfast::part::{CurvedFace, FacePair, Part, PlanarFace, ReadOptions, Shape, Unit, drawing};
 use gripfast::units::Quantity;
 use serde_json::json;
 
@@ -149,6 +149,10 @@ fn to_text(part: &Part, pairs: &[FacePair], density: Option<f64>, rows: usize) -
     }
     text += &format!("\n{} planar faces\n", part.faces.len());
     text += &face_table(&part.faces, rows);
+    if !part.curved.is_empty() {
+        text += &format!("\n{} curved faces\n", part.curved.len());
+        text += &curved_table(&part.curved, rows);
+    }
     text += &format!("\n{} antiparallel pairs\n", pairs.len());
     text += &pair_table(pairs, rows);
     text
@@ -209,6 +213,69 @@ fn face_table(faces: &[PlanarFace], rows: usize) -> String {
     finish(&table, faces.len(), rows)
 }
 
+fn curved_table(faces: &[CurvedFace], rows: usize) -> String {
+    let header =
+        ["face", "kind", "", "area mm2", "size mm", "axis", "through mm", "off um", "facets", ""];
+    let mut table = table(&header);
+    for face in faces.iter().take(rows) {
+        let direction = face.shape.axis().map_or(String::new(), |axis| triple(axis.direction, 4));
+        let through = match face.shape {
+            Shape::Sphere { centre, .. } => centre,
+            Shape::Cone { apex, .. } => apex,
+            shape => shape.axis().map_or(face.centroid, |axis| axis.origin),
+        };
+        table.add_row([
+            face.id.to_string(),
+            face.shape.name().to_string(),
+            if face.outside { "outside" } else { "inside" }.to_string(),
+            format!("{:.2}", face.area * 1e6),
+            size(&face.shape),
+            direction,
+            triple(through * 1e3, 2),
+            format!("{:.2}", face.residual * 1e6),
+            face.facets.map_or(String::new(), |facets| format!("{facets:.0}")),
+            note(face),
+        ]);
+    }
+    finish(&table, faces.len(), rows)
+}
+
+/// Radius and extent of a curved face, in words.
+fn size(shape: &Shape) -> String {
+    let long = |along: [f64; 2]| format!("{:.2} long", (along[1] - along[0]) * 1e3);
+    match *shape {
+        Shape::Cylinder { radius, along, turn, .. } => {
+            let arc = if turn < std::f64::consts::TAU {
+                format!(", {:.0} deg", turn.to_degrees())
+            } else {
+                String::new()
+            };
+            format!("R {:.3}, {}{arc}", radius * 1e3, long(along))
+        }
+        Shape::Cone { half_angle, along, .. } => {
+            let [small, large] = along.map(|place| place * half_angle.tan() * 1e3);
+            format!("R {small:.3} to {large:.3}, {:.2} deg", half_angle.to_degrees())
+        }
+        Shape::Sphere { radius, .. } => format!("R {:.3}", radius * 1e3),
+        Shape::Torus { major, minor, .. } => {
+            format!("R {:.3}, tube {:.3}", major * 1e3, minor * 1e3)
+        }
+        Shape::Revolution { along, .. } => long(along),
+        _ => String::new(),
+    }
+}
+
+fn note(face: &CurvedFace) -> String {
+    let mut notes = Vec::new();
+    if face.is_doubtful() {
+        notes.push("faceted or round?");
+    }
+    if !face.reachable {
+        notes.push("inside");
+    }
+    notes.join(", ")
+}
+
 fn pair_table(pairs: &[FacePair], rows: usize) -> String {
     let mut table = table(&["faces", "width mm", "overlap mm2", "kind"]);
     for pair in pairs.iter().take(rows) {
@@ -235,6 +302,17 @@ fn to_json(part: &Part, pairs: &[FacePair], density: Option<f64>) -> serde_json:
             })
         })
         .collect();
+    let curved: Vec<_> = part
+        .curved
+        .iter()
+        .map(|face| {
+            json!({
+                "id": face.id, "shape": face.shape, "outside": face.outside, "residual": face.residual,
+                "facets": face.facets, "doubtful": face.is_doubtful(), "area": face.area,
+                "centroid": face.centroid, "shell": face.shell, "reachable": face.reachable,
+            })
+        })
+        .collect();
     let pairs: Vec<_> = pairs
         .iter()
         .map(|pair| json!({ "faces": [pair.face_i, pair.face_ii], "width": pair.width, "overlap_area": pair.overlap_area, "kind": pair.kind }))
@@ -242,6 +320,6 @@ fn to_json(part: &Part, pairs: &[FacePair], density: Option<f64>) -> serde_json:
     json!({
         "file": part.file, "name": part.name, "unit_m": part.unit_m, "triangles": part.mesh.triangles.len(), "vertices": part.mesh.vertices.len(),
         "bbox_min": low, "bbox_max": high, "health": part.health, "volume": mass.volume, "centre_of_mass": mass.centre_of_mass,
-        "density": density, "mass": density.map(|_| mass.mass), "inertia": density.map(|_| mass.inertia), "faces": faces, "pairs": pairs,
+        "density": density, "mass": density.map(|_| mass.mass), "inertia": density.map(|_| mass.inertia), "faces": faces, "curved": curved, "pairs": pairs,
     })
 }

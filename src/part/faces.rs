@@ -2,12 +2,13 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
+use super::curves::{self, Curves};
 use super::facets::Facets;
 use super::noise::{self, Noise};
 use super::orient::Role;
 use super::regions::{self, Flatness, Regions};
 use super::repair::Repaired;
-use super::{CurvedFace, PlanarFace, boundary, curves};
+use super::{CurvedFace, PlanarFace, boundary};
 use crate::geometry::polygon::{Moments, patch_moments};
 use crate::model::Frame;
 
@@ -16,6 +17,8 @@ use crate::model::Frame;
 const DISTANCE: [f64; 2] = [1e-5, 3e-5];
 /// Uncertainty of a corner as a share of the diagonal, besides that of 32-bit floats; likewise.
 const JITTER: [f64; 2] = [1e-7, 1e-5];
+/// Uncertainty of a vertex of a curved surface as a share of the diagonal: rounding in the file.
+const FLOOR: f64 = 1e-6;
 /// Width (twice area over half perimeter) below which a face is no place for a pad, as a share of
 /// the diagonal.
 const NARROWEST: f64 = 5e-4;
@@ -55,8 +58,17 @@ pub(super) fn faces(part: &mut Repaired) -> (Vec<PlanarFace>, Vec<CurvedFace>) {
             taken * 1e6
         ));
     }
+    let floor =
+        if is_rough { rough.distance } else { (FLOOR * part.diagonal).max(4.0 * part.noise) };
+    let Curves { faces: mut curved, is_curved } =
+        curves::curved_faces(part, &regions, &facets.borders, floor);
+    for (is_facet, is_curved) in facets.is_facet.iter_mut().zip(is_curved) {
+        *is_facet |= is_curved;
+    }
     let planar = outline(part, &regions, &facets);
-    let curved = curves::curved_faces(part, &regions, &facets, planar.len() as u32);
+    for (face, id) in curved.iter_mut().zip(planar.len() as u32..) {
+        face.id = id;
+    }
     (planar, curved)
 }
 
@@ -66,7 +78,7 @@ fn outline(part: &Repaired, regions: &Regions, facets: &Facets) -> Vec<PlanarFac
     let mut faces: Vec<PlanarFace> = Vec::new();
     for (index, region) in regions.all.iter().enumerate() {
         if facets.is_facet[index]
-            || 4.0 * region.area < NARROWEST * part.diagonal * facets.perimeter[index]
+            || 4.0 * region.area < NARROWEST * part.diagonal * facets.borders.perimeter[index]
         {
             continue;
         }

@@ -1,10 +1,8 @@
 //! Which planar regions are faces of their own, and which are facets of curved surfaces.
 
-use rustc_hash::FxHashMap;
-
+use super::borders::{Border, Borders};
 use super::regions::{Region, Regions};
 use super::repair::Repaired;
-use super::topology::NONE;
 
 /// Dihedral angle up to which two regions may be neighbouring facets of one curved surface: 25
 /// degrees.
@@ -29,12 +27,10 @@ struct Smooth {
 
 /// Boundaries between regions and what follows from them.
 pub(super) struct Facets {
-    /// Length of each region's boundary \[m\].
-    pub perimeter: Vec<f64>,
+    /// Common boundaries.
+    pub borders: Borders,
     /// Whether each region is a facet of a curved surface.
     pub is_facet: Vec<bool>,
-    /// Per region its neighbours and the length shared with each.
-    shared: Vec<FxHashMap<u32, f64>>,
 }
 
 impl Facets {
@@ -50,32 +46,14 @@ impl Facets {
     /// a flat too few loses grips.
     pub(super) fn new(part: &Repaired, regions: &Regions) -> Self {
         let count = regions.all.len();
-        let mut perimeter = vec![0.0; count];
-        let mut shared = vec![FxHashMap::default(); count];
-        for index in 0..count {
-            for &triangle in regions.triangles(index) {
-                for k in 0..3 {
-                    let twin = part.edges.twin[(triangle * 3 + k) as usize];
-                    let other = if twin == NONE { NONE } else { regions.of[(twin / 3) as usize] };
-                    if other == index as u32 {
-                        continue;
-                    }
-                    let corners = part.mesh.corners(triangle);
-                    let length = corners[k as usize].distance(corners[(k as usize + 1) % 3]);
-                    perimeter[index] += length;
-                    if other != NONE {
-                        *shared[index].entry(other).or_insert(0.0) += length;
-                    }
-                }
-            }
-        }
-        let mut facets = Self { perimeter, is_facet: Vec::new(), shared };
+        let borders = Borders::new(part, regions);
+        let mut facets = Self { borders, is_facet: Vec::new() };
         let smooth: Vec<Vec<Smooth>> =
             (0..count).map(|index| facets.smooth(&regions.all, index, part.diagonal)).collect();
         let small = (SMALL * part.diagonal).powi(2);
         facets.is_facet = (0..count)
             .map(|index| {
-                let long = 0.25 * facets.perimeter[index];
+                let long = 0.25 * facets.borders.perimeter[index];
                 let total: f64 = smooth[index].iter().map(|other| other.shared).sum();
                 let comparable: Vec<&Smooth> =
                     smooth[index].iter().filter(|other| other.comparable).collect();
@@ -98,7 +76,8 @@ impl Facets {
     /// Neighbours with which a region may lie on one curved surface.
     fn smooth(&self, regions: &[Region], index: usize, diagonal: f64) -> Vec<Smooth> {
         let region = &regions[index];
-        let neighbours = self.shared[index].iter().filter_map(|(&neighbour, &shared)| {
+        let neighbours = self.borders.of(index).iter().filter_map(|border| {
+            let (neighbour, shared) = (border.other, border.length);
             let other = &regions[neighbour as usize];
             let angle = region.plane.normal.angle_between(other.plane.normal);
             // Of a strip as wide as its area over the shared edge.
@@ -134,7 +113,7 @@ impl Facets {
                     (height.abs() < within).then_some(sum + height)
                 })
             };
-            let near = self.shared[index].keys().find_map(|&other| {
+            let near = self.borders.of(index).iter().find_map(|&Border { other, .. }| {
                 let face = &regions.all[other as usize];
                 let is_face = face.area >= 10.0 * region.area && !self.is_facet[other as usize];
                 if is_face && region.plane.normal.angle_between(face.plane.normal) < 0.2 {

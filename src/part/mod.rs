@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, ErrorKind, Result};
 use crate::model::{Frame, LARGEST_LENGTH, Polygon};
 
+mod borders;
 mod boundary;
 mod cracks;
 mod crossing;

@@ -32,6 +32,8 @@ pub(super) struct Repaired {
     pub diagonal: f64,
     /// Rounding of the coordinates to 32-bit floats \[m\].
     pub noise: f64,
+    /// Unit of the file's numbers \[m\].
+    pub unit: f64,
     apex: DVec3,
 }
 
@@ -114,7 +116,7 @@ pub(super) fn repair(soup: Soup, scale: f64, place: &str) -> Result<Repaired> {
                 .to_string(),
         ),
     }
-    Ok(Repaired { mesh, health, edges, shell_of, shells, diagonal, noise, apex })
+    Ok(Repaired { mesh, health, edges, shell_of, shells, diagonal, noise, unit: scale, apex })
 }
 
 /// Parts neighbours whose windings still disagree, so that walks over the surface never change

@@ -1,109 +1,397 @@
 //! Which regions of the mesh make curved faces.
 
 use glam::DVec3;
-use nalgebra::Matrix3;
 
-use super::fit::{Kind, Profile, Surface, circle};
+use super::fit::{Kind, Profile};
+use super::grow::{Exactness, FREE, Found, Growth};
+use super::judge::{COARSE, Cut, turn};
+use super::net::Net;
+use super::seed::neighbours;
 use super::{Axis, CurvedFace, Shape};
 use crate::geometry::UnionFind;
-use crate::part::facets::Facets;
+use crate::part::borders::Borders;
 use crate::part::orient::Role;
 use crate::part::regions::Regions;
 use crate::part::repair::Repaired;
-use crate::part::topology::NONE;
 
-/// Distance of a vertex from its shape as a share of the radius.
-const RESIDUAL: f64 = 1e-3;
+/// Side of a square, as a share of the part's diagonal, below whose area a curved face is none.
+const LEAST: f64 = 5e-4;
+/// Attempts that may fail before only each second facet is tried, then each third, and so on:
+/// freely curved surfaces of a million facets.
+const PATIENCE: usize = 1500;
+/// Facets that a surface found in spite of noise has at least.
+const MANY: usize = 24;
+/// How much larger than its neighbour a facet of a noisy surface may be.
+const NOISY_RATIO: f64 = 10.0;
+/// Facets of a patch that a noisy surface is looked for in.
+const NOISY_PATCH: usize = 120;
+/// Groups and patches tried at most.
+const NOISY_TRIES: usize = 60;
+/// Facets whose coordinates are looked at for rounding.
+const SAMPLE: usize = 300;
+/// Distance of vertices from a cylinder as a share of its radius up to which it is no cone.
+const STRAIGHT: f64 = 5e-4;
+/// Strips of a cylinder or cone from which on its outermost ones, too, are no planes.
+const STRIPS: f64 = 6.0;
+/// Sag as a share of the diagonal up to which that holds.
+const ARC: f64 = 0.01;
 
-/// All curved faces of the part, by falling area, numbered from `first`.
+/// A surface with its facets, and how they cut it.
+pub(super) struct Face {
+    pub found: Found,
+    pub cut: Cut,
+}
+
+/// Curved faces by falling area, not numbered yet, and which regions are no planes because of
+/// them.
+pub(in crate::part) struct Curves {
+    pub faces: Vec<CurvedFace>,
+    pub is_curved: Vec<bool>,
+}
+
+/// All curved faces of the part. `floor`: uncertainty of its vertices \[m\].
 pub(in crate::part) fn curved_faces(
     part: &Repaired,
     regions: &Regions,
-    facets: &Facets,
-    first: u32,
-) -> Vec<CurvedFace> {
-    let mut sets = UnionFind::new(regions.all.len());
-    for (half, &twin) in part.edges.twin.iter().enumerate() {
-        if twin == NONE {
-            continue;
+    borders: &Borders,
+    floor: f64,
+) -> Curves {
+    let mut is_curved = vec![false; regions.all.len()];
+    let is_bent = |facet: u32| {
+        let bends = borders.of(facet as usize).iter().filter(|border| {
+            let [a, b] =
+                [facet, border.other].map(|index| regions.all[index as usize].plane.normal);
+            (0.67..1.0 - 1.5e-7).contains(&a.dot(b))
+        });
+        bends.count() >= 2
+    };
+    let seeds: Vec<u32> = (0..regions.all.len() as u32).filter(|&facet| is_bent(facet)).collect();
+    if seeds.is_empty() {
+        return Curves { faces: Vec::new(), is_curved };
+    }
+    let floor = floor.max(quantum(part, regions, &seeds));
+    let net = Net::new(part, regions, borders, floor);
+    let mut growth = Growth::new(&net);
+    let mut faces: Vec<Face> = Vec::new();
+    growth.exact(&seeds, &mut faces);
+    growth.noisy(&seeds, &mut faces);
+    growth.join_same(&mut faces);
+    growth.join_rows(&mut faces);
+    faces.retain(|face| !face.found.members.is_empty());
+    let least = (LEAST * part.diagonal).powi(2);
+    let mut described = Vec::new();
+    for face in &faces {
+        if let Some(curved) = describe(part, regions, face).filter(|curved| curved.area > least) {
+            if takes_planes(face, part.diagonal) {
+                for &facet in &face.found.members {
+                    is_curved[facet as usize] = true;
+                }
+            }
+            described.push(curved);
         }
-        let pair = [half / 3, twin as usize / 3].map(|triangle| regions.of[triangle] as usize);
-        if pair[0] != pair[1] && pair.iter().all(|&region| facets.is_facet[region]) {
-            let [a, b] = pair.map(|region| regions.all[region].plane.normal);
-            if a.dot(b) > 0.9 {
-                sets.join(pair[0], pair[1]);
+    }
+    // As planar faces: areas that agree to 1e-6 count as equal.
+    let key = |face: &CurvedFace| (face.area.log2() * 1e5).round() as i64;
+    let step = (part.diagonal * 1e-6).max(f64::MIN_POSITIVE);
+    let place = |face: &CurvedFace| {
+        [face.centroid.x, face.centroid.y, face.centroid.z].map(|x| (x / step).round() as i64)
+    };
+    described.sort_by_cached_key(|face| (std::cmp::Reverse(key(face)), place(face)));
+    Curves { faces: described, is_curved }
+}
+
+/// The step to which the file rounds coordinates of curved surfaces \[m\], decimal or binary, where
+/// it is seen in all of them; 0 otherwise.
+fn quantum(part: &Repaired, regions: &Regions, seeds: &[u32]) -> f64 {
+    let stride = seeds.len().div_ceil(SAMPLE);
+    let coordinates: Vec<f64> = seeds
+        .iter()
+        .step_by(stride)
+        .flat_map(|&facet| part.mesh.corners(regions.triangles(facet as usize)[0]))
+        .flat_map(|point| point.to_array())
+        .collect();
+    let decimal = (0..12).map(|digits| 10.0_f64.powi(-digits));
+    let binary = (0..40).map(|digits| 0.5_f64.powi(digits));
+    let fits = |step: &f64| {
+        coordinates.iter().all(|x| {
+            let steps = x / step;
+            (steps - steps.round()).abs() < 1e-3 + 4.0 * part.noise / step
+        })
+    };
+    // Steps coarser than 1e-4 of the part are none: a part of whole millimetres.
+    let possible = 40.0 * part.noise..1e-4 * part.diagonal;
+    decimal
+        .chain(binary)
+        .map(|step| part.unit * step)
+        .filter(|step| possible.contains(step) && fits(step))
+        .fold(0.0, f64::max)
+}
+
+/// Whether the facets of a face are no planes even where a look at their neighbours alone leaves it
+/// open: a ring of facets on a torus, the cap of a sphere, the outermost strip of an arc.
+fn takes_planes(face: &Face, diagonal: f64) -> bool {
+    let strips = face.cut.turn * face.cut.facets / std::f64::consts::TAU;
+    match face.found.kind {
+        Kind::Torus => true,
+        Kind::Sphere | Kind::Revolution => face.cut.step <= COARSE,
+        Kind::Cylinder | Kind::Cone => {
+            face.cut.step <= COARSE && strips > STRIPS - 0.3 && face.found.sag < ARC * diagonal
+        }
+    }
+}
+
+impl Growth<'_> {
+    /// Adds a surface; what it takes over is taken from the others.
+    pub(super) fn take(&mut self, faces: &mut Vec<Face>, found: Found, cut: Cut) {
+        let mut losers: Vec<u32> =
+            found.members.iter().map(|&facet| self.owner[facet as usize]).collect();
+        losers.sort_unstable();
+        losers.dedup();
+        self.claim(&found);
+        for loser in losers.into_iter().filter(|&loser| loser != FREE) {
+            let left = &mut faces[loser as usize].found.members;
+            let before = left.len();
+            left.retain(|&facet| self.owner[facet as usize] == loser);
+            // A rest is no surface any more.
+            if 2 * left.len() < before {
+                for facet in left.drain(..) {
+                    self.owner[facet as usize] = FREE;
+                }
+            }
+        }
+        faces.push(Face { found, cut });
+    }
+
+    /// Surfaces whose corners lie on them exactly.
+    fn exact(&mut self, seeds: &[u32], faces: &mut Vec<Face>) {
+        let mut failed = 0;
+        for (index, &seed) in seeds.iter().enumerate() {
+            if self.owner[seed as usize] != FREE || index % (1 + failed / PATIENCE) != 0 {
+                continue;
+            }
+            let judged = |growth: &mut Self, found: Option<Found>| {
+                let found = found?;
+                let cut = growth.judge(&found, Exactness::Exact)?;
+                Some((found, cut))
+            };
+            let sphere = self.sphere_at(seed);
+            let sphere = judged(self, sphere);
+            let row = self.by_row(seed);
+            let row = judged(self, row).map(|row| self.straightened(row));
+            let found = match (sphere, row) {
+                // The two circles at the ends of a cylinder lie on a sphere, too.
+                (Some(sphere), Some(row)) => {
+                    let is_all = self.area_of(&row.0) > 0.95 * self.area_of(&sphere.0);
+                    Some(if is_all { row } else { sphere })
+                }
+                (Some(found), None) | (None, Some(found)) => Some(found),
+                (None, None) => {
+                    let found = self.by_patch(seed);
+                    judged(self, found)
+                }
+            };
+            match found {
+                Some((found, cut)) => self.take(faces, found, cut),
+                None => failed += 1,
             }
         }
     }
-    let mut members: Vec<Vec<usize>> = vec![Vec::new(); regions.all.len()];
-    for region in (0..regions.all.len()).filter(|&region| facets.is_facet[region]) {
-        members[sets.root(region)].push(region);
+
+    /// A cone whose radius changes by less than vertices may lie off, as a cylinder.
+    fn straightened(&self, (mut found, cut): (Found, Cut)) -> (Found, Cut) {
+        if found.kind == Kind::Cone
+            && let Some(surface) = found.surface.as_cylinder(&found.points)
+        {
+            let residual = surface.residual(&found.points);
+            if residual <= self.net.floor + STRAIGHT * surface.radius() {
+                (found.surface, found.kind, found.residual) = (surface, Kind::Cylinder, residual);
+            }
+        }
+        (found, cut)
     }
-    let mut faces: Vec<CurvedFace> = members
-        .iter()
-        .filter(|members| members.len() >= 3)
-        .filter_map(|members| cylinder(part, regions, members))
-        .collect();
-    faces.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.triangles.cmp(&b.triangles)));
-    for (face, id) in faces.iter_mut().zip(first..) {
-        face.id = id;
+
+    /// Surfaces whose corners lie off by more, in connected bent facets that are left.
+    fn noisy(&mut self, seeds: &[u32], faces: &mut Vec<Face>) {
+        let net = self.net;
+        let mut sets = UnionFind::new(self.owner.len());
+        let mut is_seed = vec![false; self.owner.len()];
+        for &seed in seeds.iter().filter(|&&seed| self.owner[seed as usize] == FREE) {
+            is_seed[seed as usize] = true;
+        }
+        for &seed in seeds.iter().filter(|&&seed| is_seed[seed as usize]) {
+            for other in neighbours(net, seed, NOISY_RATIO) {
+                if is_seed[other as usize] {
+                    sets.join(seed as usize, other as usize);
+                }
+            }
+        }
+        let mut groups: Vec<(usize, u32)> = seeds
+            .iter()
+            .filter(|&&seed| is_seed[seed as usize])
+            .map(|&seed| (sets.root(seed as usize), seed))
+            .collect();
+        groups.sort_unstable();
+        let mut groups: Vec<(f64, Vec<u32>)> = groups
+            .chunk_by(|a, b| a.0 == b.0)
+            .filter(|group| group.len() >= MANY)
+            .map(|group| {
+                let facets: Vec<u32> = group.iter().map(|entry| entry.1).collect();
+                (facets.iter().map(|&facet| net.area(facet)).sum(), facets)
+            })
+            .collect();
+        groups.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut tries = NOISY_TRIES;
+        for (_, facets) in groups.iter().take(NOISY_TRIES) {
+            if self.noisy_surface(facets, faces) {
+                continue;
+            }
+            let stride = facets.len().div_ceil(NOISY_TRIES / 4);
+            for &seed in facets.iter().step_by(stride) {
+                if tries > 0 && self.owner[seed as usize] == FREE {
+                    tries -= 1;
+                    let patch = self.patch(seed, NOISY_PATCH);
+                    if patch.len() >= MANY {
+                        self.noisy_surface(&patch, faces);
+                    }
+                }
+            }
+        }
     }
-    faces
+
+    /// Joins neighbours that lie on one surface: pieces of different fineness, and a helical strip
+    /// whose windings were found one by one.
+    fn join_same(&mut self, faces: &mut [Face]) {
+        let mut pairs: Vec<(usize, usize)> = Vec::new();
+        for (number, face) in faces.iter().enumerate() {
+            for &facet in &face.found.members {
+                for border in self.net.borders.of(facet as usize) {
+                    let other = self.owner[border.other as usize];
+                    if other != FREE && (other as usize) < number {
+                        pairs.push((other as usize, number));
+                    }
+                }
+            }
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        let mut sets = UnionFind::new(faces.len());
+        for &(a, b) in &pairs {
+            let (one, other) = (&faces[a].found, &faces[b].found);
+            let (large, small) =
+                if self.area_of(one) >= self.area_of(other) { (one, other) } else { (other, one) };
+            if large.kind == small.kind
+                && large.sign == small.sign
+                && large.surface.residual(&small.points) <= 2.0 * self.tolerance_of(large)
+            {
+                sets.join(a, b);
+            }
+        }
+        for number in 0..faces.len() {
+            let root = sets.root(number);
+            if root == number {
+                continue;
+            }
+            let moved = std::mem::take(&mut faces[number].found.members);
+            for &facet in &moved {
+                self.owner[facet as usize] = root as u32;
+            }
+            faces[root].found.members.extend(moved);
+            if faces[number].found.points.len() > faces[root].found.points.len() {
+                faces[root].found.surface = faces[number].found.surface;
+            }
+        }
+        for face in faces.iter_mut() {
+            let found = &mut face.found;
+            let points = self.points(&found.members);
+            if points.len() <= found.points.len() {
+                continue;
+            }
+            found.surface = found.surface.fitted(found.kind, &points).unwrap_or(found.surface);
+            found.residual = found.surface.residual(&points);
+            found.points = points;
+            face.cut.turn = match found.kind {
+                Kind::Cylinder | Kind::Cone => turn(found, std::f64::consts::TAU / face.cut.facets),
+                _ => face.cut.turn,
+            };
+        }
+    }
+
+    /// A surface near all of `facets`.
+    fn noisy_surface(&mut self, facets: &[u32], faces: &mut Vec<Face>) -> bool {
+        let points = self.points(facets);
+        let attempts = [Self::line_of, Self::sphere_of, Self::torus_of];
+        let found = attempts.iter().find_map(|attempt| {
+            let found = attempt(self, facets, &points, Exactness::Noisy)?;
+            let cut = self.judge(&found, Exactness::Noisy)?;
+            Some((found, cut))
+        });
+        let is_found = found.is_some();
+        if let Some((found, cut)) = found {
+            self.take(faces, found, cut);
+        }
+        is_found
+    }
 }
 
-fn cylinder(part: &Repaired, regions: &Regions, members: &[usize]) -> Option<CurvedFace> {
-    let mut spread = Matrix3::zeros();
-    for &region in members {
-        let region = &regions.all[region];
-        let normal = region.plane.normal;
-        let normal = nalgebra::Vector3::new(normal.x, normal.y, normal.z);
-        spread += normal * normal.transpose() * region.area;
-    }
-    let eigen = spread.symmetric_eigen();
-    let column = eigen.eigenvectors.column(eigen.eigenvalues.imin());
-    let direction = DVec3::new(column[0], column[1], column[2]).normalize();
-    let (u, v) = direction.any_orthonormal_pair();
-    let mut triangles: Vec<u32> =
-        members.iter().flat_map(|&region| regions.triangles(region)).copied().collect();
+fn describe(part: &Repaired, regions: &Regions, face: &Face) -> Option<CurvedFace> {
+    let found = &face.found;
+    let mut triangles: Vec<u32> = found
+        .members
+        .iter()
+        .flat_map(|&facet| regions.triangles(facet as usize))
+        .copied()
+        .collect();
     triangles.sort_unstable();
-    let mut vertices: Vec<u32> =
-        triangles.iter().flat_map(|&t| part.mesh.triangles[t as usize]).collect();
-    vertices.sort_unstable();
-    vertices.dedup();
-    let points: Vec<DVec3> =
-        vertices.iter().map(|&vertex| part.mesh.vertices[vertex as usize]).collect();
-    let (x, y, radius) = circle(points.iter().map(|point| (point.dot(u), point.dot(v))))?;
-    let start = Surface {
-        axis: Axis { origin: u * x + v * y, direction },
-        profile: Profile::Line { radius, slope: 0.0 },
-    };
-    let surface = start.fitted(Kind::Cylinder, &points)?;
-    let Profile::Line { radius, .. } = surface.profile else { return None };
-    let residual = surface.residual(&points);
-    if residual > RESIDUAL * radius + 1e-6 * part.diagonal {
-        return None;
-    }
-    let (mut area, mut centroid, mut outward) = (0.0, DVec3::ZERO, 0.0);
+    let (mut area, mut centroid) = (0.0, DVec3::ZERO);
     for &triangle in &triangles {
         let [a, b, c] = part.mesh.corners(triangle);
-        let normal = (b - a).cross(c - a) / 2.0;
-        let middle = (a + b + c) / 3.0;
-        area += normal.length();
-        centroid += middle * normal.length();
-        outward += normal.dot(surface.distance_and_normal(middle).1);
+        let own = (b - a).cross(c - a).length() / 2.0;
+        area += own;
+        centroid += (a + b + c) / 3.0 * own;
     }
-    let axis = surface.axis;
-    let places = points.iter().map(|&point| axis.along(point));
-    let along = places.fold([f64::INFINITY, f64::NEG_INFINITY], |along, place| {
-        [along[0].min(place), along[1].max(place)]
-    });
-    let shell = part.shell_of[triangles[0] as usize];
+    let axis = found.surface.axis;
+    // The greatest component of the direction is positive, so that the search does not decide.
+    let sense = axis.direction[axis.direction.abs().max_position()].signum();
+    let mut axis = Axis { direction: axis.direction * sense, ..axis };
+    let extent = |axis: Axis| {
+        let places = found.points.iter().map(|&point| axis.along(point));
+        places.fold([f64::INFINITY, f64::NEG_INFINITY], |along, place| {
+            [along[0].min(place), along[1].max(place)]
+        })
+    };
+    let centred = |axis: &mut Axis| {
+        let [low, high] = extent(*axis);
+        axis.origin += axis.direction * (low + high) / 2.0;
+        extent(*axis)
+    };
+    let shape = match (found.kind, found.surface.profile) {
+        (Kind::Revolution, _) => {
+            let along = centred(&mut axis);
+            Shape::Revolution { axis, along }
+        }
+        (Kind::Cone, Profile::Line { radius, slope }) => {
+            let apex =
+                found.surface.axis.origin - found.surface.axis.direction * (radius / slope.tan());
+            let axis = found.surface.axis.direction * slope.signum();
+            let along = extent(Axis { origin: apex, direction: axis });
+            Shape::Cone { apex, axis, half_angle: slope.abs(), along }
+        }
+        (_, Profile::Line { radius, .. }) => {
+            let along = centred(&mut axis);
+            Shape::Cylinder { axis, radius, along, turn: face.cut.turn }
+        }
+        (Kind::Sphere, Profile::Circle { minor, .. }) => {
+            Shape::Sphere { centre: axis.origin, radius: minor }
+        }
+        (_, Profile::Circle { major, minor }) => Shape::Torus { axis, major, minor },
+    };
+    let shell = part.shell_of[*triangles.first()? as usize];
     Some(CurvedFace {
         id: 0,
-        shape: Shape::Cylinder { axis, radius, along, turn: std::f64::consts::TAU },
-        outside: outward > 0.0,
-        residual,
-        facets: Some(members.len() as f64),
+        shape,
+        outside: found.sign > 0.0,
+        residual: found.residual,
+        facets: Some(face.cut.facets),
         area,
         centroid: centroid / area,
         triangles,

@@ -32,6 +32,8 @@ pub(super) enum Kind {
     Cone,
     Sphere,
     Torus,
+    /// With any profile: not fitted.
+    Revolution,
 }
 
 /// Axis across (two), axis along, turn of the axis (two), first and second of the profile.
@@ -44,6 +46,7 @@ impl Kind {
             Kind::Cone => [true, true, false, true, true, true, true],
             Kind::Sphere => [true, true, true, false, false, false, true],
             Kind::Torus => [true; 7],
+            Kind::Revolution => [false; 7],
         }
     }
 
@@ -62,7 +65,7 @@ pub(super) struct Surface {
 /// Most steps of a fit; exact data need three to six.
 const STEPS: usize = 40;
 /// Most points that a fit looks at: more make it no better.
-const MOST_POINTS: usize = 3000;
+const MOST_POINTS: usize = 600;
 
 impl Surface {
     /// Place along the axis, distance from it, unit vector away from it.
@@ -84,7 +87,7 @@ impl Surface {
             }
             Profile::Circle { major, minor } => {
                 let across = r - major;
-                let length = across.hypot(s).max(f64::MIN_POSITIVE);
+                let length = (across * across + s * s).sqrt().max(f64::MIN_POSITIVE);
                 (length - minor, across / length, s / length)
             }
         }
@@ -101,6 +104,23 @@ impl Surface {
         let (s, r, away) = self.place(point);
         let (distance, by_r, by_s) = self.level(s, r);
         (distance, away * by_r + self.axis.direction * by_s)
+    }
+
+    /// The radius that residuals are compared with \[m\]: of a cylinder, of a cone at the axis'
+    /// origin, of a sphere or of a tube.
+    pub(super) fn radius(&self) -> f64 {
+        match self.profile {
+            Profile::Line { radius, .. } => radius.abs(),
+            Profile::Circle { minor, .. } => minor,
+        }
+    }
+
+    /// The greatest radius about the axis: of a sphere, or of a torus outside \[m\].
+    pub(super) fn reach(&self) -> f64 {
+        match self.profile {
+            Profile::Line { radius, .. } => radius.abs(),
+            Profile::Circle { major, minor } => major + minor,
+        }
     }
 
     /// Greatest distance of `points` \[m\].
@@ -153,6 +173,13 @@ impl Surface {
         (sound && self.axis.origin.is_finite() && cost.is_finite()).then_some(self)
     }
 
+    /// The cylinder nearest to points near `self`.
+    pub(super) fn as_cylinder(self, points: &[DVec3]) -> Option<Surface> {
+        let Profile::Line { radius, .. } = self.profile else { return None };
+        Surface { profile: Profile::Line { radius, slope: 0.0 }, ..self }
+            .fitted(Kind::Cylinder, points)
+    }
+
     /// Moves the origin along the axis; the surface stays.
     pub(super) fn move_origin(&mut self, by: f64) {
         self.axis.origin += self.axis.direction * by;
@@ -187,18 +214,22 @@ impl Surface {
             let row = [-by_r * eu, -by_r * ev, -by_s, tilt * eu, tilt * ev, profile[0], profile[1]];
             let mut scaled = Parameters::zeros();
             for k in 0..7 {
-                if free[k] {
-                    scaled[k] = row[k] * scale[k];
+                scaled[k] = row[k] * scale[k];
+            }
+            for column in 0..7 {
+                for row in column..7 {
+                    normal[(row, column)] += scaled[row] * scaled[column];
                 }
             }
-            normal.ger(1.0, &scaled, &scaled, 1.0);
             gradient += scaled * distance;
             cost += distance * distance;
         }
-        for k in 0..7 {
-            if !free[k] {
-                normal[(k, k)] = 1.0;
-            }
+        normal.fill_upper_triangle_with_lower_triangle();
+        for k in (0..7).filter(|&k| !free[k]) {
+            normal.column_mut(k).fill(0.0);
+            normal.row_mut(k).fill(0.0);
+            normal[(k, k)] = 1.0;
+            gradient[k] = 0.0;
         }
         (normal, gradient, cost)
     }

@@ -9,8 +9,13 @@ use serde::{Deserialize, Serialize};
 
 mod find;
 mod fit;
+mod grow;
+mod judge;
+mod net;
+mod profile;
+mod seed;
 
-pub(super) use find::curved_faces;
+pub(super) use find::{Curves, curved_faces};
 
 /// A line in the part frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -1,0 +1,236 @@
+//! Whether facets that lie on a surface were made from it.
+
+use std::f64::consts::TAU;
+
+use super::fit::{Kind, Profile};
+use super::grow::{Exactness, Found, Growth, RESIDUAL};
+
+/// Angle between facets above which they may as well be flats \[rad\]: 25.5 degrees, 14 to the turn.
+pub(super) const COARSE: f64 = 0.445;
+/// Turn below which a face shows too little of its curvature \[rad\]: 26 degrees.
+const LEAST_TURN: f64 = 0.45;
+/// ... of a torus, about its tube and about its axis: 17 and 10 degrees.
+const LEAST_TORUS: [f64; 2] = [0.3, 0.17];
+/// Turn \[rad\] above which nothing but a circle fits a circle within the tolerances (an involute
+/// or an ellipse leaves it by more): 100 degrees; 60 with noise.
+const SURE: [f64; 2] = [1.75, 1.05];
+/// Share of the part's diagonal up to which flats of a bent sheet and facets of an arc look alike:
+/// sag.
+const ARC: f64 = 0.01;
+/// Sag as a multiple of that of a chord across a typical facet from which on a facet is too deep
+/// for a surface that is curved both ways.
+const DEEP: f64 = 8.0;
+/// Side of a square as a share of the diagonal: three facets alone count when smaller.
+const SMALL: f64 = 0.02;
+
+/// What the facets of a surface say of how it was cut.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cut {
+    /// Typical angle between neighbouring facets \[rad\].
+    pub step: f64,
+    /// Facets to a turn.
+    pub facets: f64,
+    /// Arc covered about the axis \[rad\]; 0 for a sphere.
+    pub turn: f64,
+}
+
+/// Borders of the members of a surface.
+#[derive(Default)]
+struct Edge {
+    /// Sums over borders within: length, length times bend, length times bend squared (signed).
+    bend: f64,
+    square: f64,
+    least: f64,
+    most: f64,
+    /// Mean length of those that are bent.
+    length: f64,
+    count: f64,
+    /// Length of borders to others, of those to facets that carry on in much the same way, and of
+    /// those that meet a tangent face.
+    outer: f64,
+    runs_on: f64,
+    tangent: f64,
+}
+
+impl Growth<'_> {
+    fn edge(&mut self, found: &Found) -> Edge {
+        self.mark(&found.members);
+        let net = self.net;
+        let mut edge = Edge { least: f64::INFINITY, ..Edge::default() };
+        for &facet in &found.members {
+            for border in net.borders.of(facet as usize) {
+                if !self.is_marked(border.other) || !net.is_smooth(facet, border.other) {
+                    continue;
+                }
+                let bend = net.bend(facet, border.other);
+                edge.bend += border.length * bend;
+                edge.square += border.length * bend * bend.abs();
+                if bend.abs() > 3e-4 {
+                    edge.least = edge.least.min(bend.abs());
+                    edge.most = edge.most.max(bend.abs());
+                    edge.length += border.length;
+                    edge.count += 1.0;
+                }
+            }
+        }
+        let step = edge.square / edge.bend;
+        for &facet in &found.members {
+            for border in net.borders.of(facet as usize) {
+                let other = border.other;
+                if self.is_marked(other) {
+                    continue;
+                }
+                edge.outer += border.length;
+                if !net.is_smooth(facet, other) {
+                    continue;
+                }
+                let bend = net.bend(facet, other) / edge.bend.signum();
+                if (0.3 * step..0.7 * step).contains(&bend) {
+                    edge.tangent += border.length;
+                }
+                let widths = net.area(facet) / net.area(other);
+                let miss = net
+                    .corners(other)
+                    .map(|vertex| found.surface.distance(net.point(vertex)).abs())
+                    .fold(0.0, f64::max);
+                if (0.5 * step..2.0 * step).contains(&bend)
+                    && (0.4..2.5).contains(&widths)
+                    && miss < net.floor + 0.35 * found.sag
+                {
+                    edge.runs_on += border.length;
+                }
+            }
+        }
+        edge
+    }
+
+    /// Whether the surface is what the facets were made from, and how they cut it.
+    pub(super) fn judge(&mut self, found: &Found, exactness: Exactness) -> Option<Cut> {
+        let edge = self.edge(found);
+        let step = edge.square / edge.bend;
+        if !(step > 1e-5 && edge.count > 0.0) {
+            return None;
+        }
+        let mean = edge.length / edge.count;
+        let coarse = step > COARSE;
+        if coarse && !self.is_even(found, &edge) {
+            return None;
+        }
+        let diagonal = self.net.part.diagonal;
+        let (turn, facets, runs_on) = match found.surface.profile {
+            Profile::Line { slope, .. } => {
+                // The normals of a cone turn by less than the facets.
+                let about = 2.0 * ((step / 2.0).sin() / slope.cos()).min(1.0).asin();
+                let turn = turn(found, about);
+                (turn, TAU / about, edge.runs_on > 0.5 * mean)
+            }
+            Profile::Circle { .. } => (0.0, TAU / step, edge.runs_on > 0.3 * edge.outer),
+        };
+        let chord = |radius: f64| radius * (1.0 - (step / 2.0).cos());
+        let is_sound = match found.kind {
+            Kind::Cylinder | Kind::Cone | Kind::Revolution => {
+                let strips = turn * facets / TAU;
+                let short = strips < 4.7 || turn < 2.09;
+                let small = || {
+                    let most = (SMALL * diagonal).powi(2);
+                    found.members.iter().all(|&facet| self.net.area(facet) < most)
+                };
+                strips > 2.7
+                    && turn > LEAST_TURN
+                    && !(short && found.sag > ARC * diagonal)
+                    && (strips > 3.5 || edge.tangent > 0.5 * mean || small())
+                    && !(runs_on && turn < SURE[0])
+            }
+            // Facets as long as a belt of a sphere is wide touch it at their ends only.
+            Kind::Sphere | Kind::Torus
+                if found.sag > DEEP * chord(found.surface.reach()) + self.net.floor =>
+            {
+                false
+            }
+            Kind::Sphere => {
+                let area: f64 = found.members.iter().map(|&facet| self.net.area(facet)).sum();
+                found.members.len() >= if coarse { 16 } else { 8 }
+                    && area > 0.1 * found.surface.radius().powi(2)
+                    && (found.sag < ARC * diagonal || found.members.len() >= 16)
+                    && !runs_on
+            }
+            Kind::Torus => {
+                let [tube, about] = torus_turns(found, step);
+                tube > LEAST_TORUS[0]
+                    && about > LEAST_TORUS[1]
+                    && found.members.len() >= if coarse { 40 } else { 9 }
+                    && found.sag < 2.0 * ARC * diagonal
+                    && !runs_on
+            }
+        };
+        let is_true = match exactness {
+            Exactness::Exact => true,
+            Exactness::Noisy => {
+                (found.kind == Kind::Cylinder && turn > SURE[1])
+                    || found.residual < RESIDUAL * found.surface.radius() * 0.1
+                    || self.is_random(found)
+            }
+        };
+        (is_sound && is_true).then_some(Cut { step, facets, turn })
+    }
+
+    /// Whether coarse facets are alike: a square bar with chamfers also has its corners on a circle.
+    fn is_even(&self, found: &Found, edge: &Edge) -> bool {
+        let doubly = matches!(found.kind, Kind::Torus | Kind::Sphere);
+        let sags = found.members.iter().filter_map(|&facet| {
+            let net = self.net;
+            net.sag(&found.surface, facet, found.sign, f64::INFINITY, f64::INFINITY)
+        });
+        let (least, most) =
+            sags.fold((f64::INFINITY, 0.0_f64), |(low, high), sag| (low.min(sag), high.max(sag)));
+        doubly
+            || (edge.most < 1.03 * edge.least && most - least < 0.06 * most + 2.0 * self.net.floor)
+    }
+
+    /// Whether distances of the vertices from the surface are noise: neighbours along edges do not
+    /// agree.
+    fn is_random(&self, found: &Found) -> bool {
+        let net = self.net;
+        let (mut products, mut squares) = (0.0, 0.0);
+        for &facet in &found.members {
+            for &triangle in net.triangles(facet) {
+                let [a, b, c] =
+                    net.part.mesh.corners(triangle).map(|point| found.surface.distance(point));
+                products += a * b + b * c + c * a;
+                squares += a * a + b * b + c * c;
+            }
+        }
+        products < 0.5 * squares
+    }
+}
+
+/// The arc that the face covers about its axis \[rad\].
+pub(super) fn turn(found: &Found, step: f64) -> f64 {
+    let (u, v) = found.surface.axis.direction.any_orthonormal_pair();
+    arc(
+        found.points.iter().map(|&point| {
+            let from = point - found.surface.axis.origin;
+            from.dot(v).atan2(from.dot(u))
+        }),
+        step,
+    )
+}
+
+/// The arcs that a torus covers about its tube and about its axis \[rad\].
+fn torus_turns(found: &Found, step: f64) -> [f64; 2] {
+    let Profile::Circle { major, .. } = found.surface.profile else { return [0.0; 2] };
+    let axis = found.surface.axis;
+    let tube =
+        found.points.iter().map(|&point| axis.along(point).atan2(axis.distance(point) - major));
+    [arc(tube, step), turn(found, step)]
+}
+
+/// The arc that angles cover: a turn less the widest gap, when that is wider than a facet.
+fn arc(angles: impl Iterator<Item = f64>, step: f64) -> f64 {
+    let mut angles: Vec<f64> = angles.collect();
+    angles.sort_unstable_by(f64::total_cmp);
+    let (Some(first), Some(last)) = (angles.first(), angles.last()) else { return 0.0 };
+    let around = first + TAU - last;
+    let gap = angles.windows(2).map(|pair| pair[1] - pair[0]).fold(around, f64::max);
+    if gap < 1.75 * step { TAU } else { TAU - gap }
+}

@@ -1,0 +1,140 @@
+//! The planar regions of a mesh as facets of curved surfaces.
+
+use glam::DVec3;
+
+use super::fit::Surface;
+use crate::part::borders::Borders;
+use crate::part::regions::Regions;
+use crate::part::repair::Repaired;
+use crate::part::topology::NONE;
+
+/// Cosine of the greatest angle between neighbouring facets of one surface: 47.5 degrees, so that
+/// an octagon (45) may be a round bar, and a hexagon may not.
+const SMOOTH: f64 = 0.675_590_207_615_660_2;
+/// Cosine of the angle between the mean normal of a facet and the surface's at its middle that is
+/// too great: 37 degrees.
+const ASKEW: f64 = 0.8;
+
+/// Regions, their borders, and the vertices where three of them meet: only those surely lie on a
+/// curved surface, as facets may have been subdivided.
+pub(super) struct Net<'a> {
+    pub part: &'a Repaired,
+    pub regions: &'a Regions,
+    pub borders: &'a Borders,
+    is_corner: Vec<bool>,
+    /// Uncertainty of a vertex \[m\].
+    pub floor: f64,
+}
+
+impl<'a> Net<'a> {
+    pub(super) fn new(
+        part: &'a Repaired,
+        regions: &'a Regions,
+        borders: &'a Borders,
+        floor: f64,
+    ) -> Self {
+        let vertices = part.mesh.vertices.len();
+        // Two regions seen at a vertex; one that is open counts as one more.
+        let mut seen = vec![[NONE; 2]; vertices];
+        let mut is_corner = vec![false; vertices];
+        for (triangle, corners) in part.mesh.triangles.iter().enumerate() {
+            let region = regions.of[triangle];
+            for (k, &vertex) in corners.iter().enumerate() {
+                let vertex = vertex as usize;
+                let [first, second] = &mut seen[vertex];
+                if *first == NONE {
+                    *first = region;
+                } else if *first != region && *second == NONE {
+                    *second = region;
+                } else if *first != region && *second != region {
+                    is_corner[vertex] = true;
+                }
+                let before = (k + 2) % 3;
+                let open =
+                    [k, before].iter().any(|side| part.edges.twin[triangle * 3 + side] == NONE);
+                is_corner[vertex] |= open;
+            }
+        }
+        Self { part, regions, borders, is_corner, floor }
+    }
+
+    pub(super) fn normal(&self, facet: u32) -> DVec3 {
+        self.regions.all[facet as usize].plane.normal
+    }
+
+    pub(super) fn centre(&self, facet: u32) -> DVec3 {
+        self.regions.all[facet as usize].centre
+    }
+
+    pub(super) fn area(&self, facet: u32) -> f64 {
+        self.regions.all[facet as usize].area
+    }
+
+    pub(super) fn triangles(&self, facet: u32) -> &[u32] {
+        self.regions.triangles(facet as usize)
+    }
+
+    /// Whether two neighbours may be facets of one surface, by the angle between them.
+    pub(super) fn is_smooth(&self, a: u32, b: u32) -> bool {
+        self.normal(a).dot(self.normal(b)) >= SMOOTH
+    }
+
+    /// Angle between two neighbours \[rad\], positive where the edge is convex.
+    pub(super) fn bend(&self, a: u32, b: u32) -> f64 {
+        let (one, other) = (self.normal(a), self.normal(b));
+        let between = self.centre(b) - self.centre(a);
+        let angle = one.cross(other).length().atan2(one.dot(other));
+        if (other - one).dot(between) >= 0.0 { angle } else { -angle }
+    }
+
+    /// The vertices of a facet that lie on the surface, some more than once.
+    pub(super) fn corners(&self, facet: u32) -> impl Iterator<Item = u32> + '_ {
+        let triangles = self.triangles(facet).iter();
+        triangles
+            .flat_map(|&triangle| self.part.mesh.triangles[triangle as usize])
+            .filter(|&vertex| self.is_corner[vertex as usize])
+    }
+
+    pub(super) fn point(&self, vertex: u32) -> DVec3 {
+        self.part.mesh.vertices[vertex as usize]
+    }
+
+    /// How far the facet lies inside the chords' surface at most \[m\] (its sag), when its corners lie
+    /// within `tolerance` of `surface` and its normal agrees with `sign` times the surface's; `None`
+    /// otherwise, and when the sag exceeds `limit`.
+    pub(super) fn sag(
+        &self,
+        surface: &Surface,
+        facet: u32,
+        sign: f64,
+        tolerance: f64,
+        limit: f64,
+    ) -> Option<f64> {
+        let mut sag = 0.0_f64;
+        for (index, &triangle) in self.triangles(facet).iter().enumerate() {
+            let vertices = self.part.mesh.triangles[triangle as usize];
+            let points = vertices.map(|vertex| self.point(vertex));
+            for (&vertex, &point) in vertices.iter().zip(&points) {
+                let distance = surface.distance(point).abs();
+                if self.is_corner[vertex as usize] && distance > tolerance {
+                    return None;
+                }
+                sag = sag.max(distance);
+            }
+            let [a, b, c] = points;
+            if index == 0 {
+                let (_, normal) = surface.distance_and_normal((a + b + c) / 3.0);
+                if sign * normal.dot(self.normal(facet)) < ASKEW {
+                    return None;
+                }
+            }
+            for middle in [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0] {
+                sag = sag.max(surface.distance(middle).abs());
+            }
+            if sag > limit {
+                return None;
+            }
+        }
+        Some(sag)
+    }
+}
