@@ -60,10 +60,13 @@ pub(super) fn faces(part: &mut Repaired) -> (Vec<PlanarFace>, Vec<CurvedFace>) {
     }
     let floor =
         if is_rough { rough.distance } else { (FLOOR * part.diagonal).max(4.0 * part.noise) };
-    let Curves { faces: mut curved, is_curved } =
+    let Curves { faces: mut curved, is_curved, flats } =
         curves::curved_faces(part, &regions, &facets.borders, floor);
     for (is_facet, is_curved) in facets.is_facet.iter_mut().zip(is_curved) {
         *is_facet |= is_curved;
+    }
+    for flat in flats {
+        facets.is_facet[flat as usize] = false;
     }
     let planar = outline(part, &regions, &facets);
     for (face, id) in curved.iter_mut().zip(planar.len() as u32..) {

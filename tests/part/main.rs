@@ -2,8 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod curved;
 mod formats;
 mod hostile;
+mod solids;
 #[cfg(feature = "step")]
 mod step;
 #[path = "../support/mod.rs"]

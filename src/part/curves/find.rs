@@ -27,6 +27,12 @@ const NOISY_RATIO: f64 = 10.0;
 const NOISY_PATCH: usize = 120;
 /// Groups and patches tried at most.
 const NOISY_TRIES: usize = 60;
+/// How much larger than a strip a flat may be that a look at its neighbours alone takes for one,
+/// and how much larger it is at least.
+const STRIPS_ALIKE: f64 = 4.0;
+const WIDER: f64 = 1.6;
+/// Facets of a ball that is no die.
+const MANY_FACETS: usize = 60;
 /// Facets whose coordinates are looked at for rounding.
 const SAMPLE: usize = 300;
 /// Distance of vertices from a cylinder as a share of its radius up to which it is no cone.
@@ -42,11 +48,13 @@ pub(super) struct Face {
     pub cut: Cut,
 }
 
-/// Curved faces by falling area, not numbered yet, and which regions are no planes because of
-/// them.
+/// Curved faces by falling area, not numbered yet, and what follows from them for the planes.
 pub(in crate::part) struct Curves {
     pub faces: Vec<CurvedFace>,
+    /// Whether each region belongs to a curved face and is no plane.
     pub is_curved: Vec<bool>,
+    /// Regions that are planes, whatever their neighbours: flats beside the strips of a cylinder.
+    pub flats: Vec<u32>,
 }
 
 /// All curved faces of the part. `floor`: uncertainty of its vertices \[m\].
@@ -67,20 +75,19 @@ pub(in crate::part) fn curved_faces(
     };
     let seeds: Vec<u32> = (0..regions.all.len() as u32).filter(|&facet| is_bent(facet)).collect();
     if seeds.is_empty() {
-        return Curves { faces: Vec::new(), is_curved };
+        return Curves { faces: Vec::new(), is_curved, flats: Vec::new() };
     }
     let floor = floor.max(quantum(part, regions, &seeds));
     let net = Net::new(part, regions, borders, floor);
     let mut growth = Growth::new(&net);
     let mut faces: Vec<Face> = Vec::new();
     growth.exact(&seeds, &mut faces);
+    growth.join_rows(&mut faces);
     growth.noisy(&seeds, &mut faces);
     growth.join_same(&mut faces);
-    growth.join_rows(&mut faces);
-    faces.retain(|face| !face.found.members.is_empty());
     let least = (LEAST * part.diagonal).powi(2);
     let mut described = Vec::new();
-    for face in &faces {
+    for face in faces.iter().filter(|face| !face.found.members.is_empty()) {
         if let Some(curved) = describe(part, regions, face).filter(|curved| curved.area > least) {
             if takes_planes(face, part.diagonal) {
                 for &facet in &face.found.members {
@@ -97,7 +104,8 @@ pub(in crate::part) fn curved_faces(
         [face.centroid.x, face.centroid.y, face.centroid.z].map(|x| (x / step).round() as i64)
     };
     described.sort_by_cached_key(|face| (std::cmp::Reverse(key(face)), place(face)));
-    Curves { faces: described, is_curved }
+    let flats = seeds.iter().copied().filter(|&seed| growth.is_flat(seed, &faces)).collect();
+    Curves { faces: described, is_curved, flats }
 }
 
 /// The step to which the file rounds coordinates of curved surfaces \[m\], decimal or binary, where
@@ -133,7 +141,9 @@ fn takes_planes(face: &Face, diagonal: f64) -> bool {
     let strips = face.cut.turn * face.cut.facets / std::f64::consts::TAU;
     match face.found.kind {
         Kind::Torus => true,
-        Kind::Sphere | Kind::Revolution => face.cut.step <= COARSE,
+        Kind::Sphere | Kind::Revolution => {
+            face.cut.step <= COARSE || face.found.members.len() >= MANY_FACETS
+        }
         Kind::Cylinder | Kind::Cone => {
             face.cut.step <= COARSE && strips > STRIPS - 0.3 && face.found.sag < ARC * diagonal
         }
@@ -141,6 +151,25 @@ fn takes_planes(face: &Face, diagonal: f64) -> bool {
 }
 
 impl Growth<'_> {
+    /// Whether a region lies between strips of cylinders, on none of them and wider than they are.
+    fn is_flat(&self, region: u32, faces: &[Face]) -> bool {
+        let net = self.net;
+        let mut wider = None;
+        for border in net.borders.of(region as usize) {
+            let other = border.other;
+            let comparable = net.area(region) <= STRIPS_ALIKE * net.area(other);
+            if !comparable || net.normal(region).dot(net.normal(other)) < COARSE.cos() {
+                continue;
+            }
+            let owner = self.owner[other as usize];
+            let is_line = owner != FREE
+                && matches!(faces[owner as usize].found.kind, Kind::Cylinder | Kind::Cone);
+            let is_wider = is_line && net.area(region) > WIDER * net.area(other);
+            wider = Some(wider.unwrap_or(true) && is_wider);
+        }
+        self.owner[region as usize] == FREE && wider == Some(true)
+    }
+
     /// Adds a surface; what it takes over is taken from the others.
     pub(super) fn take(&mut self, faces: &mut Vec<Face>, found: Found, cut: Cut) {
         let mut losers: Vec<u32> =
@@ -181,7 +210,7 @@ impl Growth<'_> {
             let found = match (sphere, row) {
                 // The two circles at the ends of a cylinder lie on a sphere, too.
                 (Some(sphere), Some(row)) => {
-                    let is_all = self.area_of(&row.0) > 0.95 * self.area_of(&sphere.0);
+                    let is_all = row.0.members.len() + 2 >= sphere.0.members.len();
                     Some(if is_all { row } else { sphere })
                 }
                 (Some(found), None) | (None, Some(found)) => Some(found),

@@ -11,11 +11,13 @@ pub(super) const RESIDUAL: f64 = 1e-3;
 /// curvature leaves the best circle by more.
 const EXACT: f64 = 0.05;
 /// ... for a torus, which comes near to many a surface.
-const EXACT_TORUS: f64 = 0.01;
+const EXACT_TORUS: f64 = 0.002;
 /// Distance of a point from its surface as a multiple of the median from which on it lies off.
 const USUAL: f64 = 8.0;
 /// How much more sag a facet may have than those at which the growth began: 1.6 times wider.
-const SAG_RATIO: f64 = 2.56;
+pub(super) const SAG_RATIO: f64 = 2.56;
+/// ... on a torus, whose facets are wider outside than inside.
+const SAG_RATIO_TORUS: f64 = 5.0;
 /// No surface.
 pub(super) const FREE: u32 = u32::MAX;
 
@@ -31,7 +33,7 @@ pub(super) struct Found {
     pub points: Vec<DVec3>,
     /// Greatest distance of those \[m\].
     pub residual: f64,
-    /// Mean sag of the facets at which the growth began \[m\].
+    /// Typical sag of the facets at which the growth began \[m\].
     pub sag: f64,
     /// One row of facets about an axis.
     pub is_row: bool,
@@ -108,7 +110,7 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// The sag of `facets` on `surface` (mean by area) when all lie on it.
+    /// The typical sag of `facets` on `surface` (exceeded by a fifth) when all lie on it.
     pub(super) fn fits(
         &self,
         surface: &Surface,
@@ -116,14 +118,14 @@ impl<'a> Growth<'a> {
         sign: f64,
         exactness: Exactness,
     ) -> Option<f64> {
-        let (mut sum, mut area) = (0.0, 0.0);
         let loose = self.net.floor + RESIDUAL * surface.radius();
+        let mut sags = Vec::with_capacity(facets.len());
         for &facet in facets {
-            let sag = self.net.sag(surface, facet, sign, loose, f64::INFINITY)?;
-            sum += sag * self.net.area(facet);
-            area += self.net.area(facet);
+            sags.push(self.net.sag(surface, facet, sign, loose, f64::INFINITY)?);
         }
-        let sag = sum / area;
+        sags.sort_unstable_by(f64::total_cmp);
+        // Not the greatest: a flat beside the strips of a shaft may be among them.
+        let sag = sags[sags.len() * 4 / 5];
         let tolerance = self.tolerance(surface, sag, exactness);
         facets
             .iter()
@@ -163,7 +165,7 @@ impl<'a> Growth<'a> {
         self.tolerance(&found.surface, found.sag, Exactness::Exact).max(found.residual)
     }
 
-    /// Grows `surface` from the facets `start`, which lie on it with this mean sag.
+    /// Grows `surface` from the facets `start`, which lie on it.
     pub(super) fn grow(
         &mut self,
         mut surface: Surface,
@@ -174,12 +176,15 @@ impl<'a> Growth<'a> {
     ) -> Option<Found> {
         let sag = self.fits(&surface, start, sign, exactness)?;
         let tolerance = self.tolerance(&surface, sag, exactness);
-        let limit = SAG_RATIO * sag + 2.0 * tolerance;
+        let ratio = if kind == Kind::Torus { SAG_RATIO_TORUS } else { SAG_RATIO };
+        let limit = ratio * sag + 2.0 * tolerance;
         self.stamp += 1;
         let stamp = self.stamp;
         let mut members = start.to_vec();
+        members
+            .retain(|&facet| self.net.sag(&surface, facet, sign, f64::INFINITY, limit).is_some());
         let mut points = Vec::new();
-        for &facet in start {
+        for &facet in &members {
             self.member[facet as usize] = stamp;
             self.add_points(facet, &mut points);
         }

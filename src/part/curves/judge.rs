@@ -3,8 +3,11 @@
 use std::f64::consts::TAU;
 
 use super::fit::{Kind, Profile};
-use super::grow::{Exactness, Found, Growth, RESIDUAL};
+use super::grow::{Exactness, Found, Growth};
+use crate::part::topology::{NONE, ends};
 
+/// Facets to the turn of a cylinder or cone, at least.
+const FEWEST: f64 = 7.5;
 /// Angle between facets above which they may as well be flats \[rad\]: 25.5 degrees, 14 to the turn.
 pub(super) const COARSE: f64 = 0.445;
 /// Turn below which a face shows too little of its curvature \[rad\]: 26 degrees.
@@ -14,6 +17,10 @@ const LEAST_TORUS: [f64; 2] = [0.3, 0.17];
 /// Turn \[rad\] above which nothing but a circle fits a circle within the tolerances (an involute
 /// or an ellipse leaves it by more): 100 degrees; 60 with noise.
 const SURE: [f64; 2] = [1.75, 1.05];
+/// Residual as a share of the sag below which even a short arc is one.
+const SURELY: f64 = 0.005;
+/// Points that show noise.
+const MANY: usize = 30;
 /// Share of the part's diagonal up to which flats of a bent sheet and facets of an arc look alike:
 /// sag.
 const ARC: f64 = 0.01;
@@ -50,6 +57,8 @@ struct Edge {
     outer: f64,
     runs_on: f64,
     tangent: f64,
+    /// Corners that have members on all sides: a belt has none.
+    inner: usize,
 }
 
 impl Growth<'_> {
@@ -73,6 +82,7 @@ impl Growth<'_> {
                 }
             }
         }
+        edge.inner = self.inner(found);
         let step = edge.square / edge.bend;
         for &facet in &found.members {
             for border in net.borders.of(facet as usize) {
@@ -102,6 +112,22 @@ impl Growth<'_> {
             }
         }
         edge
+    }
+
+    /// Number of corners that have marked facets on all sides.
+    fn inner(&self, found: &Found) -> usize {
+        let net = self.net;
+        let mut rim = rustc_hash::FxHashSet::default();
+        for &triangle in found.members.iter().flat_map(|&facet| net.triangles(facet)) {
+            for half in 3 * triangle..3 * triangle + 3 {
+                let twin = net.part.edges.twin[half as usize];
+                if twin == NONE || !self.is_marked(net.regions.of[(twin / 3) as usize]) {
+                    let (from, to) = ends(&net.part.mesh.triangles, half);
+                    rim.extend([from, to]);
+                }
+            }
+        }
+        found.points.len() - rim.iter().filter(|&&vertex| net.is_corner(vertex)).count()
     }
 
     /// Whether the surface is what the facets were made from, and how they cut it.
@@ -136,10 +162,14 @@ impl Growth<'_> {
                     found.members.iter().all(|&facet| self.net.area(facet) < most)
                 };
                 strips > 2.7
+                    && facets > FEWEST
                     && turn > LEAST_TURN
                     && !(short && found.sag > ARC * diagonal)
                     && (strips > 3.5 || edge.tangent > 0.5 * mean || small())
                     && !(runs_on && turn < SURE[0])
+                    && (turn > SURE[1]
+                        || found.residual < self.net.floor + SURELY * found.sag
+                        || self.is_random(found))
             }
             // Facets as long as a belt of a sphere is wide touch it at their ends only.
             Kind::Sphere | Kind::Torus
@@ -150,13 +180,15 @@ impl Growth<'_> {
             Kind::Sphere => {
                 let area: f64 = found.members.iter().map(|&facet| self.net.area(facet)).sum();
                 found.members.len() >= if coarse { 16 } else { 8 }
+                    && edge.inner >= 2
                     && area > 0.1 * found.surface.radius().powi(2)
                     && (found.sag < ARC * diagonal || found.members.len() >= 16)
                     && !runs_on
             }
             Kind::Torus => {
                 let [tube, about] = torus_turns(found, step);
-                tube > LEAST_TORUS[0]
+                edge.inner >= 4
+                    && tube > LEAST_TORUS[0]
                     && about > LEAST_TORUS[1]
                     && found.members.len() >= if coarse { 40 } else { 9 }
                     && found.sag < 2.0 * ARC * diagonal
@@ -166,9 +198,7 @@ impl Growth<'_> {
         let is_true = match exactness {
             Exactness::Exact => true,
             Exactness::Noisy => {
-                (found.kind == Kind::Cylinder && turn > SURE[1])
-                    || found.residual < RESIDUAL * found.surface.radius() * 0.1
-                    || self.is_random(found)
+                (found.kind == Kind::Cylinder && turn > SURE[1]) || self.is_random(found)
             }
         };
         (is_sound && is_true).then_some(Cut { step, facets, turn })
@@ -200,7 +230,7 @@ impl Growth<'_> {
                 squares += a * a + b * b + c * c;
             }
         }
-        products < 0.5 * squares
+        found.points.len() >= MANY && products < 0.2 * squares
     }
 }
 

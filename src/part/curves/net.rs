@@ -95,6 +95,11 @@ impl<'a> Net<'a> {
             .filter(|&vertex| self.is_corner[vertex as usize])
     }
 
+    /// Whether three regions meet at a vertex.
+    pub(super) fn is_corner(&self, vertex: u32) -> bool {
+        self.is_corner[vertex as usize]
+    }
+
     pub(super) fn point(&self, vertex: u32) -> DVec3 {
         self.part.mesh.vertices[vertex as usize]
     }

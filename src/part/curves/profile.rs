@@ -17,7 +17,9 @@ const PARALLEL: f64 = 0.01;
 /// ... and their distance as a share of the radius.
 const SAME_AXIS: f64 = 1e-3;
 /// Residual of a profile's corners on a circle as a share of the sag of its pieces.
-const EXACT: f64 = 0.05;
+const EXACT: f64 = 0.01;
+/// Turn of a profile \[rad\] above which nothing but a circle fits a circle: 60 degrees.
+const SURE: f64 = 1.05;
 
 /// Places on the profile: along the axis, distance from it \[m\].
 type Place = DVec2;
@@ -325,14 +327,28 @@ fn circles(places: &[Place], floor: f64) -> Vec<(std::ops::Range<usize>, Place, 
             end += 1;
         }
         match best {
-            Some(run) => {
+            Some(run) if !runs_on(places, &run.0) => {
                 start = run.0.end;
                 found.push(run);
             }
-            None => start += 1,
+            _ => start += 1,
         }
     }
     found
+}
+
+/// Whether the profile goes on beyond a short run of pieces much as within: then it is no circle.
+fn runs_on(places: &[Place], run: &std::ops::Range<usize>) -> bool {
+    let bends = run.len() - 1;
+    let turn: f64 = (run.start + 1..run.end).map(|k| bend(places, k)).sum();
+    let length = |k: usize| places[k].distance(places[k + 1]);
+    let alike = |joint: usize, outside: usize, inside: usize| {
+        (0.5..2.0).contains(&(bend(places, joint) * bends as f64 / turn))
+            && (0.4..2.5).contains(&(length(outside) / length(inside)))
+    };
+    let before = run.start > 0 && alike(run.start, run.start - 1, run.start);
+    let after = run.end + 1 < places.len() && alike(run.end, run.end, run.end - 1);
+    turn.abs() < SURE && (before || after)
 }
 
 /// The circle through corners of a profile that bends evenly.

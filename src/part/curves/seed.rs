@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Axis;
 use super::fit::{Kind, Profile, Surface, circle};
-use super::grow::{Exactness, Found, Growth};
+use super::grow::{Exactness, Found, Growth, SAG_RATIO};
 use super::net::Net;
 
 /// Cosine of the angle under which neighbours count as bent: above 0.03 degrees. Regions of one
@@ -177,6 +177,7 @@ impl Growth<'_> {
         let net = self.net;
         let others = neighbours(net, seed, COMPARABLE);
         let centre = net.centre(seed);
+        let mut best: Option<Found> = None;
         for (index, &one) in others.iter().enumerate().take(4) {
             for &other in others.iter().skip(index + 1).take(4) {
                 let (a, b) = (net.centre(one) - centre, net.centre(other) - centre);
@@ -193,21 +194,40 @@ impl Growth<'_> {
                 };
                 let points = self.points(&row);
                 let rise = direction.dot(middle).abs();
-                let mut found = None;
+                let mut guesses = Vec::new();
                 if rise < 0.1 {
-                    let guess = cylinder_along(direction, &points);
-                    found = self.attempt(guess, Kind::Cylinder, &row, &points, Exactness::Exact);
+                    guesses.push((Kind::Cylinder, cylinder_along(direction, &points)));
                 }
-                if found.is_none() && (1e-4..0.998).contains(&rise) {
-                    let guess = cone_along(net, direction, row, &points);
-                    found = self.attempt(guess, Kind::Cone, &row, &points, Exactness::Exact);
+                if (1e-4..0.998).contains(&rise) {
+                    guesses.push((Kind::Cone, cone_along(net, direction, row, &points)));
                 }
-                if found.is_some() {
-                    return found;
+                for (kind, guess) in guesses {
+                    let found = self.attempt(guess, kind, &row, &points, Exactness::Exact);
+                    // Of a row about the axis and one along the tube of a torus the first is
+                    // larger.
+                    if let Some(found) = found
+                        && self.is_even_row(&found, &row)
+                        && best
+                            .as_ref()
+                            .is_none_or(|best| self.area_of(&found) > 1.02 * self.area_of(best))
+                    {
+                        best = Some(found);
+                    }
                 }
             }
         }
-        None
+        best
+    }
+
+    /// Whether the facets of a row are about as wide: a flat beside strips of a shaft is none of them.
+    fn is_even_row(&self, found: &Found, row: &[u32]) -> bool {
+        let sags = row.iter().filter_map(|&facet| {
+            let infinite = f64::INFINITY;
+            self.net.sag(&found.surface, facet, found.sign, infinite, infinite)
+        });
+        let (least, most) =
+            sags.fold((f64::INFINITY, 0.0_f64), |(low, high), sag| (low.min(sag), high.max(sag)));
+        most <= SAG_RATIO * least + 2.0 * self.net.floor
     }
 
     /// Facets about `seed` that may lie on one surface with it, nearest first.
@@ -254,8 +274,13 @@ impl Growth<'_> {
             return None;
         }
         let points = self.points(&patch);
-        self.line_of(&patch, &points, Exactness::Exact)
-            .or_else(|| self.torus_of(&patch, &points, Exactness::Exact))
+        let line = self.line_of(&patch, &points, Exactness::Exact);
+        if line.is_some() {
+            return line;
+        }
+        let patch = self.patch(seed, 4 * PATCH);
+        let points = self.points(&patch);
+        self.torus_of(&patch, &points, Exactness::Exact)
     }
 
     /// A cylinder or cone by the normals of `patch`.
