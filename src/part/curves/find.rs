@@ -6,7 +6,7 @@ use super::fit::{Kind, Profile};
 use super::grow::{Exactness, FREE, Found, Growth};
 use super::judge::{COARSE, Cut, turn};
 use super::net::Net;
-use super::seed::neighbours;
+use super::seed::comparable;
 use super::{Axis, CurvedFace, Shape};
 use crate::geometry::UnionFind;
 use crate::part::borders::Borders;
@@ -18,7 +18,7 @@ use crate::part::repair::Repaired;
 const LEAST: f64 = 5e-4;
 /// Attempts that may fail before only each second facet is tried, then each third, and so on:
 /// freely curved surfaces of a million facets.
-const PATIENCE: usize = 1500;
+const PATIENCE: usize = 300;
 /// Facets that a surface found in spite of noise has at least.
 const MANY: usize = 24;
 /// How much larger than its neighbour a facet of a noisy surface may be.
@@ -248,8 +248,13 @@ impl Growth<'_> {
             is_seed[seed as usize] = true;
         }
         for &seed in seeds.iter().filter(|&&seed| is_seed[seed as usize]) {
-            for other in neighbours(net, seed, NOISY_RATIO) {
-                if is_seed[other as usize] {
+            for border in net.borders.of(seed as usize) {
+                let other = border.other;
+                if other < seed
+                    && is_seed[other as usize]
+                    && net.is_smooth(seed, other)
+                    && comparable(net, seed, other, NOISY_RATIO)
+                {
                     sets.join(seed as usize, other as usize);
                 }
             }

@@ -55,6 +55,8 @@ pub(super) struct Growth<'a> {
     pub owner: Vec<u32>,
     /// Whether each surface found so far may be taken over by one that is curved both ways.
     pub yields: Vec<bool>,
+    /// Patches looked at in vain.
+    pub patches_missed: usize,
     stamp: u32,
     member: Vec<u32>,
     refused: Vec<u32>,
@@ -68,6 +70,7 @@ impl<'a> Growth<'a> {
             net,
             owner: vec![FREE; facets],
             yields: Vec::new(),
+            patches_missed: 0,
             stamp: 0,
             member: vec![0; facets],
             refused: vec![0; facets],

@@ -8,6 +8,9 @@ use crate::part::topology::{NONE, ends};
 
 /// Facets to the turn of a cylinder or cone, at least.
 const FEWEST: f64 = 7.5;
+/// Cosine of the half angle of the flattest cone: 78 degrees. A flatter one is hard to tell from
+/// any dome.
+const FLATTEST: f64 = 0.2;
 /// Angle between facets above which they may as well be flats \[rad\]: 25.5 degrees, 14 to the turn.
 pub(super) const COARSE: f64 = 0.445;
 /// Turn below which a face shows too little of its curvature \[rad\]: 26 degrees.
@@ -152,6 +155,10 @@ impl Growth<'_> {
             }
             Profile::Circle { .. } => (0.0, TAU / step, edge.runs_on > 0.3 * edge.outer),
         };
+        let is_steep = match found.surface.profile {
+            Profile::Line { slope, .. } => slope.cos() > FLATTEST,
+            Profile::Circle { .. } => true,
+        };
         let chord = |radius: f64| radius * (1.0 - (step / 2.0).cos());
         let is_sound = match found.kind {
             Kind::Cylinder | Kind::Cone | Kind::Revolution => {
@@ -163,6 +170,7 @@ impl Growth<'_> {
                 };
                 strips > 2.7
                     && facets > FEWEST
+                    && is_steep
                     && turn > LEAST_TURN
                     && !(short && found.sag > ARC * diagonal)
                     && (strips > 3.5 || edge.tangent > 0.5 * mean || small())

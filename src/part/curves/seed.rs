@@ -17,6 +17,10 @@ const COMPARABLE: f64 = 4.0;
 const PATCH_RATIO: f64 = 10.0;
 /// Facets of a patch.
 const PATCH: usize = 12;
+/// Distance of corners from a first guess as a multiple of the facets' sag that a fit can mend.
+const POOR: f64 = 2.0;
+/// Patches that may be looked at in vain: their fits are the dearest.
+const PATCH_PATIENCE: usize = 500;
 /// Points that a fit needs beyond its parameters, to be a test.
 const SPARE: usize = 2;
 /// ... and as many again for a torus, which comes near to many a surface.
@@ -26,13 +30,13 @@ fn bent(net: &Net<'_>, a: u32, b: u32) -> bool {
     net.normal(a).dot(net.normal(b)) < BENT && net.is_smooth(a, b)
 }
 
-fn comparable(net: &Net<'_>, a: u32, b: u32, ratio: f64) -> bool {
+pub(super) fn comparable(net: &Net<'_>, a: u32, b: u32, ratio: f64) -> bool {
     let (a, b) = (net.area(a), net.area(b));
     a <= ratio * b && b <= ratio * a
 }
 
 /// Bent neighbours of a facet that may lie on one surface with it, longest border first.
-pub(super) fn neighbours(net: &Net<'_>, facet: u32, ratio: f64) -> Vec<u32> {
+fn neighbours(net: &Net<'_>, facet: u32, ratio: f64) -> Vec<u32> {
     let mut found: Vec<(f64, u32)> = net
         .borders
         .of(facet as usize)
@@ -145,6 +149,18 @@ fn torus_about(axis: Axis, points: &[DVec3]) -> Option<Surface> {
 }
 
 impl Growth<'_> {
+    /// Greatest distance of the middles of some facets' edges from a surface \[m\].
+    fn rough_sag(&self, surface: &Surface, facets: &[u32]) -> f64 {
+        let triangles = facets.iter().take(3).map(|&facet| self.net.triangles(facet)[0]);
+        triangles
+            .flat_map(|triangle| {
+                let [a, b, c] = self.net.part.mesh.corners(triangle);
+                [a + b, b + c, c + a]
+            })
+            .map(|sum| surface.distance(sum / 2.0).abs())
+            .fold(0.0, f64::max)
+    }
+
     /// Fits and grows from `facets`, where the points are enough to test a fit and the first guess
     /// is within reach of the answer.
     fn attempt(
@@ -163,8 +179,13 @@ impl Growth<'_> {
         {
             return None;
         }
-        // A poor guess by far: a tenth of the radius.
-        if guess.residual(points) > 0.1 * guess.radius() {
+        // Out of reach: exact facets come near at once, whereas most facets of a freely curved
+        // surface end here.
+        let reach = match exactness {
+            Exactness::Exact => POOR * self.rough_sag(&guess, facets) + 4.0 * self.net.floor,
+            Exactness::Noisy => f64::INFINITY,
+        };
+        if guess.residual(points) > reach.min(0.1 * guess.radius()) {
             return None;
         }
         let surface = guess.fitted(kind, points)?;
@@ -270,7 +291,7 @@ impl Growth<'_> {
     /// A cylinder, cone or torus by the facets about `seed`, for meshes without rows.
     pub(super) fn by_patch(&mut self, seed: u32) -> Option<Found> {
         let patch = self.patch(seed, 2 * PATCH);
-        if patch.len() < PATCH {
+        if patch.len() < PATCH || self.patches_missed > PATCH_PATIENCE {
             return None;
         }
         let points = self.points(&patch);
@@ -280,7 +301,11 @@ impl Growth<'_> {
         }
         let patch = self.patch(seed, 4 * PATCH);
         let points = self.points(&patch);
-        self.torus_of(&patch, &points, Exactness::Exact)
+        let torus = self.torus_of(&patch, &points, Exactness::Exact);
+        if torus.is_none() {
+            self.patches_missed += 1;
+        }
+        torus
     }
 
     /// A cylinder or cone by the normals of `patch`.
