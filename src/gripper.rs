@@ -39,8 +39,12 @@ pub struct Gripper {
     /// stated.
     #[serde(default)]
     pub moment: Option<[f64; 3]>,
-    /// Pad outline in `(x1, x2)`, counter-clockwise, convex \[m\]; the same on both jaws.
+    /// Pad outline in `(x1, x2)`, counter-clockwise, convex \[m\]; the same on both jaws but for
+    /// `pad_ii`.
     pub pad: Ring,
+    /// Outline of jaw II's pad, where it has another one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pad_ii: Option<Ring>,
     /// Friction coefficient of the pad material, where stated.
     pub pad_friction: Option<f64>,
     /// Rubber thickness \[m\], where stated.
@@ -54,9 +58,15 @@ pub struct Gripper {
     pub outer_pad: Option<f64>,
     /// Bodies that move with the finger at `x3 > 0`, placed for pads touching at zero width: the
     /// pad face lies at `x3 = 0` and the body at `x3 >= 0`. The other finger's bodies are these
-    /// turned by 180 degrees about `x1`.
+    /// turned by 180 degrees about `x1`, but for `fingers_ii`.
     pub fingers: Vec<Body>,
-    /// How the pads move along the approach while the jaws move.
+    /// Bodies of the finger at `x3 < 0` before that turn, where they are others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fingers_ii: Option<Vec<Body>>,
+    /// Which jaws move against the palm.
+    #[serde(default, skip_serializing_if = "Moving::is_both")]
+    pub moving: Moving,
+    /// How the pads of moving jaws go along the approach while they move.
     #[serde(default)]
     pub travel: Travel,
     /// Bodies fixed to the palm, placed for pads touching at zero width; [`Gripper::palm_at`]
@@ -162,8 +172,27 @@ impl Body {
     }
 }
 
+/// Which jaws of a gripper move; another one is fixed to the palm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+pub enum Moving {
+    /// Both, by the same way.
+    #[default]
+    #[serde(rename = "both")]
+    Both,
+    /// The one at `x3 > 0` alone.
+    I,
+    /// The one at `x3 < 0` alone.
+    II,
+}
+
+impl Moving {
+    fn is_both(&self) -> bool {
+        *self == Self::Both
+    }
+}
+
 /// One of the two jaws of a gripper.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Jaw {
     /// The one at `x3 > 0`.
     I,
@@ -234,16 +263,93 @@ impl Jaws {
 }
 
 impl Gripper {
-    /// The bodies of a finger, with the pads `width` apart \[m\].
-    pub fn finger(&self, jaw: Jaw, width: f64) -> Vec<Body> {
-        let map = jaw.at(width / 2.0);
-        self.fingers.iter().map(|body| body.moved(&map)).collect()
+    /// The bodies of a jaw's finger as `fingers` describes them: those of jaw II before their half
+    /// turn.
+    pub fn bodies(&self, jaw: Jaw) -> &[Body] {
+        match (jaw, &self.fingers_ii) {
+            (Jaw::II, Some(bodies)) => bodies,
+            _ => &self.fingers,
+        }
+    }
+
+    /// The bodies of a finger, with the pads `gap` apart \[m\].
+    pub fn finger(&self, jaw: Jaw, gap: f64) -> Vec<Body> {
+        let map = self.jaw_at(jaw, gap, 0.0);
+        self.bodies(jaw).iter().map(|body| body.moved(&map)).collect()
+    }
+
+    /// Outlines of the pads of jaw I and II in the `(x1, x2)` of a grip with the pads `gap` apart
+    /// \[m\]. A jaw that runs along an arc alone shifts its pad against the other one.
+    pub fn pads(&self, gap: f64) -> [Ring; 2] {
+        Jaw::BOTH.map(|jaw| {
+            let shift = self.jaw_at(jaw, gap, 0.0).origin.x;
+            let pad = match (jaw, &self.pad_ii) {
+                (Jaw::II, Some(pad)) => pad,
+                _ => &self.pad,
+            };
+            if shift == 0.0 {
+                pad.clone()
+            } else {
+                pad.iter().map(|&point| point + DVec2::X * shift).collect()
+            }
+        })
+    }
+
+    /// Sizes of the pads of jaw I and II along `x1` and `x2` \[m\].
+    pub fn pad_sizes(&self) -> [DVec2; 2] {
+        [&self.pad, self.pad_ii.as_ref().unwrap_or(&self.pad)]
+            .map(|pad| crate::geometry::Bounds2::of(pad).size())
+    }
+
+    /// How far the pads reach from the grip axis at most \[m\].
+    pub fn pad_reach(&self) -> f64 {
+        let pads = self.stroke.map(|gap| self.pads(gap));
+        pads.iter().flatten().flatten().map(|point| point.length()).fold(0.0, f64::max)
+    }
+
+    /// Whether a jaw moves against the palm.
+    pub fn moves(&self, jaw: Jaw) -> bool {
+        matches!(
+            (self.moving, jaw),
+            (Moving::Both, _) | (Moving::I, Jaw::I) | (Moving::II, Jaw::II)
+        )
+    }
+
+    /// The way of a jaw \[m\] where the pads go apart by twice `opening`: a jaw that moves alone
+    /// goes all of it.
+    pub fn way(&self, jaw: Jaw, opening: f64) -> f64 {
+        match (self.moving, self.moves(jaw)) {
+            (Moving::Both, _) => opening,
+            (_, true) => 2.0 * opening,
+            (_, false) => 0.0,
+        }
+    }
+
+    /// Distance of the pads when a moving jaw has `out` to go to a grip with the pads `gap` apart.
+    fn gap_before(&self, gap: f64, out: f64) -> f64 {
+        if self.moving.is_both() { 2.0 * (gap / 2.0 + out) } else { gap + out }
+    }
+
+    /// Advance of a jaw's pad with the pads `gap` apart \[m\].
+    fn advance(&self, jaw: Jaw, gap: f64) -> f64 {
+        if self.moves(jaw) { self.travel.advance(gap) } else { 0.0 }
+    }
+
+    /// Where the middle between the pads lies along the approach with the pads `gap` apart \[m\].
+    fn middle(&self, gap: f64) -> f64 {
+        f64::midpoint(self.advance(Jaw::I, gap), self.advance(Jaw::II, gap))
     }
 
     /// Where the palm, and what is fixed to it, stands in the grip frame with the pads `gap` apart
     /// \[m\], seen from where the gripper file places it.
     pub fn palm_place(&self, gap: f64) -> Frame {
-        Frame { rotation: DMat3::IDENTITY, origin: DVec3::NEG_X * self.travel.advance(gap) }
+        let aside = match self.moving {
+            Moving::Both => 0.0,
+            Moving::I => -gap / 2.0,
+            Moving::II => gap / 2.0,
+        };
+        let origin = DVec3::new(-self.middle(gap), 0.0, aside);
+        Frame { rotation: DMat3::IDENTITY, origin }
     }
 
     /// The bodies of the palm in the grip frame with the pads `gap` apart \[m\].
@@ -252,18 +358,29 @@ impl Gripper {
         self.palm.iter().map(|body| body.moved(&place)).collect()
     }
 
-    /// A jaw's frame in the frame of a grip with the pads `gap` apart \[m\], with its own pad at
-    /// `offset` from the middle plane \[m\]: before it has closed, say.
-    pub fn jaw_at(&self, jaw: Jaw, gap: f64, offset: f64) -> Frame {
-        let mut place = jaw.at(offset);
-        place.origin.x = self.travel.advance(2.0 * offset) - self.travel.advance(gap);
+    /// A jaw's frame in the frame of a grip with the pads `gap` apart \[m\], its own pad standing
+    /// `out` \[m\] further out than in the grip (before it has closed, say).
+    pub fn jaw_at(&self, jaw: Jaw, gap: f64, out: f64) -> Frame {
+        let mut place = jaw.at(gap / 2.0 + out);
+        place.origin.x = self.advance(jaw, self.gap_before(gap, out)) - self.middle(gap);
         place
     }
 
     /// Share of the pad that touches, on the face where it is less.
     pub fn pad_share(&self, contact: &Contact) -> f64 {
-        let area = patch_area(&contact.face_i).min(patch_area(&contact.face_ii));
-        area / ring_area(&self.pad)
+        let other = self.pad_ii.as_ref().unwrap_or(&self.pad);
+        let one = patch_area(&contact.face_i) / ring_area(&self.pad);
+        one.min(patch_area(&contact.face_ii) / ring_area(other))
+    }
+
+    /// How far a jaw leaves the straight way between two places `out` of a grip with the pads `gap`
+    /// apart, along the approach, at most \[m\].
+    pub fn bulge(&self, jaw: Jaw, gap: f64, [from, to]: [f64; 2]) -> f64 {
+        if self.moves(jaw) {
+            self.travel.bulge(self.gap_before(gap, from), self.gap_before(gap, to))
+        } else {
+            0.0
+        }
     }
 
     /// Distance of the pads in a grip \[m\]: the faces' own, or less by the fingers where these
@@ -284,9 +401,12 @@ impl Gripper {
     }
 
     /// Whether exchanging the jaws (half a turn about the approach axis) changes nothing but the
-    /// names: the pad is mirror-symmetric in `x2`, and the half turn maps the set of palm bodies to
-    /// itself.
+    /// names: the jaws are alike and both move, the pad is mirror-symmetric in `x2`, and the half
+    /// turn maps the set of palm bodies to itself.
     pub fn is_symmetric(&self) -> bool {
+        if !self.moving.is_both() || self.pad_ii.is_some() || self.fingers_ii.is_some() {
+            return false;
+        }
         let close = 1e-9;
         let mirrored = |point: &DVec2| {
             self.pad.iter().any(|other| other.distance(DVec2::new(point.x, -point.y)) < close)

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::clash::{Course, MeshObstacle, Nearby, Room, Volumes};
 use crate::error::{Error, Result};
-use crate::gripper::Gripper;
+use crate::gripper::{Gripper, Jaw};
 use crate::model::{Frame, Grip};
 use crate::results::{GripSet, Verdict};
 
@@ -317,8 +317,11 @@ impl<'a> Picker<'a> {
             }
             Reason::Stroke(gap) => format!("outside the stroke: pads {:.2} mm apart", gap * 1e3),
             Reason::Collision { obstacle, phase, jaw, body } => {
-                let bodies =
-                    if jaw.is_empty() { &self.gripper.palm } else { &self.gripper.fingers };
+                let bodies = match jaw {
+                    "I" => self.gripper.bodies(Jaw::I),
+                    "II" => self.gripper.bodies(Jaw::II),
+                    _ => &self.gripper.palm,
+                };
                 let body = bodies.get(body).map_or("gripper", |body| body.name.as_str());
                 let jaw = if jaw.is_empty() { String::new() } else { format!(" of jaw {jaw}") };
                 let phase = match phase {

@@ -8,7 +8,9 @@ use clap::{Args as ClapArgs, Subcommand};
 use comfy_table::{Table, presets};
 use gripfast::file;
 use gripfast::geometry::Bounds2;
-use gripfast::gripper::{self, Body, Gripper, Shape, catalogue, check, drawing};
+use gripfast::gripper::{
+    self, Body, Gripper, Jaw, Moving, Shape, Travel, catalogue, check, drawing,
+};
 use gripfast::text::shown;
 
 use crate::terminal;
@@ -120,10 +122,15 @@ fn describe(gripper: &Gripper) -> String {
     if let Some(moment) = gripper.moment {
         row("moment".into(), format!("{} Nm (x1, x2, x3)", moment.map(short_number).join(", ")));
     }
-    let pad = Bounds2::of(&gripper.pad).size() * 1e3;
+    let [pad, other] = gripper.pad_sizes().map(|size| {
+        format!("{} x {} mm (x1, x2)", short_number(size.x * 1e3), short_number(size.y * 1e3))
+    });
     row(
         "pad.size".into(),
-        format!("{} x {} mm (x1, x2)", short_number(pad.x), short_number(pad.y)),
+        match gripper.pad_ii {
+            None => pad,
+            Some(_) => format!("jaw I: {pad}; jaw II: {other}"),
+        },
     );
     if let Some(value) = gripper.pad_thickness {
         row("pad.thickness".into(), format!("{} mm", short_number(value * 1e3)));
@@ -135,10 +142,20 @@ fn describe(gripper: &Gripper) -> String {
         "pad.friction".into(),
         gripper.pad_friction.map_or("not stated".into(), |value| value.to_string()),
     );
-    for (table, bodies) in [("finger", &gripper.fingers), ("palm", &gripper.palm)] {
-        for body in bodies {
-            row(format!("{table}.{}", body.name), body_text(body));
+    if gripper.moving != Moving::Both || gripper.travel != Travel::Parallel {
+        row("motion".into(), motion_text(gripper));
+    }
+    let alike = gripper.fingers_ii.is_none();
+    for &jaw in if alike { &Jaw::BOTH[..1] } else { &Jaw::BOTH } {
+        let of = if alike { String::new() } else { format!("jaw {}: ", jaw.name()) };
+        for body in gripper.bodies(jaw) {
+            // As it lies in the file.
+            let lies = if alike { body.clone() } else { body.moved(&jaw.at(0.0)) };
+            row(format!("finger.{}", body.name), format!("{of}{}", body_text(&lies)));
         }
+    }
+    for body in &gripper.palm {
+        row(format!("palm.{}", body.name), body_text(body));
     }
     if let Some(frame) = gripper.grip_from_flange {
         row("flange".into(), place_text(frame.origin.to_array()));
@@ -149,6 +166,29 @@ fn describe(gripper: &Gripper) -> String {
     let warnings: Vec<String> =
         gripper::check(gripper).iter().map(|warning| format!("\nwarning: {warning}")).collect();
     format!("{}\n{table}{throat}{}", shown(&gripper.name), warnings.concat())
+}
+
+/// Which jaws move, and how far their pads leave the straight way.
+fn motion_text(gripper: &Gripper) -> String {
+    let moving = match gripper.moving {
+        Moving::Both => "both jaws",
+        Moving::I => "jaw I, jaw II is fixed to the palm",
+        Moving::II => "jaw II, jaw I is fixed to the palm",
+    };
+    let way = match &gripper.travel {
+        Travel::Arc { crank, angle, .. } => format!(
+            ", on a crank of {} mm from {} deg",
+            short_number(crank * 1e3),
+            short_number(angle.to_degrees())
+        ),
+        Travel::Table { rows } => format!(", by a table of {} rows", rows.len()),
+        _ => return moving.to_owned(),
+    };
+    let advance = gripper.stroke.map(|gap| gripper.travel.advance(gap) * 1e3);
+    format!(
+        "{moving}{way}: the pads lie {} mm nearer to the palm when open",
+        short_number(advance[0] - advance[1])
+    )
 }
 
 /// Where the origin of a frame lies, with its offsets to the side.

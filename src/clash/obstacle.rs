@@ -32,7 +32,8 @@ const RAY: DVec3 =
 pub(crate) struct Course {
     /// Distance of the pads in the grip \[m\].
     pub(crate) gap: f64,
-    /// Way of each jaw from contact to the opening for the approach \[m\], outwards positive.
+    /// Half of the way by which the pads go apart from contact to the opening for the approach
+    /// \[m\], outwards positive.
     pub(crate) opening: f64,
     /// Length of the approach along `x1` \[m\].
     pub(crate) approach: f64,
@@ -72,13 +73,12 @@ impl Volumes {
             list.push(Volume { body, sweep, bounds });
         };
         let back = DVec3::NEG_X * course.approach;
-        let (closed, opened) = (course.gap / 2.0, course.gap / 2.0 + course.opening);
-        let bulge = gripper.travel.bulge(2.0 * closed, 2.0 * opened);
         for jaw in Jaw::BOTH {
-            let [at_grip, away] =
-                [closed, opened].map(|offset| gripper.jaw_at(jaw, course.gap, offset));
+            let outs = [0.0, gripper.way(jaw, course.opening)];
+            let bulge = gripper.bulge(jaw, course.gap, outs);
+            let [at_grip, away] = outs.map(|out| gripper.jaw_at(jaw, course.gap, out));
             let closing = away.origin - at_grip.origin;
-            for (index, body) in gripper.fingers.iter().enumerate() {
+            for (index, body) in gripper.bodies(jaw).iter().enumerate() {
                 let mut finger = |phase, place: &Frame, path, grown| {
                     add(phase, index, body.moved(place), jaw.name(), path, grown);
                 };

@@ -77,27 +77,38 @@ pub(crate) fn sweeps(gripper: &Gripper, motion: &Motion) -> Vec<Sweep> {
         }
     };
     let back = motion.approach * DVec3::NEG_X;
+    let turn = Frame { rotation: motion.jaws.turn(), origin: DVec3::ZERO };
     let (mut grip, mut approach) = (Vec::new(), Vec::new());
-    for jaw in Jaw::BOTH {
-        // Away from the gripped face by the tolerance, so that lying on it is no collision.
-        let [closed, opened] = [motion.touch, way.abs().max(motion.touch)]
-            .map(|way_out| gap / 2.0 + way_out * way.signum());
-        let bulge = gripper.travel.bulge(2.0 * closed, 2.0 * opened);
-        let [closed, opened] = [closed, opened].map(|offset| gripper.jaw_at(jaw, gap, offset));
-        // Named after the face that it grips.
-        let jaw = match motion.kind {
-            PairKind::External => jaw.name(),
-            PairKind::Internal => jaw.other().name(),
+    for side in Jaw::BOTH {
+        let jaw = match motion.jaws {
+            Jaws::Straight => side,
+            Jaws::Exchanged => side.other(),
         };
-        for body in &gripper.fingers {
+        // Away from the gripped face by the tolerance, so that lying on it is no collision.
+        let outs = [motion.touch, gripper.way(jaw, way.abs()).max(motion.touch)]
+            .map(|out| out * way.signum());
+        let bulge = gripper.bulge(jaw, gap, outs);
+        let [closed, opened] = outs.map(|out| turn.compose(&gripper.jaw_at(jaw, gap, out)));
+        // Named after the face that it grips.
+        let face = match motion.kind {
+            PairKind::External => side.name(),
+            PairKind::Internal => side.other().name(),
+        };
+        for body in gripper.bodies(jaw) {
             let path = opened.origin - closed.origin;
-            grip.push(Sweep::new(body.moved(&closed), jaw, Phase::Grip, path, motion, bulge));
-            approach.push(Sweep::new(body.moved(&opened), jaw, Phase::Approach, back, motion, 0.0));
+            grip.push(Sweep::new(body.moved(&closed), face, Phase::Grip, path, motion, bulge));
+            approach.push(Sweep::new(
+                body.moved(&opened),
+                face,
+                Phase::Approach,
+                back,
+                motion,
+                0.0,
+            ));
         }
     }
-    let palm_at = Frame { rotation: motion.jaws.turn(), origin: DVec3::ZERO };
     for body in gripper.palm_at(gap) {
-        let body = body.moved(&palm_at);
+        let body = body.moved(&turn);
         grip.push(Sweep::new(body.clone(), "", Phase::Grip, DVec3::ZERO, motion, 0.0));
         approach.push(Sweep::new(body, "", Phase::Approach, back, motion, 0.0));
     }

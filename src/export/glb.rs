@@ -5,7 +5,7 @@
 
 use std::io::Write;
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use serde_json::{Value, json};
 
 use super::View;
@@ -89,13 +89,23 @@ pub(super) fn write(
         let mesh = scene.mesh("part", &part.vertices, &part.triangles, PART);
         roots.push(scene.node(json!({"name": "part", "mesh": mesh})));
     }
-    let (fingers, palm, pad) = match &view.gripper {
-        None => (Vec::new(), Vec::new(), None),
+    let (fingers, palm, pads) = match &view.gripper {
+        None => ([Vec::new(), Vec::new()], Vec::new(), [None; 2]),
         Some(gripper) => {
-            let (vertices, triangles) = prism(&gripper.pad);
-            let pad =
-                (!triangles.is_empty()).then(|| scene.mesh("pad", &vertices, &triangles, PAD));
-            (draw(&mut scene, &gripper.fingers), draw(&mut scene, &gripper.palm), pad)
+            // In the frames of the jaws, which are half a turn apart.
+            let mut pad = |ring: &Ring| {
+                let (vertices, triangles) = prism(ring);
+                (!triangles.is_empty()).then(|| scene.mesh("pad", &vertices, &triangles, PAD))
+            };
+            let first = pad(&gripper.pad);
+            let pads = [
+                first,
+                gripper.pad_ii.as_ref().map_or(first, |ring| {
+                    pad(&ring.iter().rev().map(|p| DVec2::new(p.x, -p.y)).collect())
+                }),
+            ];
+            let fingers = Jaw::BOTH.map(|jaw| draw(&mut scene, gripper.bodies(jaw)));
+            (fingers, draw(&mut scene, &gripper.palm), pads)
         }
     };
     for (index, grip) in view.grips().iter().enumerate() {
@@ -111,12 +121,19 @@ pub(super) fn write(
             .as_ref()
             .map_or(Frame::IDENTITY, |gripper| gripper.palm_place(view.gap(grip)));
         let mut jaws = place(&mut scene, &palm, "", &palm_place);
-        for (jaw, name) in Jaw::BOTH.into_iter().zip(["jaw_i", "jaw_ii"]) {
-            let mut children = place(&mut scene, &fingers, &format!("{name}/"), &Frame::IDENTITY);
+        for (index, (jaw, name)) in Jaw::BOTH.into_iter().zip(["jaw_i", "jaw_ii"]).enumerate() {
+            let mut children =
+                place(&mut scene, &fingers[index], &format!("{name}/"), &Frame::IDENTITY);
             children.extend(
-                pad.map(|pad| scene.node(json!({"name": format!("{id}/{name}/pad"), "mesh": pad}))),
+                pads[index].map(|pad| {
+                    scene.node(json!({"name": format!("{id}/{name}/pad"), "mesh": pad}))
+                }),
             );
-            let place = jaw.at(view.gap(grip) / 2.0);
+            let gap = view.gap(grip);
+            let place = view
+                .gripper
+                .as_ref()
+                .map_or(jaw.at(gap / 2.0), |gripper| gripper.jaw_at(jaw, gap, 0.0));
             let rotation = DQuat::from_mat3(&place.rotation).to_array();
             let mut jaw = json!({"name": format!("{id}/{name}"), "translation": place.origin, "rotation": rotation});
             if !children.is_empty() {

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Body, Gripper};
+use super::{Body, Gripper, Jaw};
 use crate::geometry::{Bounds2, convex_hull, overlay, patch_area, ring_area};
 use crate::model::{Polygon, Ring};
 
@@ -10,36 +10,54 @@ use crate::model::{Polygon, Ring};
 pub fn check(gripper: &Gripper) -> Vec<String> {
     let mut warnings = Vec::new();
     let mm = |value: f64| format!("{:.2} mm", value * 1e3);
-    if gripper.fingers.is_empty() {
-        warnings.push("no finger body: fingers will not be checked against the part".into());
+    let alike = gripper.fingers_ii.is_none();
+    let jaws = if alike { &Jaw::BOTH[..1] } else { &Jaw::BOTH };
+    // Says whose it is where that makes a difference.
+    let of = |jaw: Jaw| if alike { String::new() } else { format!(" of jaw {}", jaw.name()) };
+    for &jaw in jaws {
+        if gripper.bodies(jaw).is_empty() {
+            let (of, fingers) = (of(jaw), if alike { "fingers" } else { "that finger" });
+            warnings.push(format!(
+                "no finger body{of}: {fingers} will not be checked against the part"
+            ));
+        }
     }
     if gripper.palm.is_empty() {
         warnings.push("no palm body: the palm will not be checked against the part".into());
     }
-    for body in &gripper.fingers {
-        let low = body.bounds()[0].z;
-        if low < -1e-9 {
+    let pads = gripper.pads(0.0).map(|pad| Bounds2::of(&pad));
+    for &jaw in jaws {
+        for body in gripper.bodies(jaw) {
+            let low = -body.bounds()[0].z;
+            let what = if low <= 1e-9 {
+                continue;
+            } else if meets_pad(gripper, jaw, body) {
+                "it would cut into every part"
+            } else if 2.0 * low > gripper.stroke[0] + 1e-9 {
+                "the fingers would meet before the jaws have closed"
+            } else {
+                continue; // beside the pad, and the jaws never come so near
+            };
             warnings.push(format!(
-                "finger body '{}' pokes {} through the pad plane: it would cut into every part",
+                "finger body '{}'{} pokes {} through the pad plane: {what}",
                 body.name,
-                mm(-low)
+                of(jaw),
+                mm(low)
             ));
         }
-    }
-    if !gripper.fingers.is_empty() {
-        let uncovered = uncovered_share(gripper);
-        if uncovered > 1e-6 {
-            warnings.push(format!("the pad is larger than the finger behind it: {:.1} % of it has no body within 1 mm", uncovered * 100.0));
+        let uncovered = uncovered_share(gripper, jaw);
+        if !gripper.bodies(jaw).is_empty() && uncovered > 1e-6 {
+            warnings.push(format!("the pad{} is larger than the finger behind it: {:.1} % of it has no body within 1 mm", of(jaw), uncovered * 100.0));
         }
     }
-    let pad = Bounds2::of(&gripper.pad);
-    if pad.centre().length() > 0.05 * pad.size().length() {
+    if pads.iter().any(|pad| pad.centre().length() > 0.05 * pad.size().length()) {
         warnings.push("the pad is not centred on the origin: positions are those of the grip origin, not of the pad centre".into());
     }
+    let rear = pads[0].min.x.max(pads[1].min.x);
     for body in &gripper.palm {
         let top = body.bounds()[1].x;
-        if top > pad.min.x {
-            warnings.push(format!("palm body '{}' reaches {} past the rear edge of the pads: nothing can be gripped there", body.name, mm(top - pad.min.x)));
+        if top > rear {
+            warnings.push(format!("palm body '{}' reaches {} past the rear edge of the pads: nothing can be gripped there", body.name, mm(top - rear)));
         }
     }
     if gripper.pad_friction.is_none() {
@@ -68,22 +86,43 @@ pub fn check(gripper: &Gripper) -> Vec<String> {
 /// Free length from the foremost palm face to the rear edge of the pads \[m\]; `None` without a palm.
 pub fn throat(gripper: &Gripper) -> Option<f64> {
     let top = gripper.palm.iter().map(|body| body.bounds()[1].x).fold(f64::NEG_INFINITY, f64::max);
-    top.is_finite().then(|| Bounds2::of(&gripper.pad).min.x - top)
+    let rear = |pad: &Ring| Bounds2::of(pad).min.x;
+    let rear = gripper.pads(0.0).iter().map(rear).fold(f64::NEG_INFINITY, f64::max);
+    top.is_finite().then(|| rear - top)
 }
 
-/// Share of the pad area with no finger body behind it that starts within 1 mm of the pad plane.
-fn uncovered_share(gripper: &Gripper) -> f64 {
+/// The pad of a jaw in the grip frame's `(x1, x2)`.
+fn pad_of(gripper: &Gripper, jaw: Jaw) -> &Ring {
+    match (jaw, &gripper.pad_ii) {
+        (Jaw::II, Some(pad)) => pad,
+        _ => &gripper.pad,
+    }
+}
+
+/// Whether a body of a finger lies over a part of its pad.
+fn meets_pad(gripper: &Gripper, jaw: Jaw, body: &Body) -> bool {
+    let outline = outline(&body.moved(&jaw.at(0.0)), DVec3::X, DVec3::Y);
+    let shape = Polygon { outer: outline, holes: Vec::new() };
+    let pad = pad_of(gripper, jaw);
+    patch_area(&overlay::intersect_convex(pad, &[shape])) > 1e-9 * ring_area(pad)
+}
+
+/// Share of a jaw's pad area with no finger body behind it that starts within 1 mm of the pad
+/// plane.
+fn uncovered_share(gripper: &Gripper, jaw: Jaw) -> f64 {
     let behind = |body: &Body| {
         let outline = outline(body, DVec3::X, DVec3::Y);
         Polygon { outer: outline, holes: Vec::new() }
     };
     let cover = gripper
-        .fingers
+        .bodies(jaw)
         .iter()
         .filter(|body| body.bounds()[0].z < 1e-3)
-        .fold(Vec::new(), |cover, body| overlay::union(&cover, &[behind(body)]));
-    let pad = ring_area(&gripper.pad);
-    1.0 - patch_area(&overlay::intersect_convex(&gripper.pad, &cover)) / pad
+        // As they lie: half a turn exchanges the sides of x2.
+        .map(|body| body.moved(&jaw.at(0.0)))
+        .fold(Vec::new(), |cover, body| overlay::union(&cover, &[behind(&body)]));
+    let pad = pad_of(gripper, jaw);
+    1.0 - patch_area(&overlay::intersect_convex(pad, &cover)) / ring_area(pad)
 }
 
 /// Outline of a body seen along `across x up`, as a convex ring in those two coordinates (round

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use glam::{DVec2, DVec3};
 
 use super::check::outline;
-use super::{Body, Gripper, Jaw};
+use super::{Body, Gripper, Jaw, Moving};
 use crate::geometry::Bounds2;
 use crate::model::Ring;
 use crate::svg::{escape, millimetres};
@@ -27,7 +27,8 @@ pub fn svg(gripper: &Gripper) -> String {
         bodies.iter().map(|(class, body)| (*class, outline(body, across, DVec3::X))).collect()
     };
     let (front, side) = (view(DVec3::Z), view(DVec3::Y));
-    let pad = Bounds2::of(&gripper.pad);
+    let pads = gripper.pads(open);
+    let pad = pads.iter().map(Bounds2::of).reduce(Bounds2::union).unwrap_or(Bounds2::of(&[]));
     let bounds = |rings: &[(&str, Ring)], pad_half: f64| {
         let pads =
             Bounds2 { min: DVec2::new(-pad_half, pad.min.x), max: DVec2::new(pad_half, pad.max.x) };
@@ -53,9 +54,14 @@ pub fn svg(gripper: &Gripper) -> String {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.1} {total:.1}\" width=\"{width:.0}\" height=\"{total:.0}\" font-family=\"sans-serif\" font-size=\"12\">\n\
          <style>.palm{{fill:#b9c2cc;stroke:#444}}.finger{{fill:#8fa3b8;stroke:#333;fill-opacity:.8}}.pad{{fill:#d9822b;stroke:#8a4b0f}}.dim{{stroke:#06c;fill:none}}text{{fill:#013;stroke:#fff;stroke-width:4px;paint-order:stroke}}.axis{{stroke:#a00;stroke-dasharray:6 3 1 3}}</style>\n\
          <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"16\" y=\"24\" font-size=\"16\">{}</text>\n\
-         <text x=\"16\" y=\"42\">jaws open to {} mm; dimensions in mm; approach downwards</text>",
+         <text x=\"16\" y=\"42\">jaws open to {} mm{}; dimensions in mm; approach downwards</text>",
         escape(&gripper.name),
         millimetres(open, 2),
+        match gripper.moving {
+            Moving::Both => "",
+            Moving::I => "; the left one (II) is fixed",
+            Moving::II => "; the right one (I) is fixed",
+        },
     );
     for (rings, place) in [(&front, &front_place), (&side, &side_place)] {
         for (class, ring) in rings {
@@ -64,14 +70,17 @@ pub fn svg(gripper: &Gripper) -> String {
     }
     // Pads: thin plates in the front view, their outline in the side view.
     let thick = gripper.pad_thickness.unwrap_or(0.0).max(2.0 / scale);
-    for sign in [1.0, -1.0] {
+    for (sign, ring) in [1.0, -1.0].into_iter().zip(&pads) {
         let (a, b) = (sign * open / 2.0, sign * (open / 2.0 + thick));
+        let pad = Bounds2::of(ring);
         let ring = [(a, pad.min.x), (b, pad.min.x), (b, pad.max.x), (a, pad.max.x)]
             .map(|(x, y)| DVec2::new(x, y));
         drawing.polygon("pad", &ring, &front_place);
     }
-    let pad_ring: Ring = gripper.pad.iter().map(|point| DVec2::new(point.y, point.x)).collect();
-    drawing.polygon("pad", &pad_ring, &side_place);
+    for ring in &pads[..if pads[0] == pads[1] { 1 } else { 2 }] {
+        let ring: Ring = ring.iter().map(|point| DVec2::new(point.y, point.x)).collect();
+        drawing.polygon("pad", &ring, &side_place);
+    }
     for (place, bounds) in [(&front_place, front_bounds), (&side_place, side_bounds)] {
         let (a, b) = (
             place.point(DVec2::new(0.0, bounds.min.y)),

@@ -1,12 +1,16 @@
 //! Reading the gripper file: commented TOML in which every quantity carries its unit.
 
+mod motion;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec2, DVec3};
 use serde::Deserialize;
 
-use super::{Body, Gripper, Shape, Source, Travel, TravelRow, mesh, rectangle};
+use motion::Motion;
+
+use super::{Body, Gripper, Jaw, Moving, Shape, Source, Travel, mesh, rectangle};
 use crate::error::{Error, Result};
 use crate::geometry::{convex_hull, is_convex, polygon, ring_area};
 use crate::model::Frame;
@@ -39,6 +43,9 @@ struct File {
 struct Pad {
     rectangle: Option<[String; 2]>,
     polygon: Option<Vec<[String; 2]>>,
+    /// Of jaw II, where it has another outline.
+    #[serde(rename = "II")]
+    other: Option<Outline>,
     thickness: Option<String>,
     modulus: Option<String>,
     outer_face: Option<String>,
@@ -47,8 +54,17 @@ struct Pad {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+struct Outline {
+    rectangle: Option<[String; 2]>,
+    polygon: Option<Vec<[String; 2]>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Solid {
     name: String,
+    /// Of a finger's body that only one jaw has.
+    jaw: Option<Jaw>,
     r#box: Option<[String; 3]>,
     cylinder: Option<Cylinder>,
     hull: Option<Vec<[String; 3]>>,
@@ -96,23 +112,6 @@ impl Axis {
             Self::X3 => DVec3::Z,
         }
     }
-}
-
-/// How the pads move along the approach.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Motion {
-    arc: Option<Arc>,
-    /// Distance of the pads, advance, and, where known, the joint's value.
-    table: Option<Vec<Vec<String>>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Arc {
-    crank: String,
-    angle: String,
-    joint: Option<[String; 2]>,
 }
 
 #[derive(Deserialize)]
@@ -176,7 +175,7 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
         Error::format(
             format!("{place}{line}"),
             shape(error.message()),
-            "compare with a shipped file: `gripfast gripper show generic`",
+            remedy(error.message()),
         )
     })?;
     let reader = Reader { place, folder };
@@ -185,7 +184,14 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
     }
     let stroke = reader.range("stroke", Quantity::Length, &file.stroke)?;
     let force = reader.range("force", Quantity::Force, &file.force)?;
-    let pad = reader.pad(&file.pad)?;
+    let pad = reader.pad("pad", file.pad.rectangle.as_ref(), file.pad.polygon.as_deref())?;
+    let pad_ii = match &file.pad.other {
+        None => None,
+        Some(Outline { rectangle, polygon }) => {
+            Some(reader.pad("pad.II", rectangle.as_ref(), polygon.as_deref())?)
+        }
+    };
+    let pad_ii = pad_ii.filter(|other| *other != pad);
     let moment = match &file.moment {
         None => None,
         Some([x1, x2, x3]) => {
@@ -207,11 +213,22 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
             "give a coefficient between 0 and 10, without unit",
         ));
     }
-    let fingers = reader.bodies("finger", &file.finger)?;
-    let palm = reader.bodies("palm", &file.palm)?;
-    let travel = match &file.motion {
-        Some(motion) => reader.travel(motion, stroke)?,
-        None => Travel::Parallel,
+    if let Some(solid) = file.palm.iter().find(|solid| solid.jaw.is_some()) {
+        return Err(reader.bad(
+            &format!("palm.{}", solid.name),
+            "names a jaw",
+            "leave it out, or make the body a [[finger]]",
+        ));
+    }
+    let fingers = reader.finger(&file.finger, Jaw::I)?;
+    let fingers_ii = match file.finger.iter().any(|solid| solid.jaw.is_some()) {
+        true => Some(reader.finger(&file.finger, Jaw::II)?).filter(|other| *other != fingers),
+        false => None,
+    };
+    let palm = reader.bodies("palm", file.palm.iter())?;
+    let (moving, travel) = match &file.motion {
+        Some(motion) => reader.motion(motion, stroke)?,
+        None => (Moving::Both, Travel::Parallel),
     };
     let axes = |field: &str, axes: &Option<Axes>| {
         axes.as_ref().map(|axes| reader.frame(field, axes)).transpose()
@@ -234,7 +251,7 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
     ]
     .map(String::from)
     .to_vec();
-    known.extend(fingers.iter().map(|body| format!("finger.{}", body.name)));
+    known.extend(file.finger.iter().map(|solid| format!("finger.{}", solid.name)));
     known.extend(palm.iter().map(|body| format!("palm.{}", body.name)));
     let mut sources = BTreeMap::new();
     for (table, entries, verified) in
@@ -264,17 +281,32 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
         payload,
         moment,
         pad,
+        pad_ii,
         pad_friction: file.pad.friction,
         pad_thickness,
         pad_modulus,
         outer_pad,
         fingers,
+        fingers_ii,
+        moving,
         travel,
         palm,
         grip_from_flange,
         grip_from_tool,
         sources,
     })
+}
+
+/// What to do about a text that is no gripper file.
+fn remedy(problem: &str) -> &'static str {
+    let unknown = |field: &&str| problem.contains(&format!("unknown field `{field}`"));
+    if ["moving", "moves", "fixed", "jaw", "jaws", "pad_ii", "finger_ii"].iter().any(unknown) {
+        "one jaw that is fixed: [motion] with moves = \"I\" (the jaw at x3 > 0 moves alone) or \
+         \"II\"; a body that one jaw has alone: jaw = \"I\" or \"II\" in its [[finger]]; another pad \
+         of jaw II: [pad.II]"
+    } else {
+        "compare with a shipped file: `gripfast gripper show generic`"
+    }
 }
 
 struct Reader<'a> {
@@ -321,46 +353,61 @@ impl Reader<'_> {
         Ok(values)
     }
 
-    fn pad(&self, pad: &Pad) -> Result<Vec<DVec2>> {
+    fn pad(
+        &self,
+        field: &str,
+        rectangle_sizes: Option<&[String; 2]>,
+        corners: Option<&[[String; 2]]>,
+    ) -> Result<Vec<DVec2>> {
         let remedy = "give the pad's outline once: rectangle = [\"along x1\", \"along x2\"] or polygon = [[\"x1\", \"x2\"], ...], convex";
-        match (&pad.rectangle, &pad.polygon) {
+        match (rectangle_sizes, corners) {
             (Some(sizes), None) => {
-                let size = DVec2::from_array(self.vector("pad.rectangle", sizes)?);
+                let field = format!("{field}.rectangle");
+                let size = DVec2::from_array(self.vector(&field, sizes)?);
                 if size.min_element() <= 0.0 {
-                    return Err(self.bad("pad.rectangle", "has no area", remedy));
+                    return Err(self.bad(&field, "has no area", remedy));
                 }
                 Ok(rectangle(size))
             }
             (None, Some(points)) => {
+                let field = format!("{field}.polygon");
                 let ring = points
                     .iter()
-                    .map(|point| self.vector("pad.polygon", point).map(DVec2::from_array))
+                    .map(|point| self.vector(&field, point).map(DVec2::from_array))
                     .collect::<Result<Vec<_>>>()?;
                 let mut shape = crate::model::Polygon { outer: ring, holes: Vec::new() };
                 polygon::normalise(&mut shape);
                 if !is_convex(&shape.outer) || ring_area(&shape.outer) <= 0.0 {
-                    return Err(self.bad(
-                        "pad.polygon",
-                        "is not a convex polygon with area",
-                        remedy,
-                    ));
+                    return Err(self.bad(&field, "is not a convex polygon with area", remedy));
                 }
                 Ok(convex_hull(&shape.outer))
             }
-            (Some(_), Some(_)) => Err(self.bad("pad", "has a rectangle and a polygon", remedy)),
-            (None, None) => Err(self.bad("pad", "has no outline", remedy)),
+            (Some(_), Some(_)) => Err(self.bad(field, "has a rectangle and a polygon", remedy)),
+            (None, None) => Err(self.bad(field, "has no outline", remedy)),
         }
     }
 
-    fn bodies(&self, table: &str, solids: &[Solid]) -> Result<Vec<Body>> {
-        let mut bodies: Vec<Body> = Vec::with_capacity(solids.len());
+    /// The bodies of a jaw, those of jaw II as they lie before its half turn about `x1`.
+    fn finger(&self, solids: &[Solid], jaw: Jaw) -> Result<Vec<Body>> {
+        self.bodies("finger", solids.iter().filter(|solid| solid.jaw.is_none_or(|of| of == jaw)))
+    }
+
+    fn bodies<'s>(
+        &self,
+        table: &str,
+        solids: impl Iterator<Item = &'s Solid>,
+    ) -> Result<Vec<Body>> {
+        let mut bodies: Vec<Body> = Vec::new();
         for solid in solids {
-            let body = self.body(&format!("{table}.{}", solid.name), solid)?;
+            let mut body = self.body(&format!("{table}.{}", solid.name), solid)?;
+            if solid.jaw == Some(Jaw::II) {
+                body = body.moved(&Jaw::II.at(0.0));
+            }
             if body.name.trim().is_empty() || bodies.iter().any(|other| other.name == body.name) {
                 return Err(self.bad(
                     table,
                     format!("name '{}' is empty or used twice", body.name),
-                    "give each body its own name",
+                    "give each body of a jaw its own name",
                 ));
             }
             match &solid.mesh {
@@ -456,74 +503,6 @@ impl Reader<'_> {
             ));
         }
         Ok(shapes)
-    }
-
-    fn travel(&self, motion: &Motion, stroke: [f64; 2]) -> Result<Travel> {
-        let field = "motion";
-        let remedy = "give arc = { crank = \"57mm\", angle = \"-5deg\" } (length, and angle from the approach axis with touching pads, outwards positive) or table = [[\"0mm\", \"0mm\"], ...] (distance of the pads, advance, and the joint if known)";
-        match (&motion.arc, &motion.table) {
-            (Some(arc), None) => {
-                let crank = self.positive("motion.arc.crank", Quantity::Length, &arc.crank)?;
-                let angle = self.value("motion.arc.angle", Quantity::Angle, &arc.angle)?;
-                let reach = angle.sin() + stroke[1] / 2.0 / crank;
-                if !(angle.abs() < std::f64::consts::FRAC_PI_2 && reach < 1.0) {
-                    let problem = format!(
-                        "a crank of {} from {} does not carry the pads as far apart as the stroke",
-                        arc.crank, arc.angle
-                    );
-                    return Err(self.bad("motion.arc", problem, "give a longer crank"));
-                }
-                let joint = match &arc.joint {
-                    None => None,
-                    Some([closed, opened]) => {
-                        let value = |text| self.value("motion.arc.joint", Quantity::Angle, text);
-                        Some([value(closed)?, value(opened)?])
-                    }
-                };
-                Ok(Travel::Arc { crank, angle, joint })
-            }
-            (None, Some(table)) => {
-                let rows = table
-                    .iter()
-                    .map(|row| self.travel_row(row))
-                    .collect::<Result<Vec<TravelRow>>>()?;
-                let rising = rows.windows(2).all(|pair| pair[0].width < pair[1].width);
-                let alike = rows.iter().all(|row| row.joint.is_some() == rows[0].joint.is_some());
-                let covers = |rows: &[TravelRow]| match rows {
-                    [first, .., last] => first.width <= stroke[0] && last.width >= stroke[1],
-                    _ => false,
-                };
-                if !(rising && alike && covers(&rows)) {
-                    return Err(self.bad(
-                        "motion.table",
-                        "does not cover the stroke with rising distances and equal rows",
-                        remedy,
-                    ));
-                }
-                Ok(Travel::Table { rows })
-            }
-            _ => Err(self.bad(field, "needs exactly one of arc and table", remedy)),
-        }
-    }
-
-    fn travel_row(&self, row: &[String]) -> Result<TravelRow> {
-        let field = "motion.table";
-        let joint = |text: &String| {
-            self.value(field, Quantity::Angle, text)
-                .or_else(|_| self.value(field, Quantity::Length, text))
-        };
-        match row {
-            [width, advance, rest @ ..] if rest.len() <= 1 => Ok(TravelRow {
-                width: self.value(field, Quantity::Length, width)?,
-                advance: self.value(field, Quantity::Length, advance)?,
-                joint: rest.first().map(joint).transpose()?,
-            }),
-            _ => Err(self.bad(
-                field,
-                format!("has a row of {} values", row.len()),
-                "give distance, advance and, if known, the joint",
-            )),
-        }
     }
 
     fn frame(&self, field: &str, axes: &Axes) -> Result<Frame> {

@@ -23,6 +23,9 @@ pub enum Travel {
         /// The robot model's joint at the smallest and the largest distance of the pads \[rad\],
         /// where stated; it turns as the crank does.
         joint: Option<[f64; 2]>,
+        /// Of one jaw alone: it goes all of the pads' distance, not half of it.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        alone: bool,
     },
     /// Measured or computed, by rising distance of the pads; straight lines between.
     Table {
@@ -47,9 +50,7 @@ impl Travel {
     pub fn advance(&self, width: f64) -> f64 {
         match self {
             Self::Parallel => 0.0,
-            Self::Arc { crank, angle, .. } => {
-                crank * (turned(*crank, *angle, width).cos() - angle.cos())
-            }
+            Self::Arc { crank, angle, .. } => crank * (self.turned(width).cos() - angle.cos()),
             Self::Table { rows } => {
                 interpolated(rows, width, |row| Some(row.advance)).unwrap_or(0.0)
             }
@@ -61,9 +62,9 @@ impl Travel {
     pub fn joint(&self, width: f64, stroke: [f64; 2]) -> Option<f64> {
         match self {
             Self::Parallel => None,
-            Self::Arc { crank, angle, joint } => {
-                let [least, most] = stroke.map(|width| turned(*crank, *angle, width));
-                let share = (turned(*crank, *angle, width) - least) / (most - least);
+            Self::Arc { joint, .. } => {
+                let [least, most] = stroke.map(|width| self.turned(width));
+                let share = (self.turned(width) - least) / (most - least);
                 joint.map(|[closed, opened]| closed + share * (opened - closed))
             }
             Self::Table { rows } => interpolated(rows, width, |row| row.joint),
@@ -77,8 +78,8 @@ impl Travel {
         match self {
             Self::Parallel => 0.0,
             // An arc leaves its chord most where it runs parallel to it, at mid angle.
-            Self::Arc { crank, angle, .. } => {
-                let [a, b] = [from, to].map(|width| turned(*crank, *angle, width));
+            Self::Arc { crank, .. } => {
+                let [a, b] = [from, to].map(|width| self.turned(width));
                 let chord = crank * (a - b).abs();
                 // The sagitta is across the chord; along the approach it is longer by the slope.
                 let sagitta = crank * (1.0 - ((a - b) / 2.0).cos());
@@ -97,11 +98,17 @@ impl Travel {
             }
         }
     }
-}
 
-/// Angle of a crank when the pads are `width` apart.
-fn turned(crank: f64, angle: f64, width: f64) -> f64 {
-    (angle.sin() + width / 2.0 / crank).clamp(-1.0, 1.0).asin()
+    /// Angle of the crank when the pads are `width` apart; zero without one.
+    fn turned(&self, width: f64) -> f64 {
+        match self {
+            Self::Arc { crank, angle, alone, .. } => {
+                let way = if *alone { width } else { width / 2.0 };
+                (angle.sin() + way / crank).clamp(-1.0, 1.0).asin()
+            }
+            _ => 0.0,
+        }
+    }
 }
 
 /// On the straight line between two rows, at the ends that of the outermost two.

@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DVec2};
 
-use super::patch::{Scratch, Touch, TurnedPad};
-use super::work::{self, Known};
+use super::patch::{Scratch, Touch};
+use super::work::{Known, Pads};
 use super::{proposer::Proposer, site};
 use crate::error::Result;
 use crate::gripper::Jaws;
@@ -30,7 +30,7 @@ impl Proposer<'_> {
         let (index, _) = self.site_of(grip.face_i, grip.face_ii, &grip.part_from_grip)?;
         let site = &self.sites[index];
         let axes = site::axes(self.directions[site.direction]);
-        let reach = self.gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
+        let reach = self.gripper.pad_reach();
         let patches = site.patches(self.part, &axes, reach);
         let (mut scratch, mut known) = ([Scratch::default(), Scratch::default()], Known::default());
         let displaced = by.iter().map(|by| {
@@ -41,14 +41,14 @@ impl Proposer<'_> {
             let (place, angle) =
                 (local.origin.truncate(), local.rotation.x_axis.truncate().to_angle());
             let jaws = site::jaws(&local);
-            let pad = TurnedPad::new(&work::oriented(&self.gripper.pad, jaws), angle);
-            let whole = [0, 1].map(|side: usize| {
-                patches.get(side).is_none_or(|patch| {
-                    patch.touch(&pad, place, &mut scratch[side]) == Touch::Whole
-                })
-            });
+            let pads = Pads::new(site.pads(self.gripper, jaws), angle);
+            let mut whole = [true; 2];
+            for (side, patch) in pads.sides(&patches) {
+                let touch = patches[patch].touch(&pads.turned[side], place, &mut scratch[side]);
+                whole[side] = touch == Touch::Whole;
+            }
             let contact =
-                self.contact(&patches, &pad, place, angle, jaws, whole, &mut scratch, &mut known);
+                self.contact(&patches, &pads, place, angle, jaws, whole, &mut scratch, &mut known);
             let mut faces = [0, 1].map(|side| site.face_at(side, self.part, place));
             if jaws == Jaws::Exchanged {
                 faces.reverse();

@@ -3,10 +3,11 @@
 use glam::{DVec2, DVec3};
 
 use super::options::Rejection;
-use super::patch::{Scratch, Touch, TurnedPad};
+use super::patch::{Scratch, Touch};
 use super::proposer::{Prepared, Proposer};
+use super::site;
 use super::site::Site;
-use super::{site, work};
+use super::work::{self, Pads};
 use crate::clash::{Phase, Sweep};
 use crate::error::{Error, Result};
 use crate::geometry::clip_ring_axis;
@@ -226,39 +227,41 @@ impl Proposer<'_> {
         jaws: Jaws,
         verdict: &mut Verdict,
     ) -> Contact {
-        let outline_of_pad = work::oriented(&self.gripper.pad, jaws);
-        let pad = TurnedPad::new(&outline_of_pad, angle);
+        let pads = Pads::new(prepared.site.pads(self.gripper, jaws), angle);
         let mut patches: [Patch; 2] = [Patch::new(), Patch::new()];
         let areas = [0, 1].map(|side: usize| {
             let mut scratch = Scratch::default();
             let patch = &prepared.patches[side.min(prepared.patches.len() - 1)];
-            match patch.touch(&pad, position, &mut scratch) {
+            let pad = &pads.turned[side];
+            match patch.touch(pad, position, &mut scratch) {
                 Touch::Empty => 0.0,
                 Touch::Whole => {
-                    patches[side] =
-                        vec![Polygon { outer: outline_of_pad.clone(), holes: Vec::new() }];
+                    let outer = pads.outlines[side].clone();
+                    patches[side] = vec![Polygon { outer, holes: Vec::new() }];
                     pad.area()
                 }
                 Touch::Part(area) => {
-                    patches[side] = patch.outline(&pad, position, &mut scratch, angle);
+                    patches[side] = patch.outline(pad, position, &mut scratch, angle);
                     area
                 }
             }
         });
-        let [share, pad_share] = self.contact_floor(prepared.site, &pad);
+        let floors =
+            [0, 1].map(|side: usize| self.contact_floor(prepared.site, &pads.turned[side]));
         let reason = || {
-            if areas.iter().all(|&area| area > 0.0 && area >= share) {
+            if areas.iter().zip(floors).all(|(&area, [share, _])| area > 0.0 && area >= share) {
                 Rejection::PadShareTooSmall
             } else {
                 Rejection::ContactTooSmall
             }
         };
-        for (name, area) in ["contact on face I", "contact on face II"].into_iter().zip(areas) {
+        for (side, name) in ["contact on face I", "contact on face II"].into_iter().enumerate() {
+            let (area, [share, pad_share]) = (areas[side], floors[side]);
             let detail = format!(
                 "{:.2} mm^2, {:.1} % of the pad; at least {:.2} mm^2 by the share of the most that \
                  can touch, {:.2} mm^2 by that of the pad",
                 area * 1e6,
-                area / pad.area() * 100.0,
+                area / pads.turned[side].area() * 100.0,
                 share * 1e6,
                 pad_share * 1e6
             );

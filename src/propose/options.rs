@@ -4,7 +4,6 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::geometry::Bounds2;
 use crate::gripper::Gripper;
 use crate::request::{Candidates, Region, Side};
 
@@ -20,7 +19,7 @@ pub use crate::request::{Cone, Ground};
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ProposeOptions {
-    /// Step of the position grid \[m\]; `None`: a fifth of the pad's shorter side.
+    /// Step of the position grid \[m\]; `None`: a fifth of the (smaller) pad's shorter side.
     pub spacing: Option<f64>,
     /// Step of the approach angle \[rad\].
     pub angle_step: f64,
@@ -127,7 +126,8 @@ impl From<&Candidates> for ProposeOptions {
 impl ProposeOptions {
     /// Step of the position grid \[m\].
     pub fn spacing(&self, gripper: &Gripper) -> f64 {
-        self.spacing.unwrap_or_else(|| Bounds2::of(&gripper.pad).size().min_element() / 5.0)
+        let [one, two] = gripper.pad_sizes();
+        self.spacing.unwrap_or_else(|| one.min(two).min_element() / 5.0)
     }
 
     /// # Errors

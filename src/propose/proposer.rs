@@ -18,7 +18,7 @@ use super::site::{self, Places, Site};
 use super::work;
 use crate::clash::{Sweep, Topology, Tree, sweeps};
 use crate::error::{Error, Result};
-use crate::gripper::{Gripper, Jaws};
+use crate::gripper::{Gripper, Jaw, Jaws};
 use crate::model::{Contact, Grip, Polygon};
 use crate::part::{FacePair, Part};
 
@@ -182,7 +182,7 @@ impl<'a> Proposer<'a> {
     /// the gripper has no pad with area, or inside grips are asked of a gripper without outer pads.
     pub fn new(part: &'a Part, gripper: &'a Gripper, options: &ProposeOptions) -> Result<Self> {
         options.validate()?;
-        if !crate::geometry::is_convex(&gripper.pad) {
+        if !gripper.pads(gripper.stroke[0]).iter().all(|pad| crate::geometry::is_convex(pad)) {
             return Err(Error::input(
                 &gripper.name,
                 "the pad is not a convex counter-clockwise polygon",
@@ -218,7 +218,7 @@ impl<'a> Proposer<'a> {
         tally.nearest_approach = environment.nearest_approach(&sites);
         let stride = if options.flips || !gripper.is_symmetric() { 2 } else { 1 };
         let grid: usize = sites.iter().map(|site| site.positions.len() * site.angles.len()).sum();
-        let pad = vec![Polygon { outer: gripper.pad.clone(), holes: Vec::new() }];
+        let pad = vec![Polygon { outer: gripper.pad.clone(), holes: Vec::new() }]; // of both
         Ok(Self {
             part,
             gripper,
@@ -265,9 +265,10 @@ impl<'a> Proposer<'a> {
 
     pub(super) fn prepare<'s>(&self, site: &'s Site) -> Prepared<'s> {
         let axes = site::axes(self.directions[site.direction]);
-        let reach = self.gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
+        let reach = self.gripper.pad_reach();
         let (low, high) = self.part.mesh.bounding_box();
-        let bodies = self.gripper.fingers.iter().chain(&self.gripper.palm);
+        let fingers = Jaw::BOTH.iter().flat_map(|&jaw| self.gripper.bodies(jaw));
+        let bodies = fingers.chain(&self.gripper.palm);
         let extent = bodies
             .flat_map(crate::gripper::Body::bounds)
             .map(|corner| corner.length())

@@ -21,7 +21,7 @@ use crate::error::{Error, Result};
 use crate::geometry::polygon::{self, Bounds2, rings};
 use crate::geometry::{UnionFind, contains, overlay};
 use crate::gripper::{Gripper, Jaws};
-use crate::model::{Frame, Patch, Polygon};
+use crate::model::{Frame, Patch, Polygon, Ring};
 use crate::part::{FacePair, PairKind, Part, PlanarFace};
 
 /// Planes whose directions differ by less count as one direction, which saves a tree \[rad\]: 0.1 um
@@ -198,8 +198,8 @@ impl Finder<'_> {
         let patches =
             [0, 1].map(|side| project(sides[side].iter().map(|&id| face(id)), &axes_from_part));
         let overlap = overlay::intersect(&patches[0], &patches[1]);
-        let bounds = Bounds2::of(&gripper.pad);
-        let reach = gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
+        let [one, two] = gripper.pad_sizes();
+        let reach = gripper.pad_reach();
         let spacing = options.spacing(gripper);
         let centre = axes_from_part * self.centre_of_mass;
 
@@ -233,9 +233,9 @@ impl Finder<'_> {
                 rise(&sides, part, &axes_from_part, axis, &overlap, heights) + SAME_PLANE * size;
             let centre_of_mass = DVec2::from_angle(-turn).rotate(centre.truncate() - middle);
             let (positions, grid) =
-                positions(&local, spacing, bounds.size().max_element() / 2.0, centre_of_mass);
+                positions(&local, spacing, one.max(two).max_element() / 2.0, centre_of_mass);
             let edges = straight_edges(&local);
-            let angles = angles(&edges, options, bounds.size().min_element());
+            let angles = angles(&edges, options, one.min(two).min_element());
             let frame = Frame {
                 rotation: axes_from_part.transpose() * DMat3::from_rotation_z(turn),
                 origin: axes_from_part.transpose() * origin,
@@ -311,12 +311,13 @@ impl Finder<'_> {
     fn special(&self, site: &Site, landmarks: &Landmarks<'_>) -> Vec<Vec<DVec2>> {
         let ways: &[Jaws] =
             if self.gripper.is_symmetric() { &[Jaws::Straight] } else { &Jaws::BOTH };
-        let ways: Vec<(Vec<DVec2>, Vec<Sweep>)> = ways
+        let ways: Vec<(Vec<Ring>, Vec<Sweep>)> = ways
             .iter()
             .map(|&jaws| {
                 let motion = site.motion(self.gripper, self.options, self.options.approach, jaws);
-                let pad = super::work::oriented(&self.gripper.pad, jaws);
-                (pad, sweeps(self.gripper, &motion))
+                let mut pads = site.pads(self.gripper, jaws).to_vec();
+                pads.dedup();
+                (pads, sweeps(self.gripper, &motion))
             })
             .collect();
         let mut room = special::Room::default();
@@ -326,10 +327,10 @@ impl Finder<'_> {
                 let mut found = Vec::new();
                 let frame = super::work::frame(site, DVec2::ZERO, angle);
                 if self.environment.allows(super::work::approach(&frame)) {
-                    for (pad, sweeps) in &ways {
+                    for (pads, sweeps) in &ways {
                         let borders =
                             self.environment.borders(sweeps, &site.part_from_site, &frame);
-                        let posture = Posture { angle, pad, sweeps, borders: &borders };
+                        let posture = Posture { angle, pads, sweeps, borders: &borders };
                         landmarks.places(&posture, &mut room, &mut found);
                     }
                 }
@@ -375,6 +376,27 @@ impl Site {
         }
     }
 
+    /// Distance of the pads in its grips \[m\].
+    fn gap(&self, gripper: &Gripper) -> f64 {
+        match self.kind {
+            PairKind::External => self.width,
+            PairKind::Internal => self.width - 2.0 * gripper.outer_pad.unwrap_or(0.0),
+        }
+    }
+
+    /// The outlines that touch side I and II, in the grip frame before the half turn.
+    pub(super) fn pads(&self, gripper: &Gripper, jaws: Jaws) -> [Ring; 2] {
+        let mut pads = gripper.pads(self.gap(gripper));
+        if self.kind == PairKind::Internal {
+            pads.reverse();
+        }
+        if jaws == Jaws::Exchanged {
+            pads.reverse();
+            pads = pads.map(|pad| super::work::mirrored(&pad));
+        }
+        pads
+    }
+
     /// How the jaws move on to the site's faces.
     pub(super) fn motion(
         &self,
@@ -386,7 +408,7 @@ impl Site {
         let [least, most] = gripper.stroke;
         let room = match self.kind {
             PairKind::External => most - self.width,
-            PairKind::Internal => self.width - 2.0 * gripper.outer_pad.unwrap_or(0.0) - least,
+            PairKind::Internal => self.gap(gripper) - least,
         };
         Motion {
             kind: self.kind,

@@ -50,12 +50,31 @@ pub(super) fn frame(site: &Site, place: DVec2, angle: f64) -> Frame {
     site.part_from_site.compose(&turn)
 }
 
-/// The pad outline of an orientation in the grip frame before the half turn: with exchanged jaws it
-/// is mirrored.
-pub(super) fn oriented(pad: &[DVec2], jaws: Jaws) -> Ring {
-    match jaws {
-        Jaws::Straight => pad.to_vec(),
-        Jaws::Exchanged => pad.iter().rev().map(|point| DVec2::new(point.x, -point.y)).collect(),
+/// A pad outline after half a turn about the approach axis.
+pub(super) fn mirrored(pad: &[DVec2]) -> Ring {
+    pad.iter().rev().map(|point| DVec2::new(point.x, -point.y)).collect()
+}
+
+/// The pads over side I and II of a site in one posture, in the grip frame before the half turn.
+#[derive(Debug)]
+pub(super) struct Pads {
+    pub(super) outlines: [Ring; 2],
+    pub(super) turned: [TurnedPad; 2],
+    /// Whether both are the same.
+    alike: bool,
+}
+
+impl Pads {
+    pub(super) fn new(outlines: [Ring; 2], angle: f64) -> Self {
+        let turned = [0, 1].map(|side: usize| TurnedPad::new(&outlines[side], angle));
+        Self { alike: outlines[0] == outlines[1], outlines, turned }
+    }
+
+    /// The sides to look at, each with the index of its patch: one stands for both where pads and
+    /// faces are the same.
+    pub(super) fn sides(&self, patches: &[PatchIndex]) -> impl Iterator<Item = (usize, usize)> {
+        let (count, last) = (patches.len(), patches.len().saturating_sub(1));
+        (0..if self.alike { count } else { 2 }).map(move |side| (side, side.min(last)))
     }
 }
 
@@ -86,13 +105,13 @@ impl Proposer<'_> {
             self.survivors(item, prepared, tree, jaws, buffers, &mut outcome);
             let site = prepared.site;
             let (angle, places) = (site.angles[item.angle], site.places(item.places, item.angle));
-            let pad = TurnedPad::new(&oriented(&self.gripper.pad, jaws), angle);
+            let pads = Pads::new(site.pads(self.gripper, jaws), angle);
             let alive = std::mem::take(&mut buffers.alive);
             for &index in &alive {
                 let place = places[item.positions.start + index as usize];
                 let contact = self.contact(
                     &prepared.patches,
-                    &pad,
+                    &pads,
                     place,
                     angle,
                     jaws,
@@ -175,29 +194,30 @@ impl Proposer<'_> {
             reject(Rejection::TooFarFromCentreOfMass, lost);
         }
 
-        let pad = TurnedPad::new(&oriented(&self.gripper.pad, jaws), angle);
-        let floor = self.contact_floor(site, &pad);
+        let pads = Pads::new(site.pads(self.gripper, jaws), angle);
+        let floors = [0, 1].map(|side: usize| self.contact_floor(site, &pads.turned[side]));
         buffers.whole.clear();
         buffers.whole.resize(positions.len(), [true; 2]);
         let (scratch, whole) = (&mut buffers.scratch, &mut buffers.whole);
         let mut small_on_pad = 0;
         let lost = keep(&mut buffers.alive, &mut |index| {
-            let mut least = f64::INFINITY;
-            for (side, patch) in prepared.patches.iter().enumerate() {
-                match patch.touch(&pad, positions[index as usize], &mut scratch[side]) {
+            let mut small = false;
+            for (side, patch) in pads.sides(&prepared.patches) {
+                let (patch, place) = (&prepared.patches[patch], positions[index as usize]);
+                match patch.touch(&pads.turned[side], place, &mut scratch[side]) {
                     Touch::Empty => return false,
                     Touch::Whole => {}
                     Touch::Part(area) => {
                         whole[index as usize][side] = false;
-                        least = least.min(area);
-                        if area < floor[0] {
+                        if area < floors[side][0] {
                             return false;
                         }
+                        small |= area < floors[side][1];
                     }
                 }
             }
-            small_on_pad += usize::from(least < floor[1]);
-            least >= floor[1]
+            small_on_pad += usize::from(small);
+            !small
         });
         reject(Rejection::ContactTooSmall, lost - small_on_pad);
         reject(Rejection::PadShareTooSmall, small_on_pad);
@@ -267,7 +287,7 @@ impl Proposer<'_> {
     pub(super) fn contact(
         &self,
         patches: &[PatchIndex],
-        pad: &TurnedPad,
+        pads: &Pads,
         place: DVec2,
         angle: f64,
         jaws: Jaws,
@@ -275,20 +295,21 @@ impl Proposer<'_> {
         scratch: &mut [Scratch; 2],
         known: &mut Known,
     ) -> Arc<Contact> {
-        if whole.iter().take(patches.len()).all(|&whole| whole) {
+        if pads.alike && pads.sides(patches).all(|(side, _)| whole[side]) {
             return Arc::clone(&self.whole);
         }
-        let mut patch = |side: usize| -> Patch {
-            match patches[side].touch(pad, place, &mut scratch[side]) {
+        let mut touched = pads.sides(patches).map(|(side, patch)| -> Patch {
+            let (patch, pad) = (&patches[patch], &pads.turned[side]);
+            match patch.touch(pad, place, &mut scratch[side]) {
                 Touch::Empty => Patch::new(),
                 Touch::Whole => {
-                    vec![Polygon { outer: oriented(&self.gripper.pad, jaws), holes: Vec::new() }]
+                    vec![Polygon { outer: pads.outlines[side].clone(), holes: Vec::new() }]
                 }
-                Touch::Part(_) => patches[side].outline(pad, place, &mut scratch[side], angle),
+                Touch::Part(_) => patch.outline(pad, place, &mut scratch[side], angle),
             }
-        };
-        let face_i = patch(0);
-        let face_ii = if patches.len() == 2 { patch(1) } else { face_i.clone() };
+        });
+        let face_i = touched.next().unwrap_or_default();
+        let face_ii = touched.next().unwrap_or_else(|| face_i.clone());
         let contact = Contact { face_i, face_ii };
         let contact = match jaws {
             Jaws::Straight => contact,
@@ -307,8 +328,7 @@ impl Proposer<'_> {
     }
 
     fn shared(&self, contact: Contact, known: &mut Known) -> Arc<Contact> {
-        let step =
-            SAME_CONTACT * self.gripper.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
+        let step = SAME_CONTACT * self.gripper.pad_reach();
         let rings =
             || [&contact.face_i, &contact.face_ii].into_iter().flatten().flat_map(polygon::rings);
         if rings().map(<[DVec2]>::len).sum::<usize>() > SHARED_CORNERS {

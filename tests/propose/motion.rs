@@ -4,7 +4,7 @@
 use gripfast::gripper::{Travel, TravelRow, find};
 
 fn arc() -> Travel {
-    Travel::Arc { crank: 0.0571, angle: -0.0948, joint: Some([0.8133, 0.0117]) }
+    Travel::Arc { crank: 0.0571, angle: -0.0948, joint: Some([0.8133, 0.0117]), alone: false }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use glam::DVec2;
 use super::places::{Edge, Grid};
 use crate::clash::{Phase, Sweep};
 use crate::geometry::Bounds2;
-use crate::model::Patch;
+use crate::model::{Patch, Ring};
 use crate::propose::environment::Border;
 use crate::propose::patch::{PatchIndex, Scratch, Touch, TurnedPad};
 
@@ -67,8 +67,8 @@ impl Line {
 /// The gripper at one angle, one way round.
 pub(super) struct Posture<'a> {
     pub(super) angle: f64,
-    /// The pad's outline, not turned.
-    pub(super) pad: &'a [DVec2],
+    /// The pads' outlines, not turned; one where both are the same.
+    pub(super) pads: &'a [Ring],
     /// What the fingers sweep while closing, grip frame.
     pub(super) sweeps: &'a [Sweep],
     /// Borders of ground and keep-out boxes for the grip origin.
@@ -89,8 +89,9 @@ impl Landmarks<'_> {
         if lines.is_empty() {
             return;
         }
-        let pad = TurnedPad::new(posture.pad, posture.angle);
-        let reach = posture.pad.iter().map(|point| point.length()).fold(0.0, f64::max);
+        let pads: Vec<TurnedPad> =
+            posture.pads.iter().map(|pad| TurnedPad::new(pad, posture.angle)).collect();
+        let reach = posture.pads.iter().flatten().map(|point| point.length()).fold(0.0, f64::max);
         let region = self.grid.bounds.grown(1.01 * reach);
         let index = room.index.get_or_insert_with(|| {
             PatchIndex::new(self.overlap.clone(), region.grown(1.01 * reach), reach / 4.0)
@@ -104,7 +105,7 @@ impl Landmarks<'_> {
             if place.clamp(region.min, region.max) == place
                 && !found.iter().any(known)
                 && !self.positions[others..].iter().any(known)
-                && index.touch(&pad, place, &mut room.scratch) != Touch::Empty
+                && pads.iter().all(|pad| index.touch(pad, place, &mut room.scratch) != Touch::Empty)
             {
                 found.push(place);
             }
@@ -135,8 +136,16 @@ impl Landmarks<'_> {
             .iter()
             .map(|border| Line { normal: border.normal, offset: border.offset + CLEAR, row: true })
             .collect();
+        for pad in posture.pads {
+            self.lines_along_edges(posture, pad, &mut lines);
+        }
+        lines
+    }
+
+    /// Lines of places at which a pad lies flush with a straight edge, or its finger just clear of
+    /// it.
+    fn lines_along_edges(&self, posture: &Posture<'_>, ring: &[DVec2], lines: &mut Vec<Line>) {
         let turn = DVec2::from_angle(posture.angle);
-        let ring = posture.pad;
         let sides: Vec<DVec2> = ring
             .iter()
             .zip(ring.iter().cycle().skip(1))
@@ -172,7 +181,6 @@ impl Landmarks<'_> {
                 clear += 1;
             }
         }
-        lines
     }
 }
 
