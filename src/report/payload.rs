@@ -108,8 +108,14 @@ impl Payload {
             .map(|display| surface(&mut columns, display));
         let (gripper, gripper_problem) =
             match serde_json::from_value::<Gripper>(set.gripper.clone()) {
-                Ok(gripper) => (gripper_json(&gripper), Value::Null),
-                Err(error) => (Value::Null, Value::String(error.to_string())),
+                Ok(gripper) => {
+                    palm(&mut columns, &gripper, grips);
+                    (gripper_json(&gripper), Value::Null)
+                }
+                Err(error) => {
+                    columns.f32("palm", grips.iter().flat_map(|_| [0.0; 2]));
+                    (Value::Null, Value::String(error.to_string()))
+                }
             };
         let header = json!({
             "format": "gripfast-report", "version": 1, "provenance": provenance(set), "part": set.part, "display": display,
@@ -220,6 +226,13 @@ fn poses_and_scores(columns: &mut Columns, grips: &[RankedGrip]) -> Vec<Value> {
     let numbers: Vec<u32> = numbers.collect();
     columns.u32("status", numbers);
     statuses
+}
+
+/// Where the palm stands in each grip along `x1` and `x3`, seen from where the gripper file places
+/// it.
+fn palm(columns: &mut Columns, gripper: &Gripper, grips: &[RankedGrip]) {
+    let place = |grip: &RankedGrip| gripper.palm_place(gripper.jaw_gap(&grip.grip)).origin;
+    columns.f32("palm", grips.iter().map(place).flat_map(|origin| [origin.x, origin.z]));
 }
 
 /// Contact areas, each written once: ring starts into the points, and per ring face (bit 0) and
@@ -396,6 +409,8 @@ fn gripper_json(gripper: &Gripper) -> Value {
         "payload": gripper.payload, "moment": gripper.moment,
         "pad_friction": gripper.pad_friction, "pad_thickness": gripper.pad_thickness, "outer_pad": gripper.outer_pad,
         "flange": gripper.grip_from_flange.as_ref().map(matrix), "tool": gripper.grip_from_tool.as_ref().map(matrix),
+        "pad_ii": gripper.pad_ii, "moving": gripper.moving,
+        "fingers_ii": gripper.fingers_ii.as_ref().map(|bodies| bodies.iter().map(body).collect::<Vec<_>>()),
         "fingers": gripper.fingers.iter().map(body).collect::<Vec<_>>(), "palm": gripper.palm.iter().map(body).collect::<Vec<_>>(),
     })
 }

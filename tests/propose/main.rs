@@ -10,3 +10,4 @@ mod parts;
 mod places;
 #[path = "../support/mod.rs"]
 mod support;
+mod unequal;

@@ -27,8 +27,10 @@ function body(description, surface, materials) {
   return group;
 }
 
-function pad(gripper, materials) {
-  const geometry = new ExtrudeGeometry(new Shape(gripper.pad.map(([x, y]) => ({ x, y }))), { depth: gripper.pad_thickness || PAD_DEPTH, bevelEnabled: false });
+/** The pad of a jaw in the jaw's own frame: that of jaw II is half a turn from the grip's. */
+function pad(gripper, side, materials) {
+  const ring = side === 0 ? gripper.pad : (gripper.pad_ii ?? gripper.pad).map(([x, y]) => [x, -y]).reverse();
+  const geometry = new ExtrudeGeometry(new Shape(ring.map(([x, y]) => ({ x, y }))), { depth: gripper.pad_thickness || PAD_DEPTH, bevelEnabled: false });
   const group = new Group();
   group.add(new Mesh(geometry, materials.pad), new LineSegments(new EdgesGeometry(geometry, 30), materials.padEdge));
   return group;
@@ -41,26 +43,41 @@ export class Jaws {
     this.root = new Group();
     this.fingers = [new Group(), new Group()];
     this.solid = new Group();
-    for (const side of this.fingers) {
+    this.moving = gripper?.moving ?? 'both';
+    for (const [k, side] of this.fingers.entries()) {
       const finger = new Group();
       if (gripper) {
-        finger.add(pad(gripper, materials));
-        gripper.fingers.forEach((description) => finger.add(body(description, materials.jaw, materials)));
+        finger.add(pad(gripper, k, materials));
+        const bodies = k === 0 ? gripper.fingers : (gripper.fingers_ii ?? gripper.fingers);
+        bodies.forEach((description) => finger.add(body(description, materials.jaw, materials)));
       }
       side.add(finger);
       this.solid.add(side);
     }
     // The other finger is the first one turned by 180 degrees about the approach axis.
     this.fingers[1].children[0].rotation.x = Math.PI;
-    gripper?.palm.forEach((description) => this.solid.add(body(description, materials.palm, materials)));
+    this.palm = new Group();
+    gripper?.palm.forEach((description) => this.palm.add(body(description, materials.palm, materials)));
+    this.solid.add(this.palm);
     this.contacts = [new Group(), new Group()];
     this.root.add(this.solid, ...this.contacts);
   }
 
-  /** Pads at `opening`, contact areas on the faces at `width` [m], which is negative for a grip from inside. */
-  place(opening, width) {
-    this.fingers[0].position.z = opening / 2;
-    this.fingers[1].position.z = -opening / 2;
+  /**
+   * Pads at `opening`, contact areas on the faces at `width` [m], which is negative for a grip from inside. `palm`: where
+   * the palm stands along x1 and x3 in a grip with the pads `gap` apart; a fixed jaw stays there.
+   */
+  place(opening, width, palm = { x: 0, z: { I: -0.5, II: 0.5 }[this.moving] * opening || 0, gap: opening }) {
+    const alone = opening - palm.gap / 2;
+    this.fingers[0].position.z = { I: alone, II: palm.gap / 2 }[this.moving] ?? opening / 2;
+    this.fingers[1].position.z = -({ I: palm.gap / 2, II: alone }[this.moving] ?? opening / 2);
+    this.palm.position.set(palm.x, 0, palm.z);
+    if (this.moving !== 'both') {
+      // A jaw on a crank alone: the grip's middle lies between the pads.
+      const own = this.moving === 'I' ? -palm.x : palm.x;
+      this.fingers[0].position.x = own;
+      this.fingers[1].position.x = -own;
+    }
     this.contacts[0].position.z = width / 2;
     this.contacts[1].position.z = -width / 2;
   }

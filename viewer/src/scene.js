@@ -9,7 +9,7 @@ import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { friction } from './colour.js';
 import { verdict } from './detail.js';
 import { Jaws } from './jaws.js';
-import { gaps } from './take.js';
+import { gaps, palmPlace } from './take.js';
 
 const MM = 1000;
 const MOVE_MS = 260;
@@ -314,7 +314,7 @@ export class View {
         const inside = this.report.column.inside[i] === 1;
         this.ghost.root.quaternion.setFromRotationMatrix(new Matrix4().makeBasis(vector(x1), vector(x2), vector(x3)));
         this.ghost.root.position.set(...origin);
-        this.ghost.place(inside ? width - 2 * (gripper.outer_pad ?? 0) : width, inside ? -width : width);
+        this.ghost.place(inside ? width - 2 * (gripper.outer_pad ?? 0) : width, inside ? -width : width, palmPlace(this.report, i));
       }
     }
     this.render();
@@ -342,7 +342,7 @@ export class View {
       root.quaternion.slerpQuaternions(from.q, to.q, t);
       root.position.lerpVectors(from.p, to.p, t);
       this.opening = from.opening + t * (opening - from.opening);
-      this.jaws.place(this.opening, this.inside ? -this.width : this.width);
+      this.jaws.place(this.opening, this.inside ? -this.width : this.width, palmPlace(this.report, this.grip));
       this.render();
     };
     this.moving = false;
@@ -371,7 +371,7 @@ export class View {
       const way = ease(Math.min(t / 0.6, 1)) - 1;
       root.position.set(...origin).addScaledVector(vector(x1), way * away);
       this.opening = free + ease(Math.max((t - 0.65) / 0.35, 0)) * (holding - free);
-      this.jaws.place(this.opening, this.inside ? -this.width : this.width);
+      this.jaws.place(this.opening, this.inside ? -this.width : this.width, palmPlace(this.report, this.grip));
       this.jaws.contacts.forEach((contact) => (contact.visible = t >= 1));
       this.draw();
     };
@@ -463,7 +463,7 @@ export class View {
     }
     this.flange.traverse((object) => (object.renderOrder = 9));
     this.flange.applyMatrix4(new Matrix4().fromArray(gripper.flange));
-    this.jaws.solid.add(this.flange);
+    this.jaws.palm.add(this.flange);
   }
 
   /** The ground and the boxes to keep out of, where the run had some. */

@@ -42,13 +42,14 @@ const add = (a, b, factor = 1) => a.map((v, k) => v + factor * b[k]);
 
 /** The tool frame of grip `i` in the part frame: `{ x, y, z, origin }`, metres. */
 export function toolPose(report, i, frame, origin) {
+  const { x: along, z: aside } = palmPlace(report, i);
   const { x1, x2, x3, origin: middle } = report.pose(i);
   const turn = (v) => [0, 1, 2].map((k) => v[0] * x1[k] + v[1] * x2[k] + v[2] * x3[k]);
   const { gripper } = report.header;
   const stated = (name) => [0, 1, 2, 3].map((k) => gripper[name].slice(4 * k, 4 * k + 3));
   const axes = FRAMES[frame]?.[1] ?? stated(frame).slice(0, 3);
   const [x, y, z] = axes.map(turn);
-  return { x, y, z, origin: origin === 'pads' ? middle : add(middle, turn(stated(origin)[3])) };
+  return { x, y, z, origin: origin === 'pads' ? middle : add(middle, turn(add(stated(origin)[3], [along, 0, aside]))) };
 }
 
 /** The quaternion (x, y, z, w) of a pose with w >= 0. */
@@ -91,6 +92,12 @@ export function gaps(report, i) {
   const [least, most] = gripper.stroke;
   const way = 2 * (asked.opening ?? Infinity);
   return [gap, inside ? Math.min(Math.max(gap - way, least), gap) : Math.max(Math.min(gap + way, most), gap)];
+}
+
+/** Where the palm stands in grip `i` along x1 and x3, seen from where the gripper file places it, and the pads' distance [m]. */
+export function palmPlace(report, i) {
+  const { palm } = report.column;
+  return { x: palm[2 * i], z: palm[2 * i + 1], gap: gaps(report, i)[0] };
 }
 
 /** One row per grip: the columns of the program's CSV, as text. */
