@@ -9,7 +9,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DMat3, DQuat, DVec3};
 use gripfast::model::Frame;
 use gripfast::part::Mesh;
-use gripfast::pick::{Obstacle, Picker, Scene, Solid};
+use gripfast::pick::{Obstacle, Picker, Reference, Scene, Solid};
 use gripfast::results::GripSet;
 
 #[path = "../tests/support/grips.rs"]
@@ -70,6 +70,7 @@ fn pick(criterion: &mut Criterion) {
     let table = Obstacle {
         name: "table".into(),
         solid: Solid::HalfSpace,
+        frame: Reference::World,
         world_from_obstacle: Frame {
             rotation: DMat3::IDENTITY,
             origin: DVec3::new(0.0, 0.0, -0.05),
@@ -78,6 +79,7 @@ fn pick(criterion: &mut Criterion) {
     let bin = Obstacle {
         name: "bin".into(),
         solid: Solid::Mesh { mesh, closed: false },
+        frame: Reference::World,
         world_from_obstacle: Frame::IDENTITY,
     };
     let scene = Scene { obstacles: vec![table, bin], ..Scene::default() };

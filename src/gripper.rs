@@ -392,8 +392,13 @@ impl Gripper {
     /// Distance of the pads before they close on a grip \[m\], each jaw having `opening` to go or as
     /// much as the stroke leaves.
     pub fn opened_gap(&self, grip: &Grip, opening: f64) -> f64 {
-        let (gap, [least, most]) = (self.jaw_gap(grip), self.stroke);
-        if grip.inside {
+        self.opened(self.jaw_gap(grip), grip.inside, opening)
+    }
+
+    /// [`Gripper::opened_gap`] of a grip with the pads `gap` apart \[m\].
+    pub fn opened(&self, gap: f64, inside: bool, opening: f64) -> f64 {
+        let [least, most] = self.stroke;
+        if inside {
             (gap - 2.0 * opening).max(least).min(gap)
         } else {
             (gap + 2.0 * opening).min(most).max(gap)

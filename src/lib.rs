@@ -109,6 +109,7 @@ pub mod rank;
 pub mod report;
 pub mod request;
 pub mod results;
+pub mod scene;
 pub(crate) mod svg;
 #[doc(hidden)] // for the program
 pub mod text;

@@ -113,6 +113,10 @@ pub struct Candidates {
     /// Boxes that the gripper must not enter.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub keep_out: Vec<Region>,
+    /// Scene file: what stands around the part, in its frame or the world's, and what the robot can
+    /// do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scene: Option<PathBuf>,
     /// Only these planar faces may be touched, and those of `faces_in`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub faces: Option<Vec<u32>>,
@@ -260,6 +264,7 @@ impl Default for Candidates {
             approach: None,
             ground: None,
             keep_out: Vec::new(),
+            scene: None,
             faces: None,
             faces_in: Vec::new(),
             grips: Side::Outside,

@@ -19,7 +19,7 @@ use crate::choice::ChoiceArgs;
     after_help = "EXAMPLES:\n  gripfast export grips.json -o grips.csv\n  gripfast export grips.json -o grips.npz --top 1000\n  \
 gripfast export a.json b.json -o all.csv --holding --diverse --top 20\n  \
 gripfast export grips.json --format isaac_grasp -o grips.yaml --joint panda_finger_joint1:0.5 --origin 103.4mm\n  \
-gripfast export grips.json --format moveit -o - --origin flange\n\nFORMATS (docs/formats.md describes each field):\n  \
+gripfast export grips.json --format moveit -o -\n\nFORMATS (docs/formats.md describes each field):\n  \
 json, jsonl   native          csv, parquet  a table\n  isaac_grasp   YAML            graspgen      JSON\n  moveit        YAML            graspnet      .npz\n  acronym       HDF5            glb           part with grippers, to look at"
 )]
 pub(crate) struct Args {
@@ -39,9 +39,9 @@ pub(crate) struct Args {
     #[arg(long, value_name = "NAME")]
     convention: Option<String>,
     /// Origin of the tool frame: pads (midway between them), flange, tool, or a distance behind the
-    /// pads.
-    #[arg(long, value_name = "ORIGIN", default_value = "pads")]
-    origin: String,
+    /// pads. When not given: flange for moveit where the gripper states one, else pads.
+    #[arg(long, value_name = "ORIGIN")]
+    origin: Option<String>,
     #[command(flatten)]
     choice: ChoiceArgs,
     /// Distance of the pads before closing; as planned when not given.
@@ -125,7 +125,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
                 .map(|name| Convention::parse("--convention", name))
                 .transpose()?,
         )
-        .with_origin(Origin::parse("--origin", &args.origin)?)
+        .with_origin(
+            args.origin.as_deref().map(|text| Origin::parse("--origin", text)).transpose()?,
+        )
         .with_top((format == Format::Glb && args.choice.top.is_none()).then_some(GLB_TOP))
         .with_opening(args.opening.as_deref().map(|text| length("--opening", text)).transpose()?)
         .with_joints(if joints.is_empty() { vec![Joint::default()] } else { joints })
@@ -150,7 +152,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !to_stdout {
         let most = options.top.unwrap_or(usize::MAX);
         let count: usize = sets.iter().map(|set| set.grips.len().min(most)).sum();
-        crate::terminal::say(&format!("{}: {count} grips", args.output.display()));
+        let frame = match sets.first() {
+            Some(set) => export::tool_frame(set, format, &options)?,
+            None => None,
+        };
+        let frame = frame.map_or("grip frames".to_owned(), |frame| format!("tool frame {frame}"));
+        crate::terminal::say(&format!("{}: {count} grips, {frame}", args.output.display()));
     }
     Ok(ExitCode::SUCCESS)
 }

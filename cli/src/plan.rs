@@ -12,6 +12,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use gripfast::error::Error;
+use gripfast::export::{self, Format};
 use gripfast::plan::{Ahead, Observer, Outcome, Plan};
 
 use super::why;
@@ -132,7 +133,11 @@ fn notes(plan: &Plan, outcome: &Outcome) {
         terminal::say(&format!("wrote {file}: the same command with --resume resumes the run"));
     }
     for path in &outcome.written {
-        terminal::say(&format!("wrote {}", path.display()));
+        let frame = Format::from_path(path)
+            .and_then(|format| export::tool_frame(&outcome.set, format, &Default::default()));
+        let frame =
+            frame.ok().flatten().map_or(String::new(), |frame| format!(", tool frame {frame}"));
+        terminal::say(&format!("wrote {}{frame}", path.display()));
     }
 }
 

@@ -46,7 +46,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == set.part.unit_m);
     let mut part = Part::read(&path, &ReadOptions::default().with_unit(unit))?;
     part.set_centre_of_mass(set.part.mass.centre_of_mass);
-    let options = ProposeOptions::from(&set.provenance.request.candidates);
+    let options = ProposeOptions::read(&set.provenance.request.candidates)?;
     let proposer = Proposer::new(&part, &gripper, &options)?;
     let explanation = proposer.explain_pose(
         ranked.grip.face_i,

@@ -63,6 +63,11 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
         api_scores.iter().map(|value| value.to_le_bytes()),
     )?;
     array(&mut archive, "ids", "<u8", &[grips.len()], ids.iter().map(|value| value.to_le_bytes()))?;
+    // A NumPy text: four bytes for each character.
+    let frame = view.tool_frame();
+    let kind = format!("<U{}", frame.chars().count());
+    let letters = frame.chars().map(|letter| u32::from(letter).to_le_bytes());
+    array(&mut archive, "tool_frame", &kind, &[], letters)?;
     writer.write_all(archive.finish().map_err(std::io::Error::other)?.get_ref())
 }
 
@@ -73,7 +78,7 @@ fn array<W: Write + Seek>(
     name: &str,
     kind: &str,
     shape: &[usize],
-    data: impl Iterator<Item = [u8; 8]>,
+    data: impl Iterator<Item = impl AsRef<[u8]>>,
 ) -> std::io::Result<()> {
     let options = SimpleFileOptions::default()
         .compression_method(zip::CompressionMethod::Stored)
@@ -89,7 +94,7 @@ fn array<W: Write + Seek>(
         .write_all(&u16::try_from(header.len()).map_err(std::io::Error::other)?.to_le_bytes())?;
     archive.write_all(header.as_bytes())?;
     for value in data {
-        archive.write_all(&value)?;
+        archive.write_all(value.as_ref())?;
     }
     Ok(())
 }

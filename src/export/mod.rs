@@ -129,6 +129,17 @@ impl Format {
             _ => Convention::Standard,
         }
     }
+
+    /// Origin of the tool frame that readers of this format expect: the flange where they mount the
+    /// gripper on it and the gripper states one, else midway between the pads.
+    pub fn origin(self, gripper: Option<&Gripper>) -> Origin {
+        match self {
+            Self::MoveIt if gripper.is_some_and(|gripper| gripper.grip_from_flange.is_some()) => {
+                Origin::Stated(Stated::Flange)
+            }
+            _ => Origin::Pads,
+        }
+    }
 }
 
 /// How to export.
@@ -137,8 +148,8 @@ impl Format {
 pub struct Options {
     /// Axes of the tool frame; the format's own when absent.
     pub convention: Option<Convention>,
-    /// Origin of the tool frame.
-    pub origin: Origin,
+    /// Origin of the tool frame; the format's own ([`Format::origin`]) when absent.
+    pub origin: Option<Origin>,
     /// Writes only this many, best first.
     pub top: Option<usize>,
     /// Distance of the opened pads \[m\]; as planned, or as far as the stroke allows, when absent.
@@ -159,7 +170,7 @@ pub struct Options {
 
 setters!(Options {
     with_convention: convention: Option<Convention>,
-    with_origin: origin: Origin,
+    with_origin: origin: Option<Origin>,
     with_top: top: Option<usize>,
     with_opening: opening: Option<f64>,
     with_joints: joints: Vec<Joint>,
@@ -174,7 +185,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             convention: None,
-            origin: Origin::Pads,
+            origin: None,
             top: None,
             opening: None,
             joints: vec![Joint::default()],
@@ -194,14 +205,15 @@ struct View<'a> {
     options: &'a Options,
     grip_from_tool: Frame,
     convention: Convention,
+    origin: Origin,
 }
 
 impl<'a> View<'a> {
     fn new(set: &'a GripSet, format: Format, options: &'a Options) -> Result<Self> {
         let convention = options.convention.unwrap_or_else(|| format.convention());
         let gripper = serde_json::from_value::<Gripper>(set.gripper.clone());
-        let grip_from_tool =
-            tool::grip_from_tool(convention, options.origin, gripper.as_ref().ok())?;
+        let origin = options.origin.unwrap_or_else(|| format.origin(gripper.as_ref().ok()));
+        let grip_from_tool = tool::grip_from_tool(convention, origin, gripper.as_ref().ok())?;
         // What the format cannot do without.
         if matches!(format, Format::GraspNet | Format::Glb)
             && let Err(error) = &gripper
@@ -224,7 +236,7 @@ impl<'a> View<'a> {
                 "state motion with its joint in the gripper file and plan again, or give scale and offset",
             ));
         }
-        Ok(Self { set, gripper, options, grip_from_tool, convention })
+        Ok(Self { set, gripper, options, grip_from_tool, convention, origin })
     }
 
     fn grips(&self) -> &'a [RankedGrip] {
@@ -234,7 +246,7 @@ impl<'a> View<'a> {
 
     /// The tool frame in the grip frame: what is fixed to the palm stands by how far the jaws close.
     fn grip_from_tool(&self, grip: &RankedGrip) -> Frame {
-        match (self.options.origin, &self.gripper) {
+        match (self.origin, &self.gripper) {
             (Origin::Stated(_), Some(gripper)) => {
                 gripper.palm_place(self.gap(grip)).compose(&self.grip_from_tool)
             }
@@ -321,7 +333,7 @@ impl<'a> View<'a> {
 
     /// The tool frame in words.
     fn tool_frame(&self) -> String {
-        format!("{}, origin {}", self.convention.axes(), self.options.origin)
+        format!("{}, origin {}", self.convention.axes(), self.origin)
     }
 }
 
@@ -439,6 +451,18 @@ fn write_table(
     match format {
         Format::Parquet => parquet::write(table, notes, writer),
         _ => table::write_csv(table, spreadsheet, writer),
+    }
+}
+
+/// The frame whose poses a file holds, in words; `None` for the native ones, which hold the grip
+/// frame.
+///
+/// # Errors
+/// As [`write()`], but for the file.
+pub fn tool_frame(set: &GripSet, format: Format, options: &Options) -> Result<Option<String>> {
+    match format {
+        Format::Json | Format::JsonLines => Ok(None),
+        _ => Ok(Some(View::new(set, format, options)?.tool_frame())),
     }
 }
 

@@ -121,7 +121,8 @@ impl PlanBuilder {
                 threads.current_num_threads()
             ));
         }
-        let propose = ProposeOptions::from(&request.candidates);
+        let propose = ProposeOptions::read(&request.candidates)
+            .map_err(|error| error.with_options(&["scene"]))?;
         Ok(Plan {
             request,
             part,

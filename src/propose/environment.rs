@@ -1,12 +1,14 @@
-//! What surrounds the part: the ground it stands on and boxes to stay out of.
+//! What surrounds the part: the ground it stands on, boxes to stay out of, and a scene.
 
 use glam::{DVec2, DVec3};
 
 use super::options::{Cone, Ground, ProposeOptions};
 use super::site::Site;
 use super::work;
-use crate::clash::Sweep;
+use crate::clash::{Cell, Course, Reason, Room, Sweep, Volumes};
+use crate::gripper::Gripper;
 use crate::model::Frame;
+use crate::scene::Scene;
 
 /// A line in a site's plane: the gripper is clear of something for all grip origins with
 /// `normal . place >= offset`.
@@ -22,11 +24,36 @@ pub(super) struct Border {
 const LEANING: f64 = 0.1;
 
 /// The surroundings, with unit vectors.
-#[derive(Debug, Clone)]
 pub(super) struct Environment {
     cone: Option<Cone>,
     ground: Option<Ground>,
     keep_out: Vec<[DVec3; 2]>,
+    scene: Option<Surroundings>,
+}
+
+/// A scene with the part at its place.
+struct Surroundings {
+    cell: Cell,
+    world_from_part: Frame,
+    /// Planes beyond which obstacles begin, part frame.
+    walls: Vec<(DVec3, f64)>,
+}
+
+impl Surroundings {
+    fn new(scene: &Scene) -> Self {
+        Self {
+            cell: Cell::new(scene),
+            world_from_part: scene.world_from_part,
+            walls: Cell::walls(scene),
+        }
+    }
+}
+
+/// How a gripper moves on to the grips of a site in a scene, and what it sweeps.
+pub(super) struct Way {
+    gap: f64,
+    /// Without one the stroke does not suffice.
+    course: Option<(Course, Volumes)>,
 }
 
 impl Environment {
@@ -37,7 +64,41 @@ impl Environment {
                 .ground
                 .map(|ground| Ground { normal: ground.normal.normalize(), ..ground }),
             keep_out: options.keep_out.clone(),
+            scene: options.scene.as_deref().map(Surroundings::new),
         }
+    }
+
+    /// The gripper's way to grips with the pads `gap` apart in the scene; `None` without one.
+    pub(super) fn way(
+        &self,
+        gripper: &Gripper,
+        gap: f64,
+        inside: bool,
+        opening: f64,
+    ) -> Option<Way> {
+        let course = self.scene.as_ref()?.cell.course(gripper, gap, inside, opening).ok();
+        let course = course.map(|course| (course, Volumes::new(gripper, &course)));
+        Some(Way { gap, course })
+    }
+
+    /// Why a pose is not free in the scene: the name of what stops it, and a sentence.
+    pub(super) fn stopped(
+        &self,
+        gripper: &Gripper,
+        way: &Way,
+        part_from_grip: &Frame,
+        room: &mut Room,
+    ) -> Option<(String, String)> {
+        let Surroundings { cell, world_from_part, .. } = self.scene.as_ref()?;
+        let world_from_grip = world_from_part.compose(part_from_grip);
+        let reason =
+            cell.beyond(gripper, way.gap, &world_from_grip).or_else(|| match &way.course {
+                None => Some(Reason::Stroke(way.gap)),
+                Some((course, volumes)) => {
+                    cell.meets(gripper, (course, volumes), world_from_part, part_from_grip, room)
+                }
+            })?;
+        Some((cell.stop(&reason).to_owned(), cell.describe(&reason, gripper)))
     }
 
     /// Whether nothing depends on the position.
@@ -67,7 +128,7 @@ impl Environment {
     }
 
     /// Where the sweeps of a gripper, given with its frames at the origin of a site, pass the ground
-    /// and the planes of the keep-out boxes' faces.
+    /// and the planes of the faces of keep-out boxes and of the scene's obstacles.
     pub(super) fn borders(
         &self,
         sweeps: &[Sweep],
@@ -93,7 +154,8 @@ impl Environment {
             (length > LEANING && offset.is_finite())
                 .then(|| Border { normal: along / length, offset: offset / length })
         };
-        ground.into_iter().chain(faces).filter_map(border).collect()
+        let walls = self.scene.iter().flat_map(|scene| scene.walls.iter().copied());
+        ground.into_iter().chain(faces).chain(walls).filter_map(border).collect()
     }
 
     /// The first sweep below the ground, for a grip origin at `origin`.

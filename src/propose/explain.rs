@@ -187,6 +187,7 @@ impl Proposer<'_> {
         self.explain_environment(&prepared, &frame, turned, &mut verdict);
         self.explain_interference(&prepared, position, angle, turned, &frame, &mut verdict);
         frame.rotation *= jaws.turn();
+        self.explain_scene(&prepared, &frame, &mut verdict);
         let Verdict { checks, rejection, place } = verdict;
         Ok(Explanation {
             site,
@@ -340,6 +341,18 @@ impl Proposer<'_> {
                 work::reason(sweep)
             });
         }
+    }
+}
+
+impl Proposer<'_> {
+    fn explain_scene(&self, prepared: &Prepared<'_>, frame: &Frame, verdict: &mut Verdict) {
+        let Some(way) = &prepared.way else { return };
+        let stopped =
+            self.environment.stopped(self.gripper, way, frame, &mut crate::clash::Room::default());
+        let detail = stopped.as_ref().map_or("free".to_owned(), |(_, text)| text.clone());
+        verdict.add("scene", stopped.is_none(), detail, || Rejection::Scene {
+            name: stopped.as_ref().map_or(String::new(), |(name, _)| name.clone()),
+        });
     }
 }
 

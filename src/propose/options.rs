@@ -1,11 +1,14 @@
 //! What to propose, and the reasons for which a candidate falls.
 
+use std::sync::Arc;
+
 use glam::DVec3;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::error::{Error, Result};
 use crate::gripper::Gripper;
 use crate::request::{Candidates, Region, Side};
+use crate::scene::Scene;
 
 pub use crate::request::{Cone, Ground};
 
@@ -61,6 +64,9 @@ pub struct ProposeOptions {
     /// Length of the straight approach that must be clear of ground and keep-out boxes \[m\]; of the
     /// part it must be clear all the way.
     pub approach: f64,
+    /// What else the gripper must be free of, and where the robot can go.
+    #[serde(serialize_with = "checksum")]
+    pub scene: Option<Arc<Scene>>,
     /// Candidates per chunk, about.
     pub chunk: usize,
 }
@@ -84,8 +90,28 @@ setters!(ProposeOptions {
     with_min_opening: min_opening: f64,
     with_clearance: clearance: f64,
     with_approach: approach: f64,
+    with_scene: scene: Option<Arc<Scene>>,
     with_chunk: chunk: usize,
 });
+
+/// A scene's meshes are too long to be written down.
+fn checksum<S: Serializer>(
+    scene: &Option<Arc<Scene>>,
+    to: S,
+) -> std::result::Result<S::Ok, S::Error> {
+    scene.as_ref().map(|scene| scene.checksum()).serialize(to)
+}
+
+impl ProposeOptions {
+    /// Those of a request, with the scene that it names.
+    ///
+    /// # Errors
+    /// As [`Scene::read`].
+    pub fn read(candidates: &Candidates) -> Result<Self> {
+        let scene = candidates.scene.as_deref().map(Scene::read).transpose()?;
+        Ok(Self { scene: scene.map(Arc::new), ..Self::from(candidates) })
+    }
+}
 
 impl Default for ProposeOptions {
     /// Those of a request that says nothing.
@@ -95,6 +121,7 @@ impl Default for ProposeOptions {
 }
 
 impl From<&Candidates> for ProposeOptions {
+    /// Without the scene's file: see [`ProposeOptions::read`].
     fn from(candidates: &Candidates) -> Self {
         let corners = |regions: &[Region]| {
             regions.iter().map(|region| [region.low, region.high]).collect::<Vec<_>>()
@@ -118,6 +145,7 @@ impl From<&Candidates> for ProposeOptions {
             min_opening: candidates.min_opening.0,
             clearance: candidates.clearance.0,
             approach: candidates.approach_distance.0,
+            scene: None,
             chunk: 65_536,
         }
     }
@@ -240,6 +268,11 @@ pub enum Rejection {
         /// Its name.
         body: String,
     },
+    /// The scene is in the way.
+    Scene {
+        /// Name of the obstacle, or of the robot's limit.
+        name: String,
+    },
 }
 
 impl Rejection {
@@ -259,6 +292,7 @@ impl Rejection {
             Self::KeepOut { body } => with("keep_out", body),
             Self::PartInterference { body } => with("part_interference", body),
             Self::ApproachBlocked { body } => with("approach_blocked", body),
+            Self::Scene { name } => with("scene", name),
         }
     }
 }

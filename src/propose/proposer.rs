@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 pub use progress::Progress;
 
-use super::environment::Environment;
+use super::environment::{Environment, Way};
 use super::options::{ProposeOptions, Rejection};
 use super::patch::PatchIndex;
 use super::site::{self, Places, Site};
@@ -20,7 +20,7 @@ use crate::clash::{Sweep, Topology, Tree, sweeps};
 use crate::error::{Error, Result};
 use crate::gripper::{Gripper, Jaw, Jaws};
 use crate::model::{Contact, Grip, Polygon};
-use crate::part::{FacePair, Part};
+use crate::part::{FacePair, PairKind, Part};
 
 /// Positions per work item: large enough to share what an angle determines, small enough to spread
 /// over the threads. Fixed, because contacts are shared within an item: results must not depend on
@@ -172,6 +172,8 @@ pub(super) struct Prepared<'a> {
     pub(super) sweeps: Vec<Vec<Sweep>>,
     /// Against ground and keep-out boxes.
     pub(super) outer_sweeps: Vec<Vec<Sweep>>,
+    /// Through the scene, where there is one.
+    pub(super) way: Option<Way>,
 }
 
 impl<'a> Proposer<'a> {
@@ -289,6 +291,12 @@ impl<'a> Proposer<'a> {
             patches: site.patches(self.part, &axes, reach),
             sweeps: each(clear),
             outer_sweeps: each(self.options.approach),
+            way: self.environment.way(
+                self.gripper,
+                site.gap(self.gripper),
+                site.kind == PairKind::Internal,
+                self.options.opening,
+            ),
         }
     }
 

@@ -377,7 +377,7 @@ impl Site {
     }
 
     /// Distance of the pads in its grips \[m\].
-    fn gap(&self, gripper: &Gripper) -> f64 {
+    pub(super) fn gap(&self, gripper: &Gripper) -> f64 {
         match self.kind {
             PairKind::External => self.width,
             PairKind::Internal => self.width - 2.0 * gripper.outer_pad.unwrap_or(0.0),

@@ -10,7 +10,7 @@ use super::options::Rejection;
 use super::patch::{PatchIndex, Scratch, Touch, TurnedPad};
 use super::proposer::{Item, Prepared, Proposer};
 use super::site::Site;
-use crate::clash::{Phase, Sweep, Tree};
+use crate::clash::{Phase, Room, Sweep, Tree};
 use crate::geometry::{clip_ring_convex, polygon, ring_area};
 use crate::gripper::{Jaws, half_turn, rectangle};
 use crate::model::{Contact, Frame, Grip, Patch, Polygon, Ring};
@@ -261,6 +261,39 @@ impl Proposer<'_> {
             reject(reason(sweep), lost);
         }
         buffers.alive.sort_unstable();
+        self.leave_free_in_scene(item, prepared, jaws, buffers, outcome);
+    }
+
+    /// Leaves in `buffers.alive` what is free in the scene too.
+    fn leave_free_in_scene(
+        &self,
+        item: &Item,
+        prepared: &Prepared<'_>,
+        jaws: Jaws,
+        buffers: &mut Buffers,
+        outcome: &mut Outcome,
+    ) {
+        let Some(way) = &prepared.way else { return };
+        let site = prepared.site;
+        let angle = site.angles[item.angle];
+        let positions = &site.places(item.places, item.angle)[item.positions.clone()];
+        // What it remembers of the last collision decides which of several is named: it stays
+        // within the item, so that reasons do not depend on the number of threads.
+        let mut room = Room::default();
+        let mut lost: std::collections::BTreeMap<String, u64> = Default::default();
+        buffers.alive.retain(|&index| {
+            let mut pose = frame(site, positions[index as usize], angle);
+            pose.rotation *= jaws.turn();
+            match self.environment.stopped(self.gripper, way, &pose, &mut room) {
+                None => true,
+                Some((name, _)) => {
+                    *lost.entry(name).or_default() += 1;
+                    false
+                }
+            }
+        });
+        let rejections = lost.into_iter().map(|(name, count)| (Rejection::Scene { name }, count));
+        outcome.rejections.extend(rejections);
     }
 
     /// Smallest contact areas at a site [m^2] by `min_contact` and by `min_pad_share`; reached up to

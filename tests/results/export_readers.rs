@@ -162,10 +162,10 @@ fn the_comparison_sees_one_changed_number() {
 /// The tool frame, axis by axis: x1 (column 0) approaches, x3 (column 2) closes.
 fn expected(grip: DMat3, origin: DVec3, options: &Options, format: Format) -> (DMat3, DVec3) {
     let (approach, closing) = (grip.col(0), grip.col(2));
-    let behind = match options.origin {
-        Origin::Pads => 0.0,
-        Origin::Behind(distance) => distance,
-        Origin::Stated(_) => 0.1,
+    let behind = match (options.origin, format) {
+        (Some(Origin::Behind(distance)), _) => distance,
+        (Some(Origin::Stated(_)), _) | (None, Format::MoveIt) => 0.1,
+        (Some(Origin::Pads), _) | (None, _) => 0.0,
     };
     let rotation = match (format, options.convention) {
         (Format::Json | Format::JsonLines, _) => return (grip, origin),
@@ -234,7 +234,7 @@ fn csv() {
 #[test]
 fn parquet() {
     let set = grips::grip_set(5);
-    let options = Options::default().with_origin(Origin::Behind(0.05));
+    let options = Options::default().with_origin(Some(Origin::Behind(0.05)));
     let Some(found) = round_trip(
         &set,
         Format::Parquet,
@@ -266,7 +266,7 @@ fn isaac_grasp() {
     let set = grips::grip_set(5);
     let options = Options::default()
         .with_joints(vec![Joint { name: "joint: \"1\"".into(), ..Joint::default() }])
-        .with_origin(Origin::Stated(Stated::Flange));
+        .with_origin(Some(Origin::Stated(Stated::Flange)));
     let Some(found) = round_trip(
         &set,
         Format::IsaacGrasp,
@@ -349,6 +349,8 @@ fn graspnet() {
         assert_eq!(numbers(&found["height"]), vec![0.01; 5]);
         assert_eq!(numbers(&found["depth"]), vec![0.01; 5]);
         assert_eq!(numbers(&found["object"]), vec![-1.0; 5]);
+        let axes = convention.unwrap_or(Convention::GraspNet).axes();
+        assert_eq!(found["frame"], format!("{axes}, origin midway between the pads"));
         assert!((found["api"][0].as_f64().unwrap() - 1.05).abs() < 1e-15);
         round_trip(
             &grips::grip_set(0),

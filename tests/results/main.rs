@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod architecture;
+mod export_frames;
 mod export_native;
 mod export_readers;
 mod load_cases;
@@ -10,6 +11,7 @@ mod load_files;
 mod pick_rank;
 mod pick_scene;
 mod plan_library;
+mod plan_scene;
 mod report_browser;
 #[path = "../support/mod.rs"]
 mod support;

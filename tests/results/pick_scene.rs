@@ -6,7 +6,7 @@ use glam::{DMat3, DQuat, DVec3};
 use gripfast::gripper::{Body, Gripper, Jaw, Shape};
 use gripfast::model::Frame;
 use gripfast::part::Mesh;
-use gripfast::pick::{Obstacle, Phase, Picker, Reach, Reason, Retreat, Scene, Solid};
+use gripfast::pick::{Obstacle, Phase, Picker, Reach, Reason, Reference, Retreat, Scene, Solid};
 use gripfast::results::{GripSet, RankedGrip};
 use parry3d_f64::math::Pose;
 use parry3d_f64::query;
@@ -32,6 +32,7 @@ fn boxed(name: &str, half: DVec3, origin: DVec3) -> Obstacle {
     Obstacle {
         name: name.into(),
         solid: Solid::Box { half },
+        frame: Reference::World,
         world_from_obstacle: Frame { rotation: DMat3::IDENTITY, origin },
     }
 }
@@ -58,6 +59,7 @@ fn meshed(name: &str, half: DVec3, world_from_obstacle: Frame) -> Obstacle {
     Obstacle {
         name: name.into(),
         solid: Solid::Mesh { mesh: box_mesh(half), closed: true },
+        frame: Reference::World,
         world_from_obstacle,
     }
 }
@@ -178,6 +180,7 @@ fn a_table_is_a_half_space() {
         obstacles: vec![Obstacle {
             name: "table".into(),
             solid: Solid::HalfSpace,
+            frame: Reference::World,
             world_from_obstacle: Frame {
                 rotation: DMat3::from_rotation_x(tilt),
                 origin: DVec3::new(0.3, 0.0, height),
@@ -357,7 +360,7 @@ proptest! {
             obstacles: obstacles.iter().enumerate().map(|(index, (frame, half, mesh))| {
                 let half = DVec3::from_array(*half);
                 let solid = if *mesh { Solid::Mesh { mesh: box_mesh(half), closed: true } } else { Solid::Box { half } };
-                Obstacle { name: format!("o{index}"), solid, world_from_obstacle: *frame }
+                Obstacle { name: format!("o{index}"), solid, frame: Reference::World, world_from_obstacle: *frame }
             }).collect(),
             ..Scene::default()
         };
@@ -503,6 +506,7 @@ fn verdicts_on_random_meshes_agree_with_all_triangles_and_with_single_checks() {
         let obstacles = meshes.iter().enumerate().map(|(index, mesh)| Obstacle {
             name: format!("o{index}"),
             solid: Solid::Mesh { mesh: mesh.clone(), closed: false },
+            frame: Reference::World,
             world_from_obstacle: placed(index),
         });
         let scene = Scene { obstacles: obstacles.collect(), ..Scene::default() };
@@ -656,6 +660,7 @@ fn a_large_mesh_agrees_with_brute_force_and_with_any_number_of_threads() {
         obstacles: vec![Obstacle {
             name: "bin".into(),
             solid: Solid::Mesh { mesh: mesh.clone(), closed: false },
+            frame: Reference::World,
             world_from_obstacle: Frame::IDENTITY,
         }],
         ..Scene::default()

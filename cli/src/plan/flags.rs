@@ -117,6 +117,10 @@ struct CandidateArgs {
     /// may be repeated.
     #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
     keep_out: Vec<Region>,
+    /// Scene file: obstacles in the world's or the part's frame, the part's pose, limits of the
+    /// robot; the one that `gripfast pick` reads.
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
     /// Only these planar faces, e.g. 0,1,4 (see `gripfast part`).
     #[arg(long, value_delimiter = ',', value_name = "FACES")]
     faces: Option<Vec<u32>>,
@@ -316,7 +320,7 @@ impl Args {
         let (flags, group) = (self.candidates, &mut request.candidates);
         give!(flags => group;
             spacing, angle_step, edge_angles, min_contact, min_pad_share, max_offset, approach,
-            ground, faces, grips, flips, opening, min_opening, clearance, approach_distance);
+            ground, scene, faces, grips, flips, opening, min_opening, clearance, approach_distance);
         for (given, regions) in
             [(flags.keep_out, &mut group.keep_out), (flags.faces_in, &mut group.faces_in)]
         {
@@ -395,7 +399,7 @@ mod tests {
     const LINE: &str = "gripfast plan part.stl --gripper my.toml --mass 350g --force 40N --unit in --max-memory 2GB --outside-buffers \
         --accel 2g --loads gravity,ball:3 --spacing 2mm --angle-step 7deg --edge-angles false \
         --min-contact 0.3 --min-pad-share 0.1 --max-offset 9mm --approach -z:45deg --ground +z:1mm \
-        --keep-out 0mm,0mm,0mm:1mm,1mm,1mm --faces 0,2 --faces-in 0mm,0mm,0mm:1mm,1mm,1mm \
+        --keep-out 0mm,0mm,0mm:1mm,1mm,1mm --scene cell.toml --faces 0,2 --faces-in 0mm,0mm,0mm:1mm,1mm,1mm \
         --grips both --flips --opening 4mm --min-opening 1mm --clearance 1mm \
         --approach-distance 80mm --backend cpu --adapter 0 --seeds 200 --k1 2 --k2 3 \
         --pad-friction 0.7 --safety 2 --com 1mm,2mm,3mm \

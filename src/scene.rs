@@ -1,14 +1,17 @@
 //! The scene file: where the part lies, what stands around it, and what the robot can do. TOML with
-//! units.
+//! units. Planning and picking read the same one.
 
+use std::fmt::Write;
 use std::path::Path;
 
+use flate2::Crc;
 use glam::{DMat3, DQuat, DVec3};
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
 use crate::model::Frame;
 use crate::part::{Mesh, Part, ReadOptions, Unit};
+use crate::request::Candidates;
 use crate::units::Quantity;
 
 /// A scene in SI units, in the world frame.
@@ -39,8 +42,21 @@ pub struct Obstacle {
     pub name: String,
     /// Its shape, in its own frame.
     pub solid: Solid,
-    /// Its pose.
+    /// Its pose in the frame that `frame` names.
     pub world_from_obstacle: Frame,
+    /// Whether it stands in the world, or goes with the part.
+    pub frame: Reference,
+}
+
+/// The frame that an obstacle keeps to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Reference {
+    /// It stands in the world.
+    #[default]
+    World,
+    /// It goes with the part, as its fixture or packaging does.
+    Part,
 }
 
 /// Shapes of obstacles.
@@ -100,8 +116,8 @@ impl Default for Scene {
             world_from_part: Frame::IDENTITY,
             obstacles: Vec::new(),
             opening: Opening::Planned,
-            approach: crate::propose::ProposeOptions::default().approach,
-            retreat: Retreat::Back(crate::propose::ProposeOptions::default().approach),
+            approach: Candidates::default().approach_distance.0,
+            retreat: Retreat::Back(Candidates::default().approach_distance.0),
             cone: None,
             reach: None,
             clearance: 0.0,
@@ -158,6 +174,8 @@ struct RobotTable {
 #[serde(deny_unknown_fields)]
 struct ObstacleTable {
     name: Option<String>,
+    #[serde(default)]
+    frame: Reference,
     mesh: Option<String>,
     unit: Option<String>,
     #[serde(rename = "box")]
@@ -170,6 +188,21 @@ struct ObstacleTable {
 }
 
 impl Scene {
+    /// All that it holds, meshes too, as a checksum.
+    pub(crate) fn checksum(&self) -> String {
+        struct Sum(Crc);
+        impl std::fmt::Write for Sum {
+            fn write_str(&mut self, text: &str) -> std::fmt::Result {
+                self.0.update(text.as_bytes());
+                Ok(())
+            }
+        }
+        let mut sum = Sum(Crc::new());
+        // Numbers are written so that they read back as the same.
+        let _ = write!(sum, "{self:?}");
+        format!("{} obstacles, checksum {:08x}", self.obstacles.len(), sum.0.sum())
+    }
+
     /// Reads a scene file and the meshes that it names, which are sought beside it.
     ///
     /// # Errors
@@ -315,7 +348,7 @@ fn obstacle(place: &str, index: usize, table: &ObstacleTable, folder: &Path) -> 
     if table.unit.is_some() && table.mesh.is_none() {
         return Err(Error::input(place, "unit is for meshes only", "leave it out"));
     }
-    Ok(Obstacle { name, solid, world_from_obstacle })
+    Ok(Obstacle { name, solid, world_from_obstacle, frame: table.frame })
 }
 
 fn pose(
