@@ -104,6 +104,7 @@ pub mod model;
 pub mod part;
 pub mod pick;
 pub mod plan;
+pub mod poses;
 pub mod propose;
 pub mod rank;
 pub mod report;

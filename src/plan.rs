@@ -30,6 +30,7 @@ mod collect;
 mod limits;
 pub mod noise;
 mod output;
+mod outside;
 mod prepare;
 mod search;
 
@@ -40,7 +41,7 @@ use glam::{DVec2, DVec3};
 use rayon::ThreadPool;
 
 use crate::backend::{Backend, SeedSet, select};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::export::Format;
 use crate::file::Lock;
 use crate::gripper::{Gripper, Jaws};
@@ -61,6 +62,7 @@ pub use assess::{Assessor, Settings};
 pub use collect::{Collector, OUTRANKED};
 pub use limits::Limits;
 pub use output::{GLB_TOP, WHOLE, solve_every_load};
+pub use outside::{Assessed, Assessment, Standing};
 pub use prepare::PlanBuilder;
 
 /// The main job, ready to run.
@@ -193,6 +195,29 @@ impl Plan {
                 position,
                 angle,
                 Jaws::Straight,
+            )
+        })
+    }
+
+    /// The number of a face pair in the plan, given by the numbers of its faces: with several
+    /// stretches, that of the largest.
+    ///
+    /// # Errors
+    /// When the gripper cannot grip these faces, and as [`Proposer::new`].
+    pub fn site_of(&self, face_i: u32, face_ii: u32) -> Result<usize> {
+        let proposer = Proposer::new(&self.part, &self.gripper, &self.propose)?;
+        let sites = proposer.sites();
+        let holds = |site: &crate::propose::SiteInfo| {
+            let has = |faces: [u32; 2]| {
+                site.faces_i.contains(&faces[0]) && site.faces_ii.contains(&faces[1])
+            };
+            has([face_i, face_ii]) || has([face_ii, face_i])
+        };
+        sites.iter().position(holds).ok_or_else(|| {
+            Error::input(
+                format!("faces {face_i} and {face_ii}"),
+                "are no pair that this gripper can grip on this part",
+                "see the pairs and widths that `gripfast part` lists, and the gripper's stroke",
             )
         })
     }

@@ -13,6 +13,7 @@ macro_rules! words {
     };
 }
 
+mod assess;
 mod backend;
 mod bench;
 mod choice;
@@ -54,6 +55,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Plan(Box<plan::Args>),
+    Assess(Box<assess::Args>),
     Part(part::Args),
     Solve(solve::Args),
     Why(why::Args),
@@ -142,6 +144,7 @@ fn run() -> ExitCode {
             .and_then(|line| match parse(line).command {
                 Command::Part(args) => part::run(args),
                 Command::Plan(args) => plan::run(*args),
+                Command::Assess(args) => assess::run(*args),
                 Command::Solve(args) => solve::run(args),
                 Command::Why(args) => why::run(args),
                 Command::Score(args) => score::run(args),

@@ -7,7 +7,8 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Args as ClapArgs;
-use gripfast::export::{Convention, Origin, grip_from_tool};
+use gripfast::export::{Convention, Origin, tool_in_grip};
+use gripfast::model::Frame;
 use gripfast::pick::{Picker, Scene};
 use gripfast::results::{GripSet, quaternion_xyzw};
 use serde_json::json;
@@ -57,7 +58,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let picker = Picker::new(&set, &scene)?.allow_slip(args.allow_slip);
     let warnings = &set.provenance.warnings;
     warnings.iter().for_each(|text| say(&format!("warning: {}", warning(text))));
-    let grip_from_tool = grip_from_tool(convention, origin, Some(picker.gripper()))?;
+    // Refused before the search where the gripper does not state the frame.
+    tool_in_grip(convention, origin, Some(picker.gripper()), 0.0)?;
     let started = Instant::now();
     let pick = picker.pick(&scene.world_from_part);
     let seconds = started.elapsed().as_secs_f64();
@@ -67,16 +69,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         *counts.entry(picker.category(reason)).or_default() += 1;
     }
     let chosen = pick.chosen.map(|index| &set.grips[index]);
-    let pose = chosen.map(|grip| {
-        let tool = match origin {
-            Origin::Stated(_) => {
-                let gap = picker.gripper().jaw_gap(&grip.grip);
-                picker.gripper().palm_place(gap).compose(&grip_from_tool)
-            }
-            _ => grip_from_tool,
-        };
-        scene.world_from_part.compose(&grip.grip.part_from_grip).compose(&tool)
+    let pose = chosen.map(|grip| -> anyhow::Result<Frame> {
+        let gap = picker.gripper().jaw_gap(&grip.grip);
+        let tool = tool_in_grip(convention, origin, Some(picker.gripper()), gap)?;
+        Ok(scene.world_from_part.compose(&grip.grip.part_from_grip).compose(&tool))
     });
+    let pose = pose.transpose()?;
     let tool_frame = format!("{}, origin {origin}", convention.axes());
     let mut out = crate::terminal::answer(args.json);
     if args.json {

@@ -101,10 +101,23 @@ fn agreed(ahead: &Ahead) -> anyhow::Result<bool> {
 
 /// Why the pose of `--why` is a grip, or is not.
 fn explain(plan: &Plan, text: &str) -> anyhow::Result<ExitCode> {
-    let (position, angle, site) = why::pose(text)?;
-    let explanation = plan.explain(site, position, angle)?;
-    why::print(&mut terminal::output(), &explanation)?;
-    Ok(if explanation.rejection.is_none() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+    /// What closing jaws right of a pose in part coordinates: as `assess` has it.
+    const TILT: f64 = 3.0;
+    let pose = match why::pose(text)? {
+        why::Asked::OnPart(pose) => pose,
+        why::Asked::OnFaces { position, angle, pair } => {
+            let (face_i, face_ii) = pair.faces(plan.part())?;
+            let explanation = plan.explain(plan.site_of(face_i, face_ii)?, position, angle)?;
+            if explanation.rejection.is_some() {
+                why::print(&mut terminal::output(), &explanation)?;
+                return Ok(ExitCode::from(1));
+            }
+            explanation.part_from_grip
+        }
+    };
+    let (assessed, standing) = plan.place(&pose, TILT.to_radians())?;
+    why::print_standing(&mut terminal::output(), &assessed, standing)?;
+    Ok(if assessed.is_free() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
 fn print_answer(plan: &Plan, outcome: &Outcome) -> anyhow::Result<()> {

@@ -5,10 +5,15 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args as ClapArgs;
+use glam::{DMat3, DVec3};
 use gripfast::error::{Error, Result};
+use gripfast::export::Convention;
 use gripfast::gripper::Gripper;
+use gripfast::model::Frame;
 use gripfast::part::{Part, ReadOptions, Unit};
-use gripfast::propose::{Explanation, ProposeOptions, Proposer};
+use gripfast::plan::{Assessed, Standing};
+use gripfast::propose::{Explanation, Misfit, ProposeOptions, Proposer};
+use gripfast::request::Cone;
 use gripfast::results::{ForceRange, GripSet, RankedGrip};
 use gripfast::units::Quantity;
 
@@ -17,7 +22,7 @@ use gripfast::units::Quantity;
 #[derive(Debug, ClapArgs)]
 #[command(
     after_help = "EXAMPLES:\n  gripfast why grips.json 962\n  gripfast why grips.json 962 --part bracket.stl\n\n\
-For a pose that is not in the list use `gripfast plan .. --why X,Y,ANGLE,SITE`."
+For a pose that is not in the list use `gripfast plan .. --why X,Y,Z:APPROACH:CLOSING`."
 )]
 pub(crate) struct Args {
     /// Result file of `gripfast plan`.
@@ -141,22 +146,108 @@ fn limits(out: &mut impl Write, ranked: &RankedGrip, set: &GripSet) -> std::io::
     Ok(())
 }
 
-/// The pose of `plan --why X,Y,ANGLE,SITE`, e.g. `3mm,-2mm,30deg,0`.
-pub(crate) fn pose(text: &str) -> Result<(glam::DVec2, f64, usize)> {
+/// The pose that `plan --why` asks about.
+pub(crate) enum Asked {
+    /// Position and angle in the plane of a face pair.
+    OnFaces {
+        /// In the pair's plane \[m\].
+        position: glam::DVec2,
+        /// Approach angle \[rad\].
+        angle: f64,
+        /// The pair.
+        pair: Pair,
+    },
+    /// The grip frame in the part frame.
+    OnPart(Frame),
+}
+
+/// A face pair by its place in the list of `gripfast part`, or by the numbers of its faces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Pair {
+    Number(usize),
+    Faces(u32, u32),
+}
+
+impl Pair {
+    /// The numbers of its faces.
+    pub(crate) fn faces(self, part: &Part) -> Result<(u32, u32)> {
+        let number = match self {
+            Self::Faces(one, other) => return Ok((one, other)),
+            Self::Number(number) => number,
+        };
+        let mut pairs = part.pairs(0.0, f64::INFINITY);
+        pairs.extend(part.internal_pairs(0.0, f64::INFINITY));
+        let pair = pairs.get(number).ok_or_else(|| {
+            Error::input(
+                "--why",
+                format!("there is no pair {number}, the part has {}", pairs.len()),
+                "count from 0 in the list of `gripfast part --internal`, or name the faces, e.g. 2|3",
+            )
+        })?;
+        Ok((pair.face_i, pair.face_ii))
+    }
+}
+
+/// The pose of `plan --why`: `3mm,-2mm,30deg,0` (X,Y,ANGLE,PAIR), `30mm,20mm,18mm:-z:+x` (place of
+/// the grip's middle, approach and closing direction in the part frame) or
+/// `30mm,20mm,18mm,0,0.7071,0,0.7071` (place and quaternion of the tool frame).
+pub(crate) fn pose(text: &str) -> Result<Asked> {
     let flag = "--why";
-    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
-    let [x, y, angle, site] = parts[..] else {
-        return Err(Error::input(
-            flag,
-            format!("'{text}' is not four values"),
-            "give X,Y,ANGLE,SITE, e.g. 3mm,-2mm,30deg,0 (position and angle in the plane of the face pair)",
-        ));
-    };
-    let site = site.parse().map_err(|_| {
-        Error::input(flag, format!("'{site}' is no site number"), "count sites (face pairs) from 0")
-    })?;
+    let remedy = "give X,Y,ANGLE,PAIR, e.g. 3mm,-2mm,30deg,0 (place and angle in the plane of a pair \
+                  of `gripfast part`, or of faces: 2|3); or in part coordinates X,Y,Z:APPROACH:CLOSING, \
+                  e.g. 30mm,20mm,18mm:-z:+x, or X,Y,Z,QX,QY,QZ,QW (tool frame with z approach, y closing)";
+    let wrong = || Error::input(flag, format!("'{text}' is no pose"), remedy);
     let length = |text: &str| Quantity::Length.parse(flag, text);
-    Ok((glam::DVec2::new(length(x)?, length(y)?), Quantity::Angle.parse(flag, angle)?, site))
+    let place = |texts: &[&str]| -> Result<DVec3> {
+        let [x, y, z] = texts else { return Err(wrong()) };
+        Ok(DVec3::new(length(x)?, length(y)?, length(z)?))
+    };
+    let split = |text: &'_ str| -> Vec<String> {
+        text.split(',').map(|piece| piece.trim().to_owned()).collect()
+    };
+    if let [origin, approach, closing] = text.split(':').collect::<Vec<_>>()[..] {
+        let origin = split(origin);
+        let origin = place(&origin.iter().map(String::as_str).collect::<Vec<_>>())?;
+        // A cone's axis is written in the same way.
+        let axis = |text: &str| format!("{text}:0deg").parse::<Cone>().map(|cone| cone.axis);
+        let (approach, closing) = (axis(approach)?.normalize(), axis(closing)?);
+        let Some(closing) = (closing - approach * approach.dot(closing)).try_normalize() else {
+            return Err(Error::input(flag, "approach and closing direction are parallel", remedy));
+        };
+        let rotation = DMat3::from_cols(approach, closing.cross(approach), closing);
+        return Ok(Asked::OnPart(Frame { rotation, origin }));
+    }
+    let pieces = split(text);
+    let parts: Vec<&str> = pieces.iter().map(String::as_str).collect();
+    match parts[..] {
+        [x, y, angle, pair] => {
+            let number = |text: &str| text.trim().parse::<u32>().map_err(|_| wrong());
+            let pair = match pair.split_once(['|', '-', '/']) {
+                Some((one, other)) => Pair::Faces(number(one)?, number(other)?),
+                None => Pair::Number(number(pair)? as usize),
+            };
+            let position = glam::DVec2::new(length(x)?, length(y)?);
+            Ok(Asked::OnFaces { position, angle: Quantity::Angle.parse(flag, angle)?, pair })
+        }
+        [x, y, z, ref quaternion @ ..] if quaternion.len() == 4 => {
+            let mut xyzw = [0.0; 4];
+            for (value, text) in xyzw.iter_mut().zip(quaternion) {
+                *value = text.parse::<f64>().map_err(|_| wrong())?;
+            }
+            let turn = glam::DQuat::from_array(xyzw);
+            if !matches!((turn.length() - 1.0).abs(), 0.0..=1e-3) {
+                let problem = format!("a quaternion of length {}", turn.length());
+                return Err(Error::input(flag, problem, "give a unit quaternion"));
+            }
+            let tool =
+                Frame { rotation: DMat3::from_quat(turn.normalize()), origin: place(&[x, y, z])? };
+            let axes = Convention::Standard.rotation(None)?;
+            Ok(Asked::OnPart(
+                tool.compose(&Frame { rotation: axes.transpose(), origin: DVec3::ZERO }),
+            ))
+        }
+        _ => Err(wrong()),
+    }
 }
 
 /// Every test of an explanation, one a line.
@@ -164,11 +255,12 @@ pub(crate) fn print(out: &mut impl Write, explanation: &Explanation) -> anyhow::
     let o = explanation.part_from_grip.origin * 1e3;
     writeln!(
         out,
-        "pose at ({:.3}, {:.3}, {:.3}) mm on face pair {}, width {:.3} mm",
+        "pose at ({:.3}, {:.3}, {:.3}) mm on faces {} | {}, width {:.3} mm",
         o.x,
         o.y,
         o.z,
-        explanation.site,
+        explanation.face_i,
+        explanation.face_ii,
         explanation.width * 1e3
     )?;
     for check in &explanation.checks {
@@ -191,6 +283,65 @@ pub(crate) fn print(out: &mut impl Write, explanation: &Explanation) -> anyhow::
         )?,
         (Some(reason), None) => writeln!(out, "rejected: {}", reason.name().replace('_', " "))?,
         (None, _) => writeln!(out, "free of interference")?,
+    }
+    Ok(())
+}
+
+/// How a pose fits faces, and where it stands among the grips found.
+pub(crate) fn print_standing(
+    out: &mut impl Write,
+    assessed: &Assessed,
+    standing: Option<(Standing, u64)>,
+) -> anyhow::Result<()> {
+    match &assessed.fit {
+        Err(Misfit::Tilted(Some(angle))) => {
+            writeln!(
+                out,
+                "grips no faces: the closing axis is {:.2} deg off the nearest normal of a pair within the stroke",
+                angle.to_degrees()
+            )?;
+        }
+        Err(Misfit::Beside) => {
+            writeln!(out, "grips no faces: none stand between the opened pads there")?;
+        }
+        Err(_) => writeln!(out, "grips no faces: no pair lies within the stroke")?,
+        Ok(fit) if fit.turned > 1e-6 || fit.shifted > 1e-6 => writeln!(
+            out,
+            "the pose was {:.3} mm along the closing axis and {:.3} deg off; closing jaws right it:",
+            fit.shifted * 1e3,
+            fit.turned.to_degrees()
+        )?,
+        Ok(_) => {}
+    }
+    if let Some(explanation) = &assessed.explanation {
+        print(out, explanation)?;
+    }
+    let Some(ranked) = &assessed.ranked else { return Ok(()) };
+    let friction = match ranked.worst.mu_s {
+        Some(mu_s) if ranked.worst.status.holds() => format!("mu_s {mu_s:.5}"),
+        _ => format!("no friction holds it: {:?}", ranked.worst.status).to_lowercase(),
+    };
+    match standing {
+        None => writeln!(out, "{friction}")?,
+        Some((Standing::Found { rank, id }, all)) => {
+            writeln!(out, "{friction}; rank {rank} of {all}, grip {id}")?;
+        }
+        Some((Standing::NotTried { rank, beyond, nearest }, all)) => {
+            let more = if beyond { " or more, beyond the grips kept" } else { "" };
+            writeln!(
+                out,
+                "{friction}; not among the {all} found: it would have rank {rank}{more}"
+            )?;
+            match nearest {
+                Some((rank, id, apart)) => writeln!(
+                    out,
+                    "its place was not tried; the nearest grip on these faces, {id} of rank {rank}, lies {:.3} mm away (a finer grid tries more)",
+                    apart * 1e3
+                )?,
+                None => writeln!(out, "no grip on these faces is among those kept")?,
+            }
+        }
+        Some(_) => writeln!(out, "{friction}")?,
     }
     Ok(())
 }

@@ -26,7 +26,7 @@ use crate::part::Mesh;
 use crate::results::{GripSet, PadFriction, RankedGrip, Verdict};
 
 pub use table::{Column, Table, Values, table};
-pub use tool::{Convention, Joint, Origin, Stated, grip_from_tool};
+pub use tool::{Convention, Joint, Origin, Stated, grip_from_tool, tool_in_grip};
 
 /// Coordinates \[m\] and components of unit vectors below this are rounding.
 const ROUNDING: f64 = 1e-15;

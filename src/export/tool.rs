@@ -259,6 +259,24 @@ pub fn grip_from_tool(
     Ok(Frame { rotation: convention.rotation(gripper)?, origin })
 }
 
+/// The tool frame in the frame of a grip with the pads `gap` apart \[m\]: what is fixed to the palm
+/// stands by how far the jaws close.
+///
+/// # Errors
+/// As [`grip_from_tool`].
+pub fn tool_in_grip(
+    convention: Convention,
+    origin: Origin,
+    gripper: Option<&Gripper>,
+    gap: f64,
+) -> Result<Frame> {
+    let tool = grip_from_tool(convention, origin, gripper)?;
+    Ok(match (origin, gripper) {
+        (Origin::Stated(_), Some(gripper)) => gripper.palm_place(gap).compose(&tool),
+        _ => tool,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -22,6 +22,14 @@ pub const WHOLE: usize = 20;
 pub const GLB_TOP: usize = 10;
 
 impl Plan {
+    /// Writes a set under the names that the request gives to result file and page.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn save(&self, set: &GripSet) -> Result<Vec<PathBuf>> {
+        self.write(set, true)
+    }
+
     /// Writes result file and page where the request names them, or beside these names when the
     /// run is not complete; the names.
     pub(super) fn write(&self, set: &GripSet, complete: bool) -> Result<Vec<PathBuf>> {

@@ -1,13 +1,16 @@
 //! Grips displaced in their pad plane, with what the pads then touch.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DVec2};
 
-use super::patch::{Scratch, Touch};
+use super::patch::{PatchIndex, Scratch, Touch};
+use super::site::Site;
 use super::work::{Known, Pads};
 use super::{proposer::Proposer, site};
 use crate::error::Result;
 use crate::gripper::Jaws;
-use crate::model::{Frame, Grip};
+use crate::model::{Contact, Frame, Grip};
 
 /// By how much a grip stands off its pose.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -41,14 +44,8 @@ impl Proposer<'_> {
             let (place, angle) =
                 (local.origin.truncate(), local.rotation.x_axis.truncate().to_angle());
             let jaws = site::jaws(&local);
-            let pads = Pads::new(site.pads(self.gripper, jaws), angle);
-            let mut whole = [true; 2];
-            for (side, patch) in pads.sides(&patches) {
-                let touch = patches[patch].touch(&pads.turned[side], place, &mut scratch[side]);
-                whole[side] = touch == Touch::Whole;
-            }
-            let contact =
-                self.contact(&patches, &pads, place, angle, jaws, whole, &mut scratch, &mut known);
+            let posture = (place, angle, jaws);
+            let contact = self.contact_at(site, &patches, posture, &mut scratch, &mut known);
             let mut faces = [0, 1].map(|side| site.face_at(side, self.part, place));
             if jaws == Jaws::Exchanged {
                 faces.reverse();
@@ -63,5 +60,23 @@ impl Proposer<'_> {
             }
         });
         Ok(displaced.collect())
+    }
+
+    /// What the pads touch at a place of a site, at an angle, one way round.
+    pub(super) fn contact_at(
+        &self,
+        site: &Site,
+        patches: &[PatchIndex],
+        (place, angle, jaws): (DVec2, f64, Jaws),
+        scratch: &mut [Scratch; 2],
+        known: &mut Known,
+    ) -> Arc<Contact> {
+        let pads = Pads::new(site.pads(self.gripper, jaws), angle);
+        let mut whole = [true; 2];
+        for (side, patch) in pads.sides(patches) {
+            let touch = patches[patch].touch(&pads.turned[side], place, &mut scratch[side]);
+            whole[side] = touch == Touch::Whole;
+        }
+        self.contact(patches, &pads, place, angle, jaws, whole, scratch, known)
     }
 }

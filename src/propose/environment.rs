@@ -128,12 +128,14 @@ impl Environment {
     }
 
     /// Where the sweeps of a gripper, given with its frames at the origin of a site, pass the ground
-    /// and the planes of the faces of keep-out boxes and of the scene's obstacles.
+    /// and the planes of the faces of keep-out boxes and of the scene's obstacles. `flush`: how far
+    /// the sweeps are drawn in \[m\].
     pub(super) fn borders(
         &self,
         sweeps: &[Sweep],
         part_from_site: &Frame,
         part_from_grip: &Frame,
+        flush: f64,
     ) -> Vec<Border> {
         let ground = self.ground.map(|ground| (ground.normal, ground.offset));
         let faces = self.keep_out.iter().flat_map(|[low, high]| {
@@ -154,7 +156,9 @@ impl Environment {
             (length > LEANING && offset.is_finite())
                 .then(|| Border { normal: along / length, offset: offset / length })
         };
-        let walls = self.scene.iter().flat_map(|scene| scene.walls.iter().copied());
+        // The sweeps are drawn in by what counts as flush with the part; a scene is met exactly.
+        let walls = self.scene.iter().flat_map(|scene| &scene.walls);
+        let walls = walls.map(|&(normal, offset)| (normal, offset + flush));
         ground.into_iter().chain(faces).chain(walls).filter_map(border).collect()
     }
 

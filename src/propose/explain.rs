@@ -61,6 +61,10 @@ pub struct Check {
 pub struct Explanation {
     /// The site it belongs to.
     pub site: usize,
+    /// Planar face of the part under pad I.
+    pub face_i: u32,
+    /// Planar face of the part under pad II.
+    pub face_ii: u32,
     /// Grip frame in the part frame.
     pub part_from_grip: Frame,
     /// Distance of the faces \[m\].
@@ -189,8 +193,14 @@ impl Proposer<'_> {
         frame.rotation *= jaws.turn();
         self.explain_scene(&prepared, &frame, &mut verdict);
         let Verdict { checks, rejection, place } = verdict;
+        let mut faces = [0, 1].map(|side| found.face_at(side, self.part, position));
+        if jaws == Jaws::Exchanged {
+            faces.reverse();
+        }
         Ok(Explanation {
             site,
+            face_i: faces[0],
+            face_ii: faces[1],
             part_from_grip: frame,
             width: found.width,
             contact,

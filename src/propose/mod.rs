@@ -10,6 +10,7 @@
 mod displace;
 mod environment;
 mod explain;
+mod fit;
 mod interference;
 mod options;
 mod patch;
@@ -19,5 +20,6 @@ mod work;
 
 pub use displace::Displacement;
 pub use explain::{Check, Explanation, SiteInfo};
+pub use fit::{Fit, Misfit};
 pub use options::{Cone, Ground, ProposeOptions, Rejection};
 pub use proposer::{Chunk, Progress, Proposer, Tally};

@@ -328,8 +328,12 @@ impl Finder<'_> {
                 let frame = super::work::frame(site, DVec2::ZERO, angle);
                 if self.environment.allows(super::work::approach(&frame)) {
                     for (pads, sweeps) in &ways {
-                        let borders =
-                            self.environment.borders(sweeps, &site.part_from_site, &frame);
+                        let borders = self.environment.borders(
+                            sweeps,
+                            &site.part_from_site,
+                            &frame,
+                            site.flush,
+                        );
                         let posture = Posture { angle, pads, sweeps, borders: &borders };
                         landmarks.places(&posture, &mut room, &mut found);
                     }

@@ -77,7 +77,7 @@ fn a_fixed_jaw_stays_where_the_palm_is() {
 #[test]
 fn each_face_is_touched_by_its_own_pad() {
     let (part, vice) = (block(DVec3::new(0.1, 0.08, 0.02)), vice());
-    let options = ProposeOptions { spacing: Some(0.01), ..ProposeOptions::default() };
+    let options = ProposeOptions::default().with_spacing(Some(0.01));
     let grips: Vec<Grip> =
         Proposer::new(&part, &vice, &options).unwrap().flat_map(|chunk| chunk.grips).collect();
     let across = |grip: &&Grip| (grip.width - 0.02).abs() < 1e-9;
@@ -145,10 +145,7 @@ fn the_palm_stands_aside_of_a_fixed_jaw() {
     add(DVec3::new(-0.03, -0.01, 0.0), DVec3::new(0.03, 0.01, 0.04));
     add(DVec3::new(-0.03, 0.05, -0.02), DVec3::new(0.03, 0.06, 0.12));
     let part = Part::from_triangles("block and wall", &vertices, &triangles).unwrap();
-    let options = ProposeOptions {
-        approach_cone: Some(gripfast::propose::Cone { axis: DVec3::NEG_Z, half_angle: 0.01 }),
-        ..ProposeOptions::default()
-    };
+    let options = ProposeOptions::default().with_approach_cone(Some(gripfast::propose::Cone { axis: DVec3::NEG_Z, half_angle: 0.01 }));
     let grips: Vec<Grip> = Proposer::new(&part, &vice(), &options)
         .unwrap()
         .flat_map(|chunk| chunk.grips)

@@ -228,9 +228,11 @@ struct OutputArgs {
     /// The result as JSON on standard output instead of the table.
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
     json: Option<bool>,
-    /// Explains one pose instead of planning: position and approach angle in the plane of a face
-    /// pair, and its number.
-    #[arg(long, value_name = "X,Y,ANGLE,SITE", allow_hyphen_values = true)]
+    /// Explains one pose instead of planning, and tells where it stands among the grips found:
+    /// X,Y,Z:APPROACH:CLOSING in part coordinates, e.g. 30mm,20mm,18mm:-z:+x; or
+    /// X,Y,Z,QX,QY,QZ,QW of the tool frame; or X,Y,ANGLE,PAIR, place and approach angle in the plane
+    /// of a pair of `gripfast part` (its place in the list, or its faces, 2|3).
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     why: Option<String>,
     /// No progress bar and no notes; warnings are printed all the same.
     #[arg(long, short, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
@@ -295,12 +297,12 @@ impl Args {
     }
 
     /// The grippers given.
-    pub(super) fn grippers(&self) -> &[String] {
+    pub(crate) fn grippers(&self) -> &[String] {
         &self.gripper
     }
 
     /// The request that the flags make, but for the gripper where several are given, over the stored one where there is one.
-    pub(super) fn request(self) -> gripfast::error::Result<Request> {
+    pub(crate) fn request(self) -> gripfast::error::Result<Request> {
         let mut request = match &self.request {
             Some(path) => Request::read(path)?,
             None => Request::default(),
@@ -369,7 +371,7 @@ fn fields(request: &Request) -> Map<String, Value> {
 /// Help that states the defaults, which stand in the request.
 pub(crate) fn with_defaults(command: Command) -> Command {
     let defaults = fields(&Request::default());
-    command.mut_subcommand("plan", |plan| {
+    let with = |plan: Command| {
         plan.mut_args(|argument| {
             let text = match defaults.get(argument.get_id().as_str()) {
                 Some(Value::String(text)) => text.clone(),
@@ -387,7 +389,8 @@ pub(crate) fn with_defaults(command: Command) -> Command {
                 _ => argument,
             }
         })
-    })
+    };
+    command.mut_subcommand("plan", with).mut_subcommand("assess", with)
 }
 
 #[cfg(test)]

@@ -1,0 +1,267 @@
+//! Poses from outside: taught ones, or those of another program, assessed as the grips of a plan are,
+//! and where one of them stands among the grips that the plan finds.
+
+use std::sync::atomic::AtomicBool;
+
+use rayon::prelude::*;
+
+use super::search::Search;
+use super::{Assessor, Plan, output};
+use crate::backend::select;
+use crate::error::Result;
+use crate::export::tool_in_grip;
+use crate::model::{Frame, Grip};
+use crate::poses::Pose;
+use crate::propose::{Explanation, Fit, Misfit, Proposer};
+use crate::rank;
+use crate::request::Polish;
+use crate::results::{self, GripSet, RankedGrip, Summary};
+
+/// Poses within this \[m\] and this \[rad\] are one pose: what files with six digits keep.
+const SAME_PLACE: f64 = 2e-6;
+const SAME_TURN: f64 = 1e-5;
+
+/// What became of a pose.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Assessed {
+    /// Its name.
+    pub name: String,
+    /// The faces that it grips, or why there are none.
+    pub fit: std::result::Result<Fit, Misfit>,
+    /// Every test of it, where it grips two faces.
+    pub explanation: Option<Explanation>,
+    /// Its numbers, where it touches both faces, free or not.
+    pub ranked: Option<RankedGrip>,
+}
+
+impl Assessed {
+    /// Whether nothing stands in its way.
+    pub fn is_free(&self) -> bool {
+        self.explanation.as_ref().is_some_and(|explanation| explanation.rejection.is_none())
+    }
+
+    /// Whether it is free and a limit state exists for its worst load.
+    pub fn is_grip(&self) -> bool {
+        self.is_free() && self.ranked.as_ref().is_some_and(|ranked| ranked.worst.status.holds())
+    }
+}
+
+/// What became of a list of poses.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Assessment {
+    /// In the order of the list.
+    pub poses: Vec<Assessed>,
+    /// Those that are grips, ranked as a plan's; their ids are the places in the list, from 0.
+    pub set: GripSet,
+}
+
+/// Where a pose stands among the grips that a plan finds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Standing {
+    /// It is the grip of this rank and id.
+    Found {
+        /// Its rank.
+        rank: u64,
+        /// Its id.
+        id: u64,
+    },
+    /// It is none of them.
+    NotTried {
+        /// The rank that its score would have.
+        rank: u64,
+        /// Whether the list that was kept ends before that rank.
+        beyond: bool,
+        /// Rank, id and distance \[m\] of the nearest grip found on the same faces.
+        nearest: Option<(u64, u64, f64)>,
+    },
+}
+
+impl Plan {
+    /// Assesses poses of the gripper on the part: which faces each one grips, every test, and its
+    /// numbers under the loads. A pose may be off the faces' normal by `turn` \[rad\]: closing jaws
+    /// right it.
+    ///
+    /// # Errors
+    /// As [`Proposer::new`] and [`Assessor::assess`]; when poses are those of a frame that the
+    /// gripper does not state.
+    pub fn assess(&self, poses: &[Pose], turn: f64) -> Result<Assessment> {
+        self.threads.install(|| {
+            let scoring = &self.request.scoring;
+            let selection = select(scoring.backend, scoring.adapter.as_deref())?;
+            let assessor = self.assessor(&selection.backend);
+            let proposer = Proposer::new(&self.part, &self.gripper, &self.propose)?;
+            let poses = self.assess_on(&proposer, &assessor, poses, turn)?;
+            let set = self.set_of(&proposer, &selection.backend.name(), &poses)?;
+            Ok(Assessment { poses, set })
+        })
+    }
+
+    /// Assesses one pose, given as a grip frame in the part frame, and says where it stands among
+    /// the grips that the plan finds; nowhere when it is no grip. Writes no file.
+    ///
+    /// # Errors
+    /// As [`Plan::run`].
+    pub fn place(
+        &self,
+        part_from_grip: &Frame,
+        turn: f64,
+    ) -> Result<(Assessed, Option<(Standing, u64)>)> {
+        self.threads.install(|| {
+            let scoring = &self.request.scoring;
+            let selection = select(scoring.backend, scoring.adapter.as_deref())?;
+            let assessor = self.assessor(&selection.backend);
+            let mut proposer = Proposer::new(&self.part, &self.gripper, &self.propose)?;
+            let pose = Pose::of_grip("pose", *part_from_grip);
+            let mut assessed = self.assess_on(&proposer, &assessor, &[pose], turn)?;
+            let assessed = assessed.remove(0);
+            if !assessed.is_grip() {
+                return Ok((assessed, None));
+            }
+            let search = Search {
+                assessor: &assessor,
+                keep: self.request.kept(),
+                race: scoring.polish == Polish::Top,
+                partial: None,
+                resume: false,
+            };
+            let found = search.run(&mut proposer, &mut (), &AtomicBool::new(false))?;
+            let (set, _) = self.finish(&proposer, &assessor, found)?;
+            let standing = assessed.ranked.as_ref().map(|ranked| standing(ranked, &set));
+            Ok((assessed, standing.map(|standing| (standing, set.summary.ranked))))
+        })
+    }
+
+    fn assess_on(
+        &self,
+        proposer: &Proposer<'_>,
+        assessor: &Assessor<'_>,
+        poses: &[Pose],
+        turn: f64,
+    ) -> Result<Vec<Assessed>> {
+        let tried: Vec<(Assessed, Option<Grip>)> = poses
+            .par_iter()
+            .enumerate()
+            .map(|(index, pose)| self.try_pose(proposer, pose, index as u64, turn))
+            .collect::<Result<_>>()?;
+        let grips: Vec<Grip> = tried.iter().filter_map(|(_, grip)| grip.clone()).collect();
+        let mut scored = assessor.assess(grips)?;
+        assessor.finish(&mut scored);
+        let mut scored = scored.into_iter();
+        Ok(tried
+            .into_iter()
+            .map(|(mut assessed, grip)| {
+                assessed.ranked = grip.and_then(|_| scored.next()).map(|mut ranked| {
+                    let mu_s = ranked.worst.mu_s.filter(|_| ranked.worst.status.holds());
+                    ranked.score = mu_s
+                        .map(|mu_s| self.settings.weights.score(mu_s, ranked.alpha))
+                        .filter(|score| score.is_finite());
+                    ranked
+                });
+                assessed
+            })
+            .collect())
+    }
+
+    /// The faces that a pose grips, every test, and the grip where both pads touch.
+    fn try_pose(
+        &self,
+        proposer: &Proposer<'_>,
+        pose: &Pose,
+        id: u64,
+        turn: f64,
+    ) -> Result<(Assessed, Option<Grip>)> {
+        let grip_frame = |gap: f64| -> Result<Frame> {
+            let tool = tool_in_grip(pose.convention, pose.origin, Some(&self.gripper), gap)?;
+            Ok(pose.part_from_tool.compose(&tool.inverse()))
+        };
+        // Flange and tool stand by how far the jaws close, which the faces decide.
+        let mut gap =
+            pose.gap.unwrap_or(f64::midpoint(self.gripper.stroke[0], self.gripper.stroke[1]));
+        let mut fit = proposer.fit(&grip_frame(gap)?, turn);
+        for _ in 0..4 {
+            match &fit {
+                Ok(found) if (found.gap - gap).abs() > 1e-9 => gap = found.gap,
+                _ => break,
+            }
+            fit = proposer.fit(&grip_frame(gap)?, turn);
+        }
+        let mut assessed =
+            Assessed { name: pose.name.clone(), fit, explanation: None, ranked: None };
+        let Ok(fit) = fit else { return Ok((assessed, None)) };
+        assessed.explanation = Some(proposer.explain_fit(&fit)?);
+        let grip = proposer.grip_at(&fit, id);
+        let touches = !grip.contact.face_i.is_empty() && !grip.contact.face_ii.is_empty();
+        Ok((assessed, touches.then_some(grip)))
+    }
+
+    /// The result file of poses that are grips.
+    fn set_of(
+        &self,
+        proposer: &Proposer<'_>,
+        backend: &str,
+        poses: &[Assessed],
+    ) -> Result<GripSet> {
+        let (low, high) = self.part.mesh.bounding_box();
+        let free = poses.iter().filter(|pose| pose.is_free());
+        let grips: Vec<RankedGrip> = free.filter_map(|pose| pose.ranked.clone()).collect();
+        let options = rank::Options { keep_flips: true, top: None, ..self.rank_options() };
+        let ranking = rank::rank(grips, self.mass.centre_of_mass, (high - low).length(), &options);
+        let mut rejections = ranking.rejections;
+        for pose in poses {
+            let reason = match (&pose.fit, &pose.explanation) {
+                (Err(_), _) => "no_faces".to_owned(),
+                (_, Some(explanation)) => match &explanation.rejection {
+                    Some(rejection) => rejection.name(),
+                    None => continue,
+                },
+                (Ok(_), None) => continue,
+            };
+            *rejections.entry(reason).or_default() += 1;
+        }
+        Ok(GripSet {
+            format: results::FORMAT.into(),
+            version: results::VERSION,
+            provenance: self.provenance(backend.to_owned(), true),
+            part: self.part_summary([low, high]),
+            gripper: output::gripper_json(&self.gripper)?,
+            loads: self.loads.clone(),
+            summary: Summary {
+                pairs: proposer.tally().pairs,
+                candidates: poses.len() as u64,
+                ranked: ranking.ranked,
+                rejections,
+                comparison: None,
+            },
+            grips: ranking.grips,
+        })
+    }
+}
+
+/// Where a grip stands in a set in order.
+fn standing(ranked: &RankedGrip, set: &GripSet) -> Standing {
+    let (grip, merit) = (&ranked.grip, |grip: &RankedGrip| grip.score.unwrap_or(f64::INFINITY));
+    let apart = |other: &Grip| other.part_from_grip.origin.distance(grip.part_from_grip.origin);
+    let turned = |other: &Grip| {
+        let [a, b] = [grip, other].map(|grip| grip.part_from_grip.rotation);
+        let angle = a.x_axis.cross(b.x_axis).length().atan2(a.x_axis.dot(b.x_axis));
+        // The same pose with exchanged jaws is the same grip of a symmetric gripper.
+        angle.max(a.z_axis.cross(b.z_axis).length())
+    };
+    let same =
+        |other: &&RankedGrip| apart(&other.grip) < SAME_PLACE && turned(&other.grip) < SAME_TURN;
+    if let Some(found) = set.grips.iter().find(same) {
+        return Standing::Found { rank: found.rank, id: found.grip.id };
+    }
+    let better = set.grips.iter().filter(|other| merit(other) > merit(ranked)).count() as u64;
+    let faces = |grip: &Grip| (grip.face_i.min(grip.face_ii), grip.face_i.max(grip.face_ii));
+    let on_the_same = set.grips.iter().filter(|other| faces(&other.grip) == faces(grip));
+    let nearest = on_the_same
+        .map(|other| (other.rank, other.grip.id, apart(&other.grip), turned(&other.grip)))
+        .min_by(|a, b| (a.2 + 0.05 * a.3).total_cmp(&(b.2 + 0.05 * b.3)))
+        .map(|(rank, id, apart, _)| (rank, id, apart));
+    let beyond = better == set.grips.len() as u64 && set.summary.ranked > better;
+    Standing::NotTried { rank: better + 1, beyond, nearest }
+}

@@ -1,0 +1,131 @@
+//! Poses of a gripper from files of other programs: the formats that [`crate::export`] writes, read
+//! back with the frames that they hold.
+
+mod formats;
+
+use std::path::Path;
+
+use crate::error::{Error, Result};
+use crate::export::{Convention, Format, Origin};
+use crate::gripper::Gripper;
+use crate::model::Frame;
+
+/// A pose of the gripper on the part.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pose {
+    /// The name or number that it has in its file.
+    pub name: String,
+    /// Tool frame in the part frame.
+    pub part_from_tool: Frame,
+    /// Axes of the tool frame; `None`: it is the grip frame itself.
+    pub convention: Convention,
+    /// Origin of the tool frame.
+    pub origin: Origin,
+    /// Distance of the pads \[m\], where the file states it.
+    pub gap: Option<f64>,
+}
+
+impl Pose {
+    /// A pose given by its grip frame in the part frame.
+    pub fn of_grip(name: &str, part_from_grip: Frame) -> Self {
+        // The standard axes are those of the grip, renamed.
+        let convention = Convention::Standard;
+        let rotation = convention.rotation(None).unwrap_or_default();
+        let part_from_tool = part_from_grip.compose(&Frame { rotation, origin: glam::DVec3::ZERO });
+        Self { name: name.to_owned(), part_from_tool, convention, origin: Origin::Pads, gap: None }
+    }
+}
+
+/// How poses are read; what is absent is what exports of the format hold.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Options {
+    /// Format; by the ending of the file when absent.
+    pub format: Option<Format>,
+    /// Axes of the tool frame.
+    pub convention: Option<Convention>,
+    /// Origin of the tool frame.
+    pub origin: Option<Origin>,
+}
+
+/// What a file says of a pose.
+struct Raw {
+    name: String,
+    frame: Frame,
+    gap: Option<f64>,
+}
+
+/// Reads the poses of a file, in its order.
+///
+/// # Errors
+/// When the file cannot be read, is not of its format, or holds a pose that is none; the message
+/// names the place.
+pub fn read(path: &Path, options: &Options, gripper: &Gripper) -> Result<Vec<Pose>> {
+    let format = match options.format {
+        Some(format) => format,
+        None => Format::from_path(path)?,
+    };
+    let place = path.display().to_string();
+    let bytes = crate::file::read(path)?;
+    let (raw, stated) = match format {
+        Format::Json | Format::JsonLines => return formats::native(&place, &bytes),
+        Format::Csv => formats::csv(&place, &bytes)?,
+        Format::IsaacGrasp => formats::isaac(&place, &bytes)?,
+        Format::MoveIt => formats::moveit(&place, &bytes)?,
+        Format::GraspGen => formats::graspgen(&place, &bytes)?,
+        Format::GraspNet => formats::graspnet(&place, bytes)?,
+        Format::Acronym => formats::acronym(&place, bytes)?,
+        Format::Parquet | Format::Glb => {
+            return Err(Error::input(
+                place,
+                "poses are not read from this format",
+                "give CSV, isaac_grasp, moveit, graspgen, graspnet, acronym, or a result file",
+            ));
+        }
+    };
+    // What the user says, what the file says, what the format usually holds.
+    let (axes, from) = stated.as_deref().and_then(stated_frame).unzip();
+    let convention = options.convention.or(axes).unwrap_or_else(|| format.convention());
+    let origin = options.origin.or(from).unwrap_or_else(|| format.origin(Some(gripper)));
+    let pose = |raw: Raw| Pose {
+        name: raw.name,
+        part_from_tool: raw.frame,
+        convention,
+        origin,
+        gap: raw.gap,
+    };
+    Ok(raw.into_iter().map(pose).collect())
+}
+
+/// The frame that an export states in words, if it is one of ours.
+fn stated_frame(text: &str) -> Option<(Convention, Origin)> {
+    let (axes, origin) = text.split_once(", origin ")?;
+    let convention =
+        Convention::ALL.into_iter().map(|known| known.0).find(|known| known.axes() == axes)?;
+    let stated = ["pads", "flange", "tool"]
+        .into_iter()
+        .filter_map(|name| Origin::parse("origin", name).ok())
+        .find(|known| known.to_string() == origin);
+    let behind = || {
+        let distance = origin.strip_suffix(" mm behind the pads")?.parse::<f64>().ok()?;
+        Some(Origin::Behind(distance * 1e-3))
+    };
+    Some((convention, stated.or_else(behind)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_words_of_an_export_are_understood() {
+        for (convention, _) in Convention::ALL {
+            for origin in ["pads", "flange", "tool", "103.4mm"] {
+                let origin = Origin::parse("origin", origin).unwrap();
+                let text = format!("{}, origin {origin}", convention.axes());
+                let (axes, from) = stated_frame(&text).unwrap();
+                assert_eq!((axes.axes(), from), (convention.axes(), origin), "{text}");
+            }
+        }
+        assert_eq!(stated_frame("x approach"), None);
+    }
+}

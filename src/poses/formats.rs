@@ -1,0 +1,363 @@
+//! One reader for each format.
+
+use glam::{DMat3, DMat4, DQuat, DVec3};
+use serde::Deserialize;
+use serde_json::Value;
+
+use super::{Pose, Raw};
+#[cfg(not(feature = "hdf5"))]
+use crate::error::ErrorKind;
+use crate::error::{Error, Result};
+use crate::model::Frame;
+use crate::results::GripSet;
+
+/// What a file holds: its poses, and the frame that it states in words.
+type Found = (Vec<Raw>, Option<String>);
+
+/// Largest departure of a pose from a rotation that is taken for rounding.
+const ROTATION: f64 = 1e-3;
+
+fn wrong(place: &str, problem: impl Into<String>) -> Error {
+    Error::format(place, problem, "docs/formats.md describes each format field by field")
+}
+
+/// A pose from a rotation that may be rounded.
+fn frame(place: &str, rotation: DMat3, origin: DVec3) -> Result<Frame> {
+    let drift = rotation * rotation.transpose() - DMat3::IDENTITY;
+    let square = drift.to_cols_array().iter().all(|entry| entry.abs() <= ROTATION);
+    if !(square && rotation.determinant() > 0.0 && origin.is_finite()) {
+        return Err(wrong(place, "is not a rotation and an origin"));
+    }
+    // To full precision again.
+    let z = rotation.z_axis.normalize();
+    let x = (rotation.x_axis - z * z.dot(rotation.x_axis)).normalize();
+    Ok(Frame { rotation: DMat3::from_cols(x, z.cross(x), z), origin })
+}
+
+fn from_quaternion(place: &str, xyzw: [f64; 4], origin: DVec3) -> Result<Frame> {
+    let quaternion = DQuat::from_array(xyzw);
+    if !matches!((quaternion.length() - 1.0).abs(), 0.0..=1e-3) {
+        return Err(wrong(place, format!("a quaternion of length {}", quaternion.length())));
+    }
+    frame(place, DMat3::from_quat(quaternion.normalize()), origin)
+}
+
+fn from_rows(place: &str, rows: &[[f64; 4]; 4]) -> Result<Frame> {
+    let matrix = DMat4::from_cols_array_2d(rows).transpose();
+    let origin = matrix.w_axis.truncate();
+    frame(place, DMat3::from_mat4(matrix), origin)
+}
+
+/// A result file of our own: its grip frames.
+pub(super) fn native(place: &str, bytes: &[u8]) -> Result<Vec<Pose>> {
+    let set = GripSet::parse(place, bytes)?;
+    let pose = |grip: &crate::model::Grip| Pose::of_grip(&grip.id.to_string(), grip.part_from_grip);
+    Ok(set.grips.iter().map(|ranked| pose(&ranked.grip)).collect())
+}
+
+/// Columns `x_m`, `y_m`, `z_m`, `qx`, `qy`, `qz`, `qw`, and, where there are, `id` or `name`,
+/// `jaw_gap_m`, `tool_frame`.
+pub(super) fn csv(place: &str, bytes: &[u8]) -> Result<Found> {
+    let mut reader = csv::Reader::from_reader(bytes);
+    let failed = |error: csv::Error| wrong(place, error.to_string());
+    let names = reader.headers().map_err(failed)?.clone();
+    let column = |name: &str| names.iter().position(|known| known.trim() == name);
+    let needed = ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"]
+        .map(|name| column(name).ok_or_else(|| wrong(place, format!("has no column {name}"))));
+    let mut columns = [0; 7];
+    for (slot, found) in columns.iter_mut().zip(needed) {
+        *slot = found?;
+    }
+    let (name, gap) = (column("id").or(column("name")), column("jaw_gap_m"));
+    let words = column("tool_frame");
+    let (mut found, mut stated) = (Vec::new(), None);
+    for (row, record) in reader.records().enumerate() {
+        let record = record.map_err(failed)?;
+        let place = format!("{place}:{}", row + 2);
+        let number = |column: usize| {
+            let text = record.get(column).unwrap_or_default().trim();
+            text.parse::<f64>()
+                .map_err(|_| wrong(&place, format!("'{text}' in {} is no number", &names[column])))
+        };
+        let mut values = [0.0; 7];
+        for (value, column) in values.iter_mut().zip(columns) {
+            *value = number(column)?;
+        }
+        let [x, y, z, quaternion @ ..] = values;
+        let text = |column: usize| record.get(column).unwrap_or_default().trim().to_owned();
+        stated = stated.or_else(|| words.map(text));
+        found.push(Raw {
+            name: name.map_or_else(|| row.to_string(), text),
+            frame: from_quaternion(&place, quaternion, DVec3::new(x, y, z))?,
+            gap: gap.filter(|column| !text(*column).is_empty()).map(number).transpose()?,
+        });
+    }
+    Ok((found, stated))
+}
+
+/// A YAML file as plain values.
+fn yaml<T: serde::de::DeserializeOwned>(place: &str, bytes: &[u8]) -> Result<T> {
+    let text = std::str::from_utf8(bytes).map_err(|_| wrong(place, "not a text file"))?;
+    serde_saphyr::from_str(text).map_err(|error| wrong(place, error.to_string()))
+}
+
+/// The frame that a comment of ours states.
+fn comment(bytes: &[u8], start: &str) -> Option<String> {
+    let text = std::str::from_utf8(bytes).ok()?;
+    text.lines().find_map(|line| line.strip_prefix(start)).map(|rest| rest.trim().to_owned())
+}
+
+#[derive(Deserialize)]
+struct IsaacFile {
+    #[serde(deserialize_with = "in_order")]
+    grasps: Vec<(String, IsaacGrasp)>,
+}
+
+/// The entries of a map in the order of the file.
+fn in_order<'de, D: serde::Deserializer<'de>>(
+    deserializer: D,
+) -> std::result::Result<Vec<(String, IsaacGrasp)>, D::Error> {
+    struct Entries;
+    impl<'de> serde::de::Visitor<'de> for Entries {
+        type Value = Vec<(String, IsaacGrasp)>;
+
+        fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+            formatter.write_str("grasps by name")
+        }
+
+        fn visit_map<A: serde::de::MapAccess<'de>>(
+            self,
+            mut map: A,
+        ) -> std::result::Result<Self::Value, A::Error> {
+            let mut entries = Vec::new();
+            while let Some(entry) = map.next_entry()? {
+                entries.push(entry);
+            }
+            Ok(entries)
+        }
+    }
+    deserializer.deserialize_map(Entries)
+}
+
+#[derive(Deserialize)]
+struct IsaacGrasp {
+    position: [f64; 3],
+    orientation: IsaacTurn,
+}
+
+#[derive(Deserialize)]
+struct IsaacTurn {
+    w: f64,
+    xyz: [f64; 3],
+}
+
+/// `isaac_grasp`: `grasps` by name.
+pub(super) fn isaac(place: &str, bytes: &[u8]) -> Result<Found> {
+    let file: IsaacFile = yaml(place, bytes)?;
+    let found = file.grasps.into_iter().map(|(name, grasp)| {
+        let place = format!("{place}, {name}");
+        let IsaacTurn { w, xyz: [x, y, z] } = grasp.orientation;
+        let frame = from_quaternion(&place, [x, y, z, w], DVec3::from_array(grasp.position))?;
+        Ok(Raw { name, frame, gap: None })
+    });
+    Ok((found.collect::<Result<_>>()?, comment(bytes, "# gripper frame:")))
+}
+
+#[derive(Deserialize)]
+struct MoveItGrasp {
+    #[serde(default)]
+    id: Option<Value>,
+    grasp_pose: MoveItStamped,
+}
+
+#[derive(Deserialize)]
+struct MoveItStamped {
+    pose: MoveItPose,
+}
+
+#[derive(Deserialize)]
+struct MoveItPose {
+    position: Xyz,
+    orientation: Xyzw,
+}
+
+#[derive(Deserialize)]
+struct Xyz {
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+#[derive(Deserialize)]
+struct Xyzw {
+    x: f64,
+    y: f64,
+    z: f64,
+    w: f64,
+}
+
+/// A list of `moveit_msgs/Grasp`.
+pub(super) fn moveit(place: &str, bytes: &[u8]) -> Result<Found> {
+    let grasps: Vec<MoveItGrasp> = yaml(place, bytes)?;
+    let found = grasps.into_iter().enumerate().map(|(index, grasp)| {
+        let name = match grasp.id {
+            Some(Value::String(name)) if !name.is_empty() => name,
+            Some(Value::Number(number)) => number.to_string(),
+            _ => index.to_string(),
+        };
+        let MoveItPose { position: p, orientation: q } = grasp.grasp_pose.pose;
+        let place = format!("{place}, grasp {name}");
+        let frame = from_quaternion(&place, [q.x, q.y, q.z, q.w], DVec3::new(p.x, p.y, p.z))?;
+        Ok(Raw { name, frame, gap: None })
+    });
+    Ok((found.collect::<Result<_>>()?, comment(bytes, "# Tool frame:")))
+}
+
+#[derive(Deserialize)]
+struct GraspGenFile {
+    grasps: GraspGenGrasps,
+    gripfast: Option<GraspGenNotes>,
+}
+
+#[derive(Deserialize)]
+struct GraspGenGrasps {
+    transforms: Vec<[[f64; 4]; 4]>,
+    #[serde(default)]
+    width: Vec<f64>,
+    #[serde(default)]
+    id: Vec<u64>,
+}
+
+#[derive(Deserialize)]
+struct GraspGenNotes {
+    tool_frame: String,
+}
+
+/// GraspGen's JSON: `grasps.transforms`.
+pub(super) fn graspgen(place: &str, bytes: &[u8]) -> Result<Found> {
+    let file: GraspGenFile =
+        serde_json::from_slice(bytes).map_err(|error| wrong(place, error.to_string()))?;
+    let GraspGenGrasps { transforms, width, id } = file.grasps;
+    let found = transforms.iter().enumerate().map(|(index, rows)| {
+        Ok(Raw {
+            name: id.get(index).map_or_else(|| index.to_string(), u64::to_string),
+            frame: from_rows(&format!("{place}, transform {index}"), rows)?,
+            gap: width.get(index).copied(),
+        })
+    });
+    Ok((found.collect::<Result<_>>()?, file.gripfast.map(|notes| notes.tool_frame)))
+}
+
+/// GraspNet's rows of 17 numbers, alone (`.npy`) or as `grasps` (or the only array) of an archive.
+pub(super) fn graspnet(place: &str, bytes: Vec<u8>) -> Result<Found> {
+    let (mut rows, mut words) = (None, None);
+    if bytes.starts_with(b"\x93NUMPY") {
+        rows = Some(npy(place, &bytes)?);
+    } else {
+        let failed = |error: zip::result::ZipError| wrong(place, error.to_string());
+        let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes)).map_err(failed)?;
+        let budget = crate::memory::Budget::new(None);
+        for index in 0..archive.len() {
+            let mut member = archive.by_index(index).map_err(failed)?;
+            let name = member.name().trim_end_matches(".npy").to_owned();
+            budget.room(place, member.size())?;
+            if !matches!(name.as_str(), "grasps" | "tool_frame" | "arr_0" | "preds") {
+                continue;
+            }
+            let mut bytes = Vec::new();
+            std::io::Read::read_to_end(&mut member, &mut bytes)
+                .map_err(|error| wrong(place, error.to_string()))?;
+            if name == "tool_frame" {
+                words = npy_text(&bytes);
+            } else {
+                rows = Some(npy(&format!("{place}, {name}"), &bytes)?);
+            }
+        }
+    }
+    let rows = rows.ok_or_else(|| wrong(place, "holds no array of grasps"))?;
+    let found = rows.chunks_exact(COLUMNS).enumerate().map(|(index, row)| {
+        let rotation = DMat3::from_cols_slice(&row[4..13]).transpose();
+        let place = format!("{place}, row {index}");
+        Ok(Raw {
+            name: index.to_string(),
+            frame: frame(&place, rotation, DVec3::from_slice(&row[13..16]))?,
+            gap: None,
+        })
+    });
+    Ok((found.collect::<Result<_>>()?, words))
+}
+
+/// Columns of a row of GraspNet.
+const COLUMNS: usize = 17;
+
+/// Header and data of an array in NumPy's format 1 to 3.
+fn npy_parts(bytes: &[u8]) -> Option<(&str, &[u8])> {
+    let (version, rest) = (*bytes.get(6)?, bytes.get(8..)?);
+    let (length, rest) = if version == 1 {
+        (usize::from(u16::from_le_bytes(rest.get(..2)?.try_into().ok()?)), rest.get(2..)?)
+    } else {
+        (u32::from_le_bytes(rest.get(..4)?.try_into().ok()?) as usize, rest.get(4..)?)
+    };
+    Some((std::str::from_utf8(rest.get(..length)?).ok()?, rest.get(length..)?))
+}
+
+/// Rows of 17 numbers from an array in NumPy's format, in single or double precision.
+fn npy(place: &str, bytes: &[u8]) -> Result<Vec<f64>> {
+    let (header, data) = npy_parts(bytes).ok_or_else(|| wrong(place, "is no array of NumPy"))?;
+    let header: String = header.split_whitespace().collect();
+    let rows = format!(",{COLUMNS})");
+    if !(header.contains("'fortran_order':False") && header.contains(&rows)) {
+        return Err(wrong(place, format!("is not rows of {COLUMNS} numbers: {header}")));
+    }
+    if header.contains("'<f8'") {
+        Ok(data
+            .chunks_exact(8)
+            .map(|b| f64::from_le_bytes(b.try_into().unwrap_or_default()))
+            .collect())
+    } else if header.contains("'<f4'") {
+        let number = |b: &[u8]| f32::from_le_bytes(b.try_into().unwrap_or_default());
+        Ok(data.chunks_exact(4).map(|b| f64::from(number(b))).collect())
+    } else {
+        Err(wrong(place, format!("holds other numbers than '<f8' and '<f4': {header}")))
+    }
+}
+
+/// A text from an array in NumPy's format.
+fn npy_text(bytes: &[u8]) -> Option<String> {
+    let (_, data) = npy_parts(bytes)?;
+    let letter = |b: &[u8]| char::from_u32(u32::from_le_bytes(b.try_into().ok()?));
+    data.chunks_exact(4).map(letter).collect()
+}
+
+/// ACRONYM's HDF5: `grasps/transforms`.
+#[cfg(feature = "hdf5")]
+pub(super) fn acronym(place: &str, bytes: Vec<u8>) -> Result<Found> {
+    let failed = |error: hdf5_pure::Error| wrong(place, error.to_string());
+    let file = hdf5_pure::File::from_bytes(bytes).map_err(failed)?;
+    let transforms = file.dataset("grasps/transforms").map_err(failed)?;
+    let words = match transforms.attrs().map_err(failed)?.get("tool_frame") {
+        Some(hdf5_pure::AttrValue::String(text)) => Some(text.clone()),
+        _ => None,
+    };
+    let values = transforms.read_f64().map_err(failed)?;
+    let found = values.chunks_exact(16).enumerate().map(|(index, values)| {
+        let mut rows = [[0.0; 4]; 4];
+        rows.iter_mut().flatten().zip(values).for_each(|(slot, value)| *slot = *value);
+        Ok(Raw {
+            name: index.to_string(),
+            frame: from_rows(&format!("{place}, transform {index}"), &rows)?,
+            gap: None,
+        })
+    });
+    Ok((found.collect::<Result<_>>()?, words))
+}
+
+#[cfg(not(feature = "hdf5"))]
+pub(super) fn acronym(place: &str, _bytes: Vec<u8>) -> Result<Found> {
+    Err(Error::new(
+        ErrorKind::Unsupported,
+        place,
+        "this build has no HDF5",
+        "build with `cargo build --release --features full`",
+    ))
+}
