@@ -145,7 +145,8 @@ fn the_palm_stands_aside_of_a_fixed_jaw() {
     add(DVec3::new(-0.03, -0.01, 0.0), DVec3::new(0.03, 0.01, 0.04));
     add(DVec3::new(-0.03, 0.05, -0.02), DVec3::new(0.03, 0.06, 0.12));
     let part = Part::from_triangles("block and wall", &vertices, &triangles).unwrap();
-    let options = ProposeOptions::default().with_approach_cone(Some(gripfast::propose::Cone { axis: DVec3::NEG_Z, half_angle: 0.01 }));
+    let options = ProposeOptions::default()
+        .with_approach_cone(Some(gripfast::propose::Cone { axis: DVec3::NEG_Z, half_angle: 0.01 }));
     let grips: Vec<Grip> = Proposer::new(&part, &vice(), &options)
         .unwrap()
         .flat_map(|chunk| chunk.grips)
