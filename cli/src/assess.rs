@@ -10,6 +10,7 @@ use gripfast::export::{Convention, Format, Origin};
 use gripfast::plan::{Assessed, Plan};
 use gripfast::poses;
 use gripfast::propose::Misfit;
+use gripfast::results::GripSet;
 use gripfast::units::Quantity;
 use serde_json::json;
 
@@ -80,14 +81,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let assessment = plan.assess(&list, turn)?;
     if as_json {
         let mut out = std::io::stdout().lock();
-        let rows: Vec<_> = assessment.poses.iter().map(row_json).collect();
+        let rows: Vec<_> =
+            assessment.poses.iter().map(|pose| row_json(pose, &assessment.set)).collect();
         serde_json::to_writer(
             &mut out,
             &json!({"poses": rows, "grips": assessment.set.grips.len()}),
         )?;
         writeln!(out)?;
     } else {
-        print(&mut terminal::output(), &assessment.poses)?;
+        print(&mut terminal::output(), &assessment.poses, &assessment.set)?;
     }
     if let Some(path) = &output {
         plan.save(&assessment.set)?;
@@ -95,11 +97,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             terminal::say(&format!("wrote {}", path.display()));
         }
     }
-    Ok(if assessment.set.grips.is_empty() { ExitCode::from(1) } else { ExitCode::SUCCESS })
+    Ok(if assessment.set.any_holds() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
 /// What a pose is, in a few words.
-fn verdict(pose: &Assessed) -> String {
+fn verdict(pose: &Assessed, set: &GripSet) -> String {
     match (&pose.fit, &pose.explanation, &pose.ranked) {
         (Err(Misfit::Tilted(Some(angle))), ..) => {
             format!("no faces: the nearest pair is {:.1} deg off", angle.to_degrees())
@@ -110,16 +112,17 @@ fn verdict(pose: &Assessed) -> String {
             let reason = explanation.rejection.as_ref().map(|reason| reason.name());
             format!("not free: {}", reason.unwrap_or_default().replace('_', " "))
         }
-        (.., Some(ranked)) if ranked.worst.status.holds() => match ranked.safety {
-            Some(safety) if safety < 1.0 => "slips".into(),
-            _ => "holds".into(),
+        (.., Some(ranked)) if ranked.worst.status.holds() => match set.verdict(ranked).holds() {
+            Some(false) => "slips".into(),
+            Some(true) => "holds".into(),
+            None => "free".into(),
         },
         (.., Some(ranked)) => format!("{:?}", ranked.worst.status).to_lowercase(),
         _ => "no contact".into(),
     }
 }
 
-fn row_json(pose: &Assessed) -> serde_json::Value {
+fn row_json(pose: &Assessed, set: &GripSet) -> serde_json::Value {
     let checks = pose.explanation.as_ref().map(|explanation| {
         let failed = explanation.checks.iter().filter(|check| !check.passed);
         failed.map(|check| format!("{}: {}", check.name, check.detail)).collect::<Vec<_>>()
@@ -127,13 +130,13 @@ fn row_json(pose: &Assessed) -> serde_json::Value {
     let (turned, shifted) =
         pose.fit.map_or((None, None), |fit| (Some(fit.turned), Some(fit.shifted)));
     json!({
-        "name": pose.name, "verdict": verdict(pose), "free": pose.is_free(),
+        "name": pose.name, "verdict": verdict(pose, set), "free": pose.is_free(),
         "faces": pose.explanation.as_ref().map(|explanation| [explanation.face_i, explanation.face_ii]),
         "failed": checks, "turned_rad": turned, "shifted_m": shifted, "grip": pose.ranked,
     })
 }
 
-fn print(out: &mut impl Write, poses: &[Assessed]) -> anyhow::Result<()> {
+fn print(out: &mut impl Write, poses: &[Assessed], set: &GripSet) -> anyhow::Result<()> {
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
     table.set_header([
@@ -163,7 +166,7 @@ fn print(out: &mut impl Write, poses: &[Assessed]) -> anyhow::Result<()> {
         let explanation = pose.explanation.as_ref();
         table.add_row([
             pose.name.clone(),
-            verdict(pose),
+            verdict(pose, set),
             number(mu_s, 5),
             number(ranked.and_then(|ranked| ranked.safety), 2),
             explanation.map_or("-".to_owned(), |one| format!("{} | {}", one.face_i, one.face_ii)),
@@ -186,7 +189,7 @@ fn print(out: &mut impl Write, poses: &[Assessed]) -> anyhow::Result<()> {
     let mut counts: std::collections::BTreeMap<String, usize> = Default::default();
     for pose in poses {
         // Without the numbers.
-        let word = verdict(pose);
+        let word = verdict(pose, set);
         let word = word.split(": the nearest").next().unwrap_or_default().to_owned();
         *counts.entry(word).or_default() += 1;
     }

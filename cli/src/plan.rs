@@ -14,6 +14,7 @@ use anyhow::Context;
 use gripfast::error::Error;
 use gripfast::export::{self, Format};
 use gripfast::plan::{Ahead, Observer, Outcome, Plan};
+use gripfast::poses::Pose;
 
 use super::why;
 use crate::terminal;
@@ -115,7 +116,16 @@ fn explain(plan: &Plan, text: &str) -> anyhow::Result<ExitCode> {
             explanation.part_from_grip
         }
     };
-    let (assessed, standing) = plan.place(&pose, TILT.to_radians())?;
+    let tilt = TILT.to_radians();
+    let (assessed, standing) = if plan.ahead()?.seconds > LONG && !plan.request().output.yes {
+        terminal::say(
+            "its rank is not told: finding all grips would take more than an hour (--yes does it)",
+        );
+        let mut poses = plan.assess(&[Pose::of_grip("pose", pose)], tilt)?.poses;
+        (poses.remove(0), None)
+    } else {
+        plan.place(&pose, tilt)?
+    };
     why::print_standing(&mut terminal::output(), &assessed, standing)?;
     Ok(if assessed.is_free() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

@@ -172,11 +172,7 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
         let line = error.span().map_or(String::new(), |span| {
             format!(":{}", text[..span.start.min(text.len())].matches('\n').count() + 1)
         });
-        Error::format(
-            format!("{place}{line}"),
-            shape(error.message()),
-            remedy(error.message()),
-        )
+        Error::format(format!("{place}{line}"), shape(error.message()), remedy(error.message()))
     })?;
     let reader = Reader { place, folder };
     if file.name.trim().is_empty() {

@@ -126,6 +126,7 @@ impl Plan {
                 race: scoring.polish == Polish::Top,
                 partial: None,
                 resume: false,
+                ids: None,
             };
             let found = search.run(&mut proposer, &mut (), &AtomicBool::new(false))?;
             let (set, _) = self.finish(&proposer, &assessor, found)?;
@@ -232,6 +233,7 @@ impl Plan {
                 pairs: proposer.tally().pairs,
                 candidates: poses.len() as u64,
                 ranked: ranking.ranked,
+                holding: self.settings.pads.value.map(|_| ranking.holding),
                 rejections,
                 comparison: None,
             },
@@ -242,7 +244,11 @@ impl Plan {
 
 /// Where a grip stands in a set in order.
 fn standing(ranked: &RankedGrip, set: &GripSet) -> Standing {
-    let (grip, merit) = (&ranked.grip, |grip: &RankedGrip| grip.score.unwrap_or(f64::INFINITY));
+    let grip = &ranked.grip;
+    // Grips that slip come after all that do not.
+    let merit = |grip: &RankedGrip| {
+        (set.verdict(grip).holds() != Some(false), grip.score.unwrap_or(f64::INFINITY))
+    };
     let apart = |other: &Grip| other.part_from_grip.origin.distance(grip.part_from_grip.origin);
     let turned = |other: &Grip| {
         let [a, b] = [grip, other].map(|grip| grip.part_from_grip.rotation);
