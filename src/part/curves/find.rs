@@ -37,6 +37,8 @@ const MANY_FACETS: usize = 60;
 const SAMPLE: usize = 300;
 /// Distance of vertices from a cylinder as a share of its radius up to which it is no cone.
 const STRAIGHT: f64 = 5e-4;
+/// Bent facets of a part from which on only whole groups of them are looked at for noise.
+const MANY_SEEDS: usize = 200_000;
 /// Strips of a cylinder or cone from which on its outermost ones, too, are no planes.
 const STRIPS: f64 = 6.0;
 /// Sag as a share of the diagonal up to which that holds.
@@ -191,11 +193,25 @@ impl Growth<'_> {
         faces.push(Face { found, cut });
     }
 
+    /// Whether chords rise above the uncertainty of the vertices: of finer facets a few in a row lie
+    /// on any surface.
+    fn shows_curvature(&self, seed: u32) -> bool {
+        let net = self.net;
+        net.borders.of(seed as usize).iter().any(|border| {
+            let width = net.area(seed) / border.length;
+            net.is_smooth(seed, border.other)
+                && width * net.bend(seed, border.other).abs() / 8.0 > net.floor
+        })
+    }
+
     /// Surfaces whose corners lie on them exactly.
     fn exact(&mut self, seeds: &[u32], faces: &mut Vec<Face>) {
         let mut failed = 0;
         for (index, &seed) in seeds.iter().enumerate() {
             if self.owner[seed as usize] != FREE || index % (1 + failed / PATIENCE) != 0 {
+                continue;
+            }
+            if !self.shows_curvature(seed) {
                 continue;
             }
             let judged = |growth: &mut Self, found: Option<Found>| {
@@ -274,8 +290,9 @@ impl Growth<'_> {
             })
             .collect();
         groups.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let mut tries = NOISY_TRIES;
-        for (_, facets) in groups.iter().take(NOISY_TRIES) {
+        // Not over and over on a freely curved surface of a million facets.
+        let mut tries = if seeds.len() < MANY_SEEDS { NOISY_TRIES } else { 0 };
+        for (_, facets) in groups.iter().take(if tries > 0 { NOISY_TRIES } else { 3 }) {
             if self.noisy_surface(facets, faces) {
                 continue;
             }

@@ -18,7 +18,7 @@ const LEAST_TURN: f64 = 0.45;
 /// ... of a torus, about its tube and about its axis: 17 and 10 degrees.
 const LEAST_TORUS: [f64; 2] = [0.3, 0.17];
 /// Turn \[rad\] above which nothing but a circle fits a circle within the tolerances (an involute
-/// or an ellipse leaves it by more): 100 degrees; 60 with noise.
+/// or an ellipse leaves it by more): 100 degrees; 60 where the residual is a small one.
 const SURE: [f64; 2] = [1.75, 1.05];
 /// Residual as a share of the sag below which even a short arc is one.
 const SURELY: f64 = 0.005;
@@ -206,7 +206,7 @@ impl Growth<'_> {
         let is_true = match exactness {
             Exactness::Exact => true,
             Exactness::Noisy => {
-                (found.kind == Kind::Cylinder && turn > SURE[1]) || self.is_random(found)
+                (found.kind == Kind::Cylinder && turn == TAU) || self.is_random(found)
             }
         };
         (is_sound && is_true).then_some(Cut { step, facets, turn })

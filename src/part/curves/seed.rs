@@ -179,10 +179,12 @@ impl Growth<'_> {
         {
             return None;
         }
+        // The first guess of a sphere is as good as its fit but for noise.
+        let poor = if kind == Kind::Sphere { 0.1 * POOR } else { POOR };
         // Out of reach: exact facets come near at once, whereas most facets of a freely curved
         // surface end here.
         let reach = match exactness {
-            Exactness::Exact => POOR * self.rough_sag(&guess, facets) + 4.0 * self.net.floor,
+            Exactness::Exact => poor * self.rough_sag(&guess, facets) + 4.0 * self.net.floor,
             Exactness::Noisy => f64::INFINITY,
         };
         if guess.residual(points) > reach.min(0.1 * guess.radius()) {
