@@ -18,7 +18,7 @@ const DISTANCE: [f64; 2] = [1e-5, 3e-5];
 /// Uncertainty of a corner as a share of the diagonal, besides that of 32-bit floats; likewise.
 const JITTER: [f64; 2] = [1e-7, 1e-5];
 /// Uncertainty of a vertex of a curved surface as a share of the diagonal: rounding in the file.
-const FLOOR: f64 = 1e-6;
+const FLOOR: f64 = 5e-7;
 /// Width (twice area over half perimeter) below which a face is no place for a pad, as a share of
 /// the diagonal.
 const NARROWEST: f64 = 5e-4;

@@ -18,7 +18,7 @@ use crate::part::repair::Repaired;
 const LEAST: f64 = 5e-4;
 /// Attempts that may fail before only each second facet is tried, then each third, and so on:
 /// freely curved surfaces of a million facets.
-const PATIENCE: usize = 300;
+const PATIENCE: usize = 150;
 /// Facets that a surface found in spite of noise has at least.
 const MANY: usize = 24;
 /// How much larger than its neighbour a facet of a noisy surface may be.
@@ -39,6 +39,8 @@ const SAMPLE: usize = 300;
 const STRAIGHT: f64 = 5e-4;
 /// Bent facets of a part from which on only whole groups of them are looked at for noise.
 const MANY_SEEDS: usize = 200_000;
+/// Patches that may then be looked at in vain.
+const FEW_PATCHES: usize = 300;
 /// Strips of a cylinder or cone from which on its outermost ones, too, are no planes.
 const STRIPS: f64 = 6.0;
 /// Sag as a share of the diagonal up to which that holds.
@@ -200,12 +202,15 @@ impl Growth<'_> {
         net.borders.of(seed as usize).iter().any(|border| {
             let width = net.area(seed) / border.length;
             net.is_smooth(seed, border.other)
-                && width * net.bend(seed, border.other).abs() / 8.0 > net.floor
+                && width * net.bend(seed, border.other).abs() / 8.0 > 3.0 * net.floor
         })
     }
 
     /// Surfaces whose corners lie on them exactly.
     fn exact(&mut self, seeds: &[u32], faces: &mut Vec<Face>) {
+        if seeds.len() > MANY_SEEDS {
+            self.patience = FEW_PATCHES;
+        }
         let mut failed = 0;
         for (index, &seed) in seeds.iter().enumerate() {
             if self.owner[seed as usize] != FREE || index % (1 + failed / PATIENCE) != 0 {

@@ -18,6 +18,8 @@ const USUAL: f64 = 8.0;
 pub(super) const SAG_RATIO: f64 = 2.56;
 /// ... on a torus, whose facets are wider outside than inside.
 const SAG_RATIO_TORUS: f64 = 5.0;
+/// Patches that may be looked at in vain.
+const PATCHES: usize = 4000;
 /// No surface.
 pub(super) const FREE: u32 = u32::MAX;
 
@@ -55,8 +57,8 @@ pub(super) struct Growth<'a> {
     pub owner: Vec<u32>,
     /// Whether each surface found so far may be taken over by one that is curved both ways.
     pub yields: Vec<bool>,
-    /// Patches looked at in vain.
-    pub patches_missed: usize,
+    /// Patches that may still be looked at in vain: their fits are the dearest.
+    pub patience: usize,
     stamp: u32,
     member: Vec<u32>,
     refused: Vec<u32>,
@@ -70,7 +72,7 @@ impl<'a> Growth<'a> {
             net,
             owner: vec![FREE; facets],
             yields: Vec::new(),
-            patches_missed: 0,
+            patience: PATCHES,
             stamp: 0,
             member: vec![0; facets],
             refused: vec![0; facets],

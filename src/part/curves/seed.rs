@@ -19,8 +19,6 @@ const PATCH_RATIO: f64 = 10.0;
 const PATCH: usize = 12;
 /// Distance of corners from a first guess as a multiple of the facets' sag that a fit can mend.
 const POOR: f64 = 2.0;
-/// Patches that may be looked at in vain: their fits are the dearest.
-const PATCH_PATIENCE: usize = 500;
 /// Points that a fit needs beyond its parameters, to be a test.
 const SPARE: usize = 2;
 /// ... and as many again for a torus, which comes near to many a surface.
@@ -293,7 +291,7 @@ impl Growth<'_> {
     /// A cylinder, cone or torus by the facets about `seed`, for meshes without rows.
     pub(super) fn by_patch(&mut self, seed: u32) -> Option<Found> {
         let patch = self.patch(seed, 2 * PATCH);
-        if patch.len() < PATCH || self.patches_missed > PATCH_PATIENCE {
+        if patch.len() < PATCH || self.patience == 0 {
             return None;
         }
         let points = self.points(&patch);
@@ -305,7 +303,7 @@ impl Growth<'_> {
         let points = self.points(&patch);
         let torus = self.torus_of(&patch, &points, Exactness::Exact);
         if torus.is_none() {
-            self.patches_missed += 1;
+            self.patience -= 1;
         }
         torus
     }
