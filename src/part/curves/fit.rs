@@ -132,7 +132,11 @@ impl Surface {
     /// `None` when it runs away.
     pub(super) fn fitted(mut self, kind: Kind, points: &[DVec3]) -> Option<Surface> {
         let stride = points.len().div_ceil(MOST_POINTS).max(1);
-        let sample: Vec<DVec3> = points.iter().step_by(stride).copied().collect();
+        // Not every second point, say: that may be one of two rings.
+        let jitter = |k: usize| (k.wrapping_mul(0x9e37_79b9) >> 16) % stride;
+        let sample: Vec<DVec3> = (0..points.len().div_ceil(stride))
+            .filter_map(|k| points.get(k * stride + jitter(k)).copied())
+            .collect();
         let count = sample.len() as f64;
         let mean = sample.iter().sum::<DVec3>() / count;
         let size = (sample.iter().map(|p| p.distance_squared(mean)).sum::<f64>() / count).sqrt();
