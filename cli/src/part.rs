@@ -14,8 +14,8 @@ use serde_json::json;
 
 use crate::{flags, terminal};
 
-/// Reads a part, checks its mesh, and lists its planar faces and the pairs of them that can be
-/// gripped.
+/// Reads a part, checks its mesh, and lists its planar and curved faces and the pairs of planar
+/// ones that can be gripped.
 #[derive(Debug, ClapArgs)]
 #[command(
     after_help = "EXAMPLES:\n  gripfast part bracket.stl\n  gripfast part bracket.stl --unit in --density 2.7g/cm3\n  gripfast part bracket.3mf --mass 350g --json\n  gripfast part bracket.stl --plot faces.svg\n\n\
@@ -46,7 +46,7 @@ pub(crate) struct Args {
     /// Most memory that reading may take, e.g. 2GB. Default: half of the machine's.
     #[arg(long, value_name = "SIZE")]
     max_memory: Option<String>,
-    /// Drawing (SVG): three views with the planar faces numbered.
+    /// Drawing (SVG): three views with the faces numbered.
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// One JSON object in SI units on standard output.

@@ -1,5 +1,5 @@
 //! A drawing of a part: three views with its planar faces numbered, coloured by how jaws can grip
-//! them.
+//! them, and its curved faces numbered.
 
 use std::fmt::Write;
 
@@ -64,13 +64,14 @@ pub fn svg(part: &Part) -> String {
     let _ = writeln!(
         text,
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" width=\"{width:.0}\" height=\"{height:.0}\" font-family=\"sans-serif\" font-size=\"12\">\n\
-         <style>path{{stroke:#333;stroke-width:.8;stroke-linejoin:round;fill-rule:evenodd}}.outside{{fill:#a9c7e8}}.inside{{fill:#f2c48d}}.both{{fill:#c9b6e4}}.none{{fill:#d9dde1}}.curved{{fill:#eceff1;stroke:#c5ccd2;stroke-width:.3}}.number{{text-anchor:middle;dominant-baseline:central;font-weight:600;fill:#013;stroke:#fff;stroke-width:3px;paint-order:stroke}}</style>\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"{MARGIN:.0}\" y=\"22\" font-size=\"15\">{}: {:.1} x {:.1} x {:.1} mm, {} planar faces</text>",
+         <style>path{{stroke:#333;stroke-width:.8;stroke-linejoin:round;fill-rule:evenodd}}.outside{{fill:#a9c7e8}}.inside{{fill:#f2c48d}}.both{{fill:#c9b6e4}}.none{{fill:#d9dde1}}.curved{{fill:#eceff1;stroke:#c5ccd2;stroke-width:.3}}.round{{fill:#dcebdc}}.number{{text-anchor:middle;dominant-baseline:central;font-weight:600;fill:#013;stroke:#fff;stroke-width:3px;paint-order:stroke}}</style>\n\
+         <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"{MARGIN:.0}\" y=\"22\" font-size=\"15\">{}: {:.1} x {:.1} x {:.1} mm, {} planar faces, {} curved</text>",
         svg::escape(&part.name),
         size.x * 1e3,
         size.y * 1e3,
         size.z * 1e3,
-        part.faces.len()
+        part.faces.len(),
+        part.curved.len()
     );
     let mut left = MARGIN;
     let mut left_out = 0;
@@ -107,6 +108,14 @@ pub fn svg(part: &Part) -> String {
                 at.x, at.y
             );
         }
+        for (number, at) in round_numbers(part, view, &shapes) {
+            let at = place(at);
+            let _ = writeln!(
+                text,
+                "<text class=\"number round\" x=\"{:.1}\" y=\"{:.1}\">{number}</text>",
+                at.x, at.y
+            );
+        }
         text.push_str("</g>\n");
         left += extent.x * scale + MARGIN;
     }
@@ -116,6 +125,7 @@ pub fn svg(part: &Part) -> String {
         ("inside", "from inside"),
         ("both", "either"),
         ("none", "no opposite face"),
+        ("round", "cylinder, cone, sphere ..."),
     ] {
         let y = height - 22.0;
         let _ = writeln!(
@@ -179,6 +189,10 @@ fn shapes(part: &Part, view: &View, class: &[&'static str]) -> (Vec<Shape>, usiz
         });
     }
     let mut curved: Vec<Shape> = Vec::new();
+    let mut is_round = vec![false; part.mesh.triangles.len()];
+    for &triangle in part.curved.iter().flat_map(|face| &face.triangles) {
+        is_round[triangle as usize] = true;
+    }
     for triangle in
         (0..part.mesh.triangles.len() as u32).filter(|&triangle| !planar[triangle as usize])
     {
@@ -188,7 +202,7 @@ fn shapes(part: &Part, view: &View, class: &[&'static str]) -> (Vec<Shape>, usiz
             let outer = [a, b, c].map(flat).to_vec();
             curved.push(Shape {
                 depth: (a + b + c).dot(view.eye) / 3.0,
-                class: "curved",
+                class: if is_round[triangle as usize] { "curved round" } else { "curved" },
                 polygons: vec![Polygon { outer, holes: Vec::new() }],
                 face: None,
             });
@@ -200,6 +214,29 @@ fn shapes(part: &Part, view: &View, class: &[&'static str]) -> (Vec<Shape>, usiz
     }
     shapes.sort_by(|a, b| a.depth.total_cmp(&b.depth));
     (shapes, left_out)
+}
+
+/// Numbers of the curved faces, each on the triangle nearest to the eye of those that look at it,
+/// where nothing lies in front.
+fn round_numbers(part: &Part, view: &View, shapes: &[Shape]) -> Vec<(u32, DVec2)> {
+    let mut found = Vec::new();
+    for face in &part.curved {
+        let seen = face.triangles.iter().filter_map(|&triangle| {
+            let [a, b, c] = part.mesh.corners(triangle);
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            let middle = (a + b + c) / 3.0;
+            (normal.dot(view.eye) > READABLE).then(|| (middle.dot(view.eye), middle))
+        });
+        let Some((depth, middle)) = seen.max_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
+        let point = DVec2::new(view.right.dot(middle), view.up.dot(middle));
+        let hidden = shapes.iter().any(|cover| {
+            cover.depth > depth + 1e-9 && cover.polygons.iter().any(|p| contains(p, point))
+        });
+        if !hidden {
+            found.push((face.id, point));
+        }
+    }
+    found
 }
 
 /// Numbers of the faces that can be seen, with a place on each where nothing lies in front.

@@ -50,6 +50,32 @@ fn pocket_floors_are_numbered_and_hidden_faces_are_not() {
 }
 
 #[test]
+fn a_shaft_carries_the_number_of_its_cylinder() {
+    let count = 32;
+    let ring = |z: f64| {
+        (0..count).map(move |k| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(count);
+            DVec3::new(0.01 * angle.cos(), 0.01 * angle.sin(), z)
+        })
+    };
+    let vertices: Vec<DVec3> = ring(0.0).chain(ring(0.05)).collect();
+    let mut triangles = Vec::new();
+    for k in 0..count as u32 {
+        let (next, up) = ((k + 1) % count as u32, count as u32);
+        triangles.extend([[k, next, up + next], [k, up + next, up + k]]);
+    }
+    for k in 1..count as u32 - 1 {
+        triangles.extend([[0, k + 1, k], [count as u32, count as u32 + k, count as u32 + k + 1]]);
+    }
+    let part = Part::from_triangles("shaft", &vertices, &triangles).unwrap();
+    let svg = drawing::svg(&part);
+    // From the front and from the side, not from above.
+    assert_eq!(svg.matches("class=\"number round\"").count(), 2);
+    assert!(svg.contains(">2</text>") && svg.contains("1 curved</text>"));
+    assert!(svg.contains("class=\"curved round\""));
+}
+
+#[test]
 fn the_command_writes_it() {
     let scratch = tempfile::tempdir().unwrap();
     let part = crate::support::root().join("data/parts/spur_gear.stl");
