@@ -452,3 +452,53 @@ fn rounded_boxes_have_their_planes_and_fillets() {
         }
     }
 }
+
+/// Curved faces of each kind in the exact part, and those that have to be found: the others are
+/// narrower than 26 degrees (tips and roots of the gear, corners of the feature block) or pieces of
+/// an irregular mesh (chamfers of the nut).
+#[test]
+fn real_parts_have_the_curved_faces_of_their_cad_models() {
+    let Some(parts) = crate::support::reference("parts") else { return };
+    let files = [
+        ("gen/gen_bearing_608.truth.json", "gen/gen_bearing_608.stl", [4, 0, 12, 8]),
+        (
+            "gen/gen_flange_slipon_2in150.truth.json",
+            "gen/gen_flange_slipon_2in150.stl",
+            [11, 0, 0, 3],
+        ),
+        ("gen/gen_gantryplate_cbeam.truth.json", "gen/gen_gantryplate_cbeam.stl", [43, 0, 0, 0]),
+        ("gen/gen_hexnut_M10_simple.truth.json", "gen/gen_hexnut_M10_simple.stl", [1, 0, 0, 0]),
+        ("gen/gen_lbracket_openbuilds.truth.json", "gen/gen_lbracket_openbuilds.stl", [4, 0, 0, 0]),
+        ("gen/gen_pillowblock_cq.truth.json", "gen/gen_pillowblock_cq.stl", [13, 0, 0, 0]),
+        ("gen/gen_pipe_2in_sch40.truth.json", "gen/gen_pipe_2in_sch40.stl", [2, 0, 0, 0]),
+        ("gen/gen_plainwasher_M12.truth.json", "gen/gen_plainwasher_M12.stl", [2, 0, 0, 0]),
+        ("gen/gen_shaftkey_6x6x40.truth.json", "gen/gen_shaftkey_6x6x40.stl", [2, 0, 0, 0]),
+        ("gen/gen_spurgear_m2_z24.truth.json", "gen/gen_spurgear_m2_z24.stl", [50, 0, 0, 0]),
+        ("gen/gen_vslot_20x20_100.truth.json", "gen/gen_vslot_20x20_100.stl", [5, 0, 0, 0]),
+        (
+            "truth/o2ac__02-PANEL.step.truth.json",
+            "derived/o2ac__02-PANEL.step__occt_lin0.05_ang0.3.stl",
+            [10, 0, 0, 0],
+        ),
+        (
+            "truth/trimesh__featuretype.STEP.truth.json",
+            "derived/trimesh__featuretype.STEP__occt_lin0.05_ang0.3.stl",
+            [28, 0, 0, 0],
+        ),
+    ];
+    for (truth, mesh, least) in files {
+        let truth: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(parts.join(truth)).unwrap()).unwrap();
+        let part = Part::read(&parts.join(mesh), &gripfast::part::ReadOptions::default()).unwrap();
+        for (kind, least) in ["cylinder", "cone", "sphere", "torus"].iter().zip(least) {
+            let found = part.curved.iter().filter(|face| face.shape.name() == *kind).count();
+            let exact = truth["surface_kinds"][kind].as_u64().unwrap_or(0) as usize;
+            assert!((least..=exact).contains(&found), "{mesh}: {found} of {exact}, a {kind}");
+        }
+        let (low, high) = part.mesh.bounding_box();
+        for face in &part.curved {
+            // Exact meshes: nothing but the rounding of the file.
+            assert!(face.residual < 2e-6 * (high - low).length(), "{mesh}: {:?}", face.shape);
+        }
+    }
+}
