@@ -17,8 +17,8 @@ use crate::part::repair::Repaired;
 /// Side of a square, as a share of the part's diagonal, below whose area a curved face is none.
 const LEAST: f64 = 5e-4;
 /// Attempts that may fail before only each second facet is tried, then each third, and so on:
-/// freely curved surfaces of a million facets.
-const PATIENCE: usize = 150;
+/// freely curved surfaces; the second number where they have very many facets.
+const PATIENCE: [usize; 2] = [150, 10];
 /// Facets that a surface found in spite of noise has at least.
 const MANY: usize = 24;
 /// How much larger than its neighbour a facet of a noisy surface may be.
@@ -208,12 +208,13 @@ impl Growth<'_> {
 
     /// Surfaces whose corners lie on them exactly.
     fn exact(&mut self, seeds: &[u32], faces: &mut Vec<Face>) {
+        let mut patience = PATIENCE[0];
         if seeds.len() > MANY_SEEDS {
-            self.patience = FEW_PATCHES;
+            (patience, self.patience) = (PATIENCE[1], FEW_PATCHES);
         }
         let mut failed = 0;
         for (index, &seed) in seeds.iter().enumerate() {
-            if self.owner[seed as usize] != FREE || index % (1 + failed / PATIENCE) != 0 {
+            if self.owner[seed as usize] != FREE || index % (1 + failed / patience) != 0 {
                 continue;
             }
             if !self.shows_curvature(seed) {
