@@ -240,11 +240,16 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
     Table { columns, rows: grips.len() }
 }
 
+/// A scalar part below this is that of half a turn, but for rounding.
+const HALF_TURN: f64 = 1e-9;
+
 /// The quaternion with a scalar part that is not negative: one of the two that mean the same
-/// rotation.
+/// rotation. Of half a turn, whose scalar part is zero, the one whose first other part is positive.
 pub(super) fn positive(quaternion: DQuat) -> DQuat {
     let quaternion = quaternion.normalize();
-    if quaternion.w < 0.0 { -quaternion } else { quaternion }
+    let [x, y, z, w] = quaternion.to_array();
+    let first = [w, x, y, z].into_iter().find(|part| part.abs() > HALF_TURN);
+    if first.is_some_and(|part| part < 0.0) { -quaternion } else { quaternion }
 }
 
 fn slip_centre(grip: &RankedGrip) -> Option<[f64; 2]> {
@@ -277,7 +282,7 @@ pub(super) fn write_csv(
     writer: &mut impl Write,
 ) -> std::io::Result<()> {
     let mut csv = csv::Writer::from_writer(writer);
-    csv.write_record(table.columns.iter().map(|column| column.name))?;
+    csv.write_record(table.columns.iter().map(|column| column.name)).map_err(plain)?;
     for row in 0..table.rows {
         csv.write_record(table.columns.iter().map(|column| match &column.values {
             Values::Integer(values) => values[row].to_string(),
@@ -287,7 +292,16 @@ pub(super) fn write_csv(
             }
             Values::Text(values) if spreadsheet => unformulated(&values[row]),
             Values::Text(values) => values[row].clone(),
-        }))?;
+        }))
+        .map_err(plain)?;
     }
     csv.flush()
+}
+
+/// The error of the file below, so that its kind is seen: a pipe whose reader has gone, say.
+fn plain(error: csv::Error) -> std::io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        other => std::io::Error::other(format!("{other:?}")),
+    }
 }

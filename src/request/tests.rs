@@ -12,6 +12,8 @@ max_memory = "2GB"
 outside_buffers = true
 gripper = "my.toml"
 density = "2.7 g/cm3"
+com = "1in,-2mm,0mm"
+inertia = "67kgmm2,107kgmm2,91kgmm2,0kgm2,1kgmm2,30kgmm2"
 force = "18lbf"
 loads = "gravity, ball:12:5N"
 accel = "2g"
@@ -42,6 +44,7 @@ seeds = 200
 k1 = 2
 k2 = 0.5
 pad_friction = 0.7
+safety = 1.5
 position_error = "0.2mm"
 closing_friction = 0.1
 separation = "discard"
@@ -53,6 +56,7 @@ threads = 2
 top = 3
 diverse = true
 merge_symmetric = true
+ids = [3, 17]
 keep = 77
 pose_noise = "1mm,2deg"
 noise_samples = 9
@@ -132,6 +136,9 @@ fn values_out_of_their_range_are_refused_by_field() {
         ("position_error", &|r| r.scoring.position_error = Length(-1e-3)),
         ("closing_friction", &|r| r.scoring.closing_friction = -0.1),
         ("pad_friction", &|r| r.scoring.pad_friction = Some(f64::NAN)),
+        ("safety", &|r| r.scoring.safety = 0.0),
+        ("inertia", &|r| r.inertia = Some(InertiaMatrix([1.0, 1.0, 2.1, 0.0, 0.0, 0.0]))),
+        ("inertia", &|r| r.inertia = Some(InertiaMatrix([1.0, 1.0, 1.0, 0.0, 0.0, 0.6]))),
         ("max_memory", &|r| r.max_memory = Some(Memory(0.0))),
         ("threads", &|r| r.scoring.threads = Some(0)),
         ("polish", &|r| (r.scoring.polish, r.scoring.k1) = (Polish::Top, -1.0)),
@@ -158,6 +165,10 @@ proptest! {
         let region = Region { low, high };
         let back: Region = region.to_string().parse().unwrap();
         prop_assert_eq!((bits(back.low), bits(back.high)), (bits(low), bits(high)));
+        let back: Position = Position(low).to_string().parse().unwrap();
+        prop_assert_eq!(bits(back.0), bits(low));
+        let back: InertiaMatrix = InertiaMatrix(v).to_string().parse().unwrap();
+        prop_assert_eq!(back.0.map(f64::to_bits), v.map(f64::to_bits));
         prop_assume!(low != DVec3::ZERO);
         let cone = Cone { axis: low, half_angle: v[3] };
         let back: Cone = cone.to_string().parse().unwrap();

@@ -36,3 +36,23 @@ pub(crate) fn say(line: &str) {
     use std::io::Write;
     let _ = writeln!(std::io::stderr(), "{line}");
 }
+
+/// A command line with more flags, each in the place of the one of the same name: a flag given twice
+/// is an error.
+pub(crate) fn with_flags<'a>(base: &[&'a str], more: &[&'a str]) -> Vec<&'a str> {
+    let name = |word: &str| word.split('=').next().unwrap_or_default().to_owned();
+    let given: Vec<String> =
+        more.iter().filter(|word| word.starts_with("--")).map(|word| name(word)).collect();
+    let mut line = Vec::new();
+    let mut words = base.iter().peekable();
+    while let Some(word) = words.next() {
+        if given.contains(&name(word)) {
+            // Its value goes with it.
+            let _ = words.next_if(|value| !value.starts_with('-'));
+        } else {
+            line.push(*word);
+        }
+    }
+    line.extend(more);
+    line
+}

@@ -52,10 +52,11 @@ export function toolPose(report, i, frame, origin) {
   return { x, y, z, origin: origin === 'pads' ? middle : add(middle, turn(add(stated(origin)[3], [along, 0, aside]))) };
 }
 
-/** The quaternion (x, y, z, w) of a pose with w >= 0. */
+/** The quaternion (x, y, z, w) of a pose with w >= 0; of half a turn the one whose first other part is positive. */
 function turned({ x, y, z }) {
   const q = quaternion({ x1: x, x2: y, x3: z });
-  return q[3] < 0 ? q.map((v) => -v) : q;
+  const first = [q[3], q[0], q[1], q[2]].find((v) => Math.abs(v) > 1e-6);
+  return first < 0 ? q.map((v) => -v) : q;
 }
 
 /** `value` with `digits` significant digits, in plain ASCII; rounding beside one is zero. */

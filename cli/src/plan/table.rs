@@ -120,16 +120,14 @@ fn summary(out: &mut impl Write, set: &GripSet, gripper: &Gripper) -> std::io::R
     let size = (set.part.bbox_max - set.part.bbox_min) * 1e3;
     writeln!(
         out,
-        "{}: {} x {} x {} mm, {} triangles, {:.4} kg, centre of mass ({:.2}, {:.2}, {:.2}) mm",
+        "{}: {} x {} x {} mm, {} triangles, {:.4} kg, centre of mass {} mm",
         set.part.file,
         length(size.x),
         length(size.y),
         length(size.z),
         set.part.triangles,
         mass.mass,
-        mass.centre_of_mass.x * 1e3,
-        mass.centre_of_mass.y * 1e3,
-        mass.centre_of_mass.z * 1e3
+        tuple(&(mass.centre_of_mass * 1e3).to_array(), 2)
     )?;
     writeln!(
         out,

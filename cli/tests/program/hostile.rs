@@ -92,7 +92,7 @@ const HEXAGON: &str = "data/parts/hex_nut.stl";
 /// A short plan with these loads.
 fn plan_with(loads: &str, more: &[&str]) -> Answer {
     let part = crate::support::root().join(HEXAGON).display().to_string();
-    let mut arguments = vec![
+    let arguments = [
         "plan",
         &part,
         "--gripper",
@@ -106,8 +106,7 @@ fn plan_with(loads: &str, more: &[&str]) -> Answer {
         "--loads",
         loads,
     ];
-    arguments.extend(more);
-    run(&arguments)
+    run(&crate::support::with_flags(&arguments, more))
 }
 
 #[test]

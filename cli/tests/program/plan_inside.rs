@@ -15,20 +15,22 @@ fn plan(folder: &Path, name: &str, more: &[&str]) -> GripSet {
         .current_dir(folder)
         .arg("plan")
         .arg(part)
-        .args([
-            "--gripper",
-            "generic",
-            "--mass",
-            "300g",
-            "--angle-step",
-            "45deg",
-            "--backend",
-            "cpu",
-            "--quiet",
-            "-o",
-        ])
+        .args(crate::support::with_flags(
+            &[
+                "--gripper",
+                "generic",
+                "--mass",
+                "300g",
+                "--angle-step",
+                "45deg",
+                "--backend",
+                "cpu",
+                "--quiet",
+            ],
+            more,
+        ))
+        .arg("-o")
         .arg(&out)
-        .args(more)
         .assert()
         .success();
     GripSet::read(&out).unwrap()

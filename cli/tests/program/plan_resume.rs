@@ -33,10 +33,9 @@ fn command(file: &Path, more: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_gripfast"));
     command
         .current_dir(crate::support::root())
-        .args(PLAN)
+        .args(crate::support::with_flags(&PLAN, more))
         .arg("-o")
         .arg(file)
-        .args(more)
         .stdin(Stdio::null());
     command
 }
