@@ -5,6 +5,7 @@ pub mod catalogue;
 pub mod check;
 pub mod drawing;
 pub mod file;
+pub mod layer;
 mod mesh;
 mod travel;
 
@@ -19,6 +20,7 @@ use crate::model::{Contact, Frame, Grip, Ring};
 pub use catalogue::find;
 pub use check::check;
 pub use file::{parse, read};
+pub use layer::Layer;
 pub use travel::{Travel, TravelRow};
 
 /// A two-finger gripper in SI units, in the grip frame (x1 approach, x3 closing; origin midway
@@ -52,6 +54,12 @@ pub struct Gripper {
     /// Young's modulus of the rubber \[Pa\], where stated.
     #[serde(default)]
     pub pad_modulus: Option<f64>,
+    /// Poisson's ratio of the rubber, where stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pad_poisson: Option<f64>,
+    /// Pressure per compression of the layer [Pa/m], where stated: [`Gripper::layer`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pad_stiffness: Option<f64>,
     /// Distance from the pad face to the finger's outer gripping face \[m\], where the gripper can
     /// grip from inside, opening into a slot; that face has the pad's outline.
     #[serde(default)]

@@ -5,12 +5,16 @@
 //! (palm towards fingertips); `x2 = x3 x x1`. Face I lies at `x3 = +d/2` (the jaw pushes the body
 //! along `-x3`), face II at `x3 = -d/2`.
 
+mod surface;
+
 use std::sync::Arc;
 
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, ErrorKind, Result};
+
+pub use surface::{Gap, Piece, Surfaces};
 
 /// A closed loop of points \[m\]; the last point joins the first.
 pub type Ring = Vec<DVec2>;
@@ -276,15 +280,21 @@ pub struct Grip {
     pub part_from_grip: Frame,
     /// Distance between the two faces, `d` \[m\].
     pub width: f64,
-    /// Planar face of the part under pad I ([`crate::part::PlanarFace::id`]).
+    /// Face of the part under pad I ([`crate::part::PlanarFace::id`],
+    /// [`crate::part::CurvedFace::id`]).
     pub face_i: u32,
-    /// Planar face of the part under pad II.
+    /// Face of the part under pad II.
     pub face_ii: u32,
     /// Angle of the approach axis about the closing axis, from the face pair's reference direction
     /// \[rad\].
     pub angle: f64,
     /// Contact areas in the grip frame; shared by grips whose areas are the same in the pad frame.
+    /// Of [`Grip::surfaces`] what is pressed without a load.
     pub contact: Arc<Contact>,
+    /// What the pads touch, where it is not plane: all of the part's surface that the pads' layers
+    /// reach; shared as the areas are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surfaces: Option<Arc<Surfaces>>,
     /// The jaws open against the faces from inside (a slot): face I then lies at `x3 = -width/2`,
     /// still pushed along `-x3`, and the `d` of the mechanics is `-width`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]

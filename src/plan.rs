@@ -430,6 +430,7 @@ impl Plan {
 
     fn provenance(&self, backend: String, complete: bool) -> Provenance {
         let resolved = Resolved {
+            pad_stiffness: self.gripper.layer().stiffness,
             force: Force(self.settings.force),
             spacing: Length(self.propose.spacing(&self.gripper)),
             pad_friction: self.settings.pads.value,

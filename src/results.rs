@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
+use crate::mechanics::curved::{FaceAnswer, Note};
 use crate::model::{Bounds, Grip, Pressure, Slip, Status, Wrench};
 use crate::part::MassProperties;
 use crate::request::Request;
@@ -101,13 +102,18 @@ pub struct Resolved {
     pub seeds: usize,
     /// Best grips kept, at most.
     pub keep: usize,
+    /// Pressure per compression of the pads' layers [Pa/m], for faces that are not plane:
+    /// [`crate::gripper::Gripper::layer`]; of a file that does not say zero.
+    #[serde(default)]
+    pub pad_stiffness: f64,
 }
 
 impl Default for Resolved {
     /// Nothing but a safety of 1.
     fn default() -> Self {
         let (force, spacing) = (Force::default(), Length::default());
-        Self { force, spacing, pad_friction: None, safety: one(), seeds: 0, keep: 0 }
+        let (pad_friction, safety) = (None, one());
+        Self { force, spacing, pad_friction, safety, seeds: 0, keep: 0, pad_stiffness: 0.0 }
     }
 }
 
@@ -232,6 +238,12 @@ pub struct RankedGrip {
     /// Gripping force of one jaw at which `mu_s` of the worst load equals the pad friction over the
     /// safety \[N\].
     pub force_needed: Option<f64>,
+    /// Of a contact that is not plane: what each face carries under the worst load.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub faces: Option<[FaceAnswer; 2]>,
+    /// Of a contact that is not plane: what to know beside the numbers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<Note>,
     /// Ids of the grips left out because a symmetry of the part maps them to this one, where they
     /// were merged.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -268,6 +280,8 @@ impl RankedGrip {
             twist_margin: 0.0,
             safety: None,
             force_needed: None,
+            faces: None,
+            notes: Vec::new(),
             merged: Vec::new(),
             load_multiple: None,
             earlier: None,

@@ -35,6 +35,8 @@ pub enum Quantity {
     Density,
     /// Pascals inside.
     Pressure,
+    /// Pascals per metre inside.
+    Stiffness,
     /// Seconds inside.
     Time,
     /// Bytes inside.
@@ -88,6 +90,9 @@ impl Quantity {
                 ("bar", 1e5),
                 ("psi", 6_894.757_293_168),
             ],
+            Self::Stiffness => {
+                &[("Pa/m", 1.0), ("MPa/mm", 1e9), ("N/mm3", 1e9), ("N/mm^3", 1e9), ("GPa/m", 1e9)]
+            }
             Self::Time => &[("s", 1.0), ("ms", 1e-3), ("min", 60.0), ("h", 3600.0)],
             Self::Memory => &[
                 ("B", 1.0),

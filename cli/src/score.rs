@@ -11,9 +11,12 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use clap::Args as ClapArgs;
 use glam::{DMat3, DVec3};
-use gripfast::backend::{Backend, Batch, Problem, ScoreOptions, Scored, SeedSet};
+use gripfast::backend::{
+    Backend, Batch, CurvedProblem, Problem, ScoreOptions, Scored, SeedSet, score_curved,
+};
 use gripfast::error::Error;
 use gripfast::load::{LoadSet, wrench_in_grip};
+use gripfast::mechanics::curved;
 use gripfast::model::{Contact, Score, Wrench};
 use gripfast::part::MassProperties;
 use gripfast::request::{Polish, Refiner, Separation};
@@ -73,6 +76,8 @@ const BLOCK_LOADS: usize = 1 << 20;
 struct Entry {
     id: Option<Value>,
     contact: Arc<Contact>,
+    /// What is touched, where it is not plane.
+    surfaces: Option<curved::Pads>,
     distance: f64,
     force: f64,
     wrenches: Wrenches,
@@ -341,6 +346,10 @@ impl Job<'_> {
                     let entry = Entry {
                         id,
                         contact: grip.contact,
+                        surfaces: grip
+                            .surfaces
+                            .map(|found| curved::Pads::new(&found))
+                            .transpose()?,
                         distance,
                         force,
                         wrenches: Wrenches::Own(wrenches),
@@ -383,10 +392,19 @@ impl Job<'_> {
             Some(_) => bail!("{place}: \"loads\" is not a list"),
             None => Wrenches::Own(vec![case.wrench]),
         };
+        let surfaces = case.surfaces.map(|found| curved::Pads::new(&found)).transpose()?;
         let contact = Arc::clone(
             contacts.entry(key(&case.contact)).or_insert_with(|| Arc::new(case.contact)),
         );
-        Ok(Entry { id, contact, distance: case.distance, force: case.force, wrenches })
+        let (distance, force) = (case.distance, case.force);
+        Ok(Entry { id, contact, surfaces, distance, force, wrenches })
+    }
+
+    fn wrenches<'e>(&'e self, entry: &'e Entry) -> &'e [Wrench] {
+        match &entry.wrenches {
+            Wrenches::Own(own) => own,
+            Wrenches::Common => self.common,
+        }
     }
 
     fn score(
@@ -397,23 +415,35 @@ impl Job<'_> {
     ) -> anyhow::Result<()> {
         let entries = std::mem::take(&mut block.entries);
         block.loads = 0;
-        let problems = entries
+        let plane = entries.iter().filter(|entry| entry.surfaces.is_none());
+        let problems = plane.map(|entry| Problem {
+            contact: &entry.contact,
+            distance: entry.distance,
+            force: entry.force,
+            wrenches: self.wrenches(entry),
+        });
+        let batch = Batch { problems: problems.collect() };
+        let curved: Vec<CurvedProblem<'_>> = entries
             .iter()
-            .map(|entry| Problem {
-                contact: &entry.contact,
+            .filter(|entry| entry.surfaces.is_some())
+            .map(|entry| CurvedProblem {
+                pads: entry.surfaces.as_ref(),
                 distance: entry.distance,
                 force: entry.force,
-                wrenches: match &entry.wrenches {
-                    Wrenches::Own(own) => own,
-                    Wrenches::Common => self.common,
-                },
+                wrenches: self.wrenches(entry),
             })
             .collect();
-        let batch = Batch { problems };
-        let scored = self
-            .threads
-            .install(|| self.backend.score(&batch, self.seeds, &self.options))
-            .with_context(|| format!("{}: grips from {}", self.name, counts.grips))?;
+        let (plane, curved) = self.threads.install(|| {
+            (
+                self.backend.score(&batch, self.seeds, &self.options),
+                score_curved(&curved, self.options.polish),
+            )
+        });
+        let plane = plane.with_context(|| format!("{}: grips from {}", self.name, counts.grips))?;
+        let (mut plane, mut curved) = (plane.into_iter(), curved.into_iter());
+        let scored = entries.iter().filter_map(|entry| {
+            if entry.surfaces.is_some() { curved.next() } else { plane.next() }
+        });
         for (entry, Scored { worst, all, solved, compared, .. }) in entries.iter().zip(scored) {
             let index = counts.grips;
             counts.grips += 1;

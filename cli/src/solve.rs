@@ -123,7 +123,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
                 if cases.len() > 1 {
                     writeln!(out, "{}{}", if index > 0 { "\n" } else { "" }, place())?;
                 }
-                print_curved(&mut out, case, &answer, args.explain)?;
+                print_curved(&mut out, &answer, args.explain)?;
             }
             continue;
         }
@@ -225,7 +225,6 @@ fn curved_answer(args: &Args, case: &Case, surfaces: &Surfaces) -> anyhow::Resul
 /// The part of a curved answer that users read.
 fn print_curved(
     out: &mut impl Write,
-    case: &Case,
     answer: &curved::Answer,
     explain: bool,
 ) -> anyhow::Result<()> {
@@ -291,7 +290,7 @@ fn print_curved(
         )?;
     }
     for note in &answer.notes {
-        writeln!(out, "note: {}", say(note, case))?;
+        writeln!(out, "note: {note}")?;
     }
     if explain {
         writeln!(
@@ -318,56 +317,6 @@ fn print_curved(
         )?;
     }
     Ok(())
-}
-
-/// A note in words.
-fn say(note: &curved::Note, case: &Case) -> String {
-    use curved::{Note, SoftLimit};
-    let mm = 1e3;
-    match *note {
-        Note::TooSoft { face, limit, value } => {
-            let what = match limit {
-                SoftLimit::Compression => {
-                    format!("is compressed by {:.0} % of its thickness", 100.0 * value)
-                }
-                SoftLimit::Width => {
-                    format!("touches {value:.2} radii to either side; mu_s is over 1.6 % too high")
-                }
-                SoftLimit::Thickness => format!(
-                    "touches {value:.2} of its thickness to either side; it is no bed of springs"
-                ),
-            };
-            format!("pad {face:?} is too soft for the theory: it {what}")
-        }
-        Note::Unstable { stiffness } => format!(
-            "unstable: the round faces stand farther apart than their radii; the part rolls out \
-             unless friction holds it ({stiffness:.4} N m per rad)"
-        ),
-        Note::OverEdge { force } => format!(
-            "unstable: a pad ends within the contact and pushes the part aside with {:.4} N",
-            force.abs()
-        ),
-        Note::SettlesBy { angle } => format!(
-            "the faces are nearly on one axis: without friction the part settles by {:.3} deg; \
-             the rotation is counted as free",
-            angle.to_degrees()
-        ),
-        Note::FacetedOrRound { facets } => {
-            format!("faceted or round? about {facets:.0} facets to the round are taken as round")
-        }
-        Note::TiltsFirst { angle, slip } => format!(
-            "the part tilts by {:.3} deg and slips {:.3} mm first; friction may hold a little \
-             below mu_s",
-            angle.to_degrees(),
-            slip * mm
-        ),
-        Note::TiltPushes { force, mu_s } => format!(
-            "the tilted flat pushes ({:.4}, {:.4}) N along the pads, which mu_s leaves out; with \
-             it {mu_s:.6}",
-            force[0], force[1]
-        ),
-        _ => format!("{note:?} (d = {} mm)", case.distance * mm),
-    }
 }
 
 /// The incipient motion in words.

@@ -9,12 +9,12 @@ use glam::{DMat3, DVec3};
 use gripfast::error::{Error, Result};
 use gripfast::export::Convention;
 use gripfast::gripper::Gripper;
-use gripfast::model::Frame;
+use gripfast::model::{Frame, Slip};
 use gripfast::part::{Part, ReadOptions, Unit};
 use gripfast::plan::{Assessed, Standing};
 use gripfast::propose::{Explanation, Misfit, ProposeOptions, Proposer};
 use gripfast::request::Cone;
-use gripfast::results::{ForceRange, GripSet, RankedGrip};
+use gripfast::results::{ForceRange, GripSet, Provenance, RankedGrip};
 use gripfast::units::Quantity;
 
 /// Explains one grip of a result file: every test with body and place, and what its score is made
@@ -51,7 +51,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == set.part.unit_m);
     let mut part = Part::read(&path, &ReadOptions::default().with_unit(unit))?;
     part.set_centre_of_mass(set.part.mass.centre_of_mass);
-    let options = ProposeOptions::read(&set.provenance.request.candidates)?;
+    let Provenance { request, resolved, .. } = &set.provenance;
+    let mut options = ProposeOptions::read(&request.candidates)?;
+    options.force = Some(resolved.force.0).filter(|force| *force > 0.0);
     let proposer = Proposer::new(&part, &gripper, &options)?;
     let explanation = proposer.explain_pose(
         ranked.grip.face_i,
@@ -98,8 +100,38 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         ranked.alpha.to_degrees(),
         ranked.delta_d * 1e3
     )?;
+    surface(&mut out, ranked)?;
     limits(&mut out, ranked, &set)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// What the pads touch of faces that are not plane.
+fn surface(out: &mut impl Write, ranked: &RankedGrip) -> std::io::Result<()> {
+    let mm = 1e3;
+    for (name, face) in ["I", "II"].into_iter().zip(ranked.faces.iter().flatten()) {
+        let [low, high] = face.extent;
+        writeln!(
+            out,
+            "  face {name}: {:.2} mm2 pressed, {:.2} x {:.2} mm, pressure {:.3} MPa, up to {:.3} MPa, \
+             layer compressed by {:.3} mm",
+            face.area * mm * mm,
+            (high[0] - low[0]) * mm,
+            (high[1] - low[1]) * mm,
+            face.mean_pressure * 1e-6,
+            face.greatest_pressure * 1e-6,
+            face.compression * mm
+        )?;
+    }
+    if let Some(Slip::Spin { rolls_on, .. }) = ranked.worst.slip {
+        let how = rolls_on.map_or("spins, both faces slip".to_owned(), |face| {
+            format!("rolls on face {face:?} and slips on the other")
+        });
+        writeln!(out, "  about to turn about its own axis: it {how}")?;
+    }
+    for note in &ranked.notes {
+        writeln!(out, "  note: {note}")?;
+    }
+    Ok(())
 }
 
 /// How much more it holds, and what was asked for besides.

@@ -16,6 +16,7 @@
 
 mod choice;
 mod cpu;
+mod curved;
 mod fan;
 #[cfg(feature = "gpu")]
 mod gpu;
@@ -41,6 +42,7 @@ pub use gpu::{
 
 pub use crate::request::{Choice, Polish};
 pub use choice::{Selection, select};
+pub use curved::{CurvedProblem, score_curved};
 pub use job::Backend;
 pub use problem::{Batch, F32_TOLERANCE, Problem, Seed, SeedStatus};
 pub use score::{ScoreOptions, Scored};

@@ -29,6 +29,11 @@ const OUTSIDE: f64 = 0.5;
 /// polygon that lies exactly where the pressure ends is no tie. What it adds is of the order of
 /// the square.
 const CUT: f64 = 1e-9;
+/// Change of the greatest pressure along a cylinder, as a share, up to which its edges are lines.
+const LINE: f64 = 1e-8;
+/// Gauss points on panels that are at most this long over their distance from the slip centre, with
+/// the same error.
+const FEWER: [(f64, usize); 2] = [(0.2, 6), (0.4, 8)];
 /// Turn of an arc's tangent up to which it is one element \[rad\].
 const TURN: f64 = 0.4;
 
@@ -181,6 +186,8 @@ impl Region {
                 (a.min(swap(x).x), b.max(swap(x).x))
             });
         let reach = |x: &f64| (low..=high).contains(x);
+        // Both branches of a cylinder's conic are lines, but for the square of the slope.
+        let straight = l.x == 0.0 && g.x.abs() * (high - low) <= LINE * rest.abs();
         let tips: Vec<f64> =
             roots(rest, g.x, 0.5 * l.x).into_iter().flatten().filter(reach).collect();
         for side in [-1.0, 1.0] {
@@ -200,7 +207,11 @@ impl Region {
                     let (a, b) = (swap(pair[0]), swap(pair[1]));
                     let inward = (b - a).perp().dot(u.slope(middle)) > 0.0;
                     let (a, b) = if inward { (a, b) } else { (b, a) };
-                    self.push_arc(a, b, 0);
+                    if straight {
+                        self.push(a, b, false);
+                    } else {
+                        self.push_arc(a, b, 0);
+                    }
                 }
             }
         }
@@ -345,12 +356,15 @@ impl Region {
     /// but zero.
     pub fn dissipation(&self, twist: [f64; 3]) -> Dissipation {
         let [u1, u2, omega] = twist;
+        if omega == 0.0 {
+            return self.sliding(DVec2::new(u1, u2));
+        }
         // Distance of the slip centre from the box, times omega.
         let off = DVec2::new(-u2, u1) - omega * self.middle;
         let outside = (off.abs() - omega.abs() * self.half).max(DVec2::ZERO);
         let near = OUTSIDE * omega.abs() * self.half.min_element();
         let mut sum = Dissipation::default();
-        if outside.length_squared() > near * near || omega == 0.0 {
+        if outside.length_squared() > near * near {
             let centre = DVec2::new(-u2, u1) / omega;
             for element in &self.elements {
                 self.area_panel(element, twist, centre, [0.0, 1.0], [0.0, 1.0], 0, &mut sum);
@@ -363,6 +377,26 @@ impl Region {
             }
             sum = edge.assemble(centre, omega);
         }
+        sum
+    }
+
+    /// [`Self::dissipation`] of a translation: moments of the pressure.
+    fn sliding(&self, v: DVec2) -> Dissipation {
+        let mut sum = Dissipation::default();
+        let speed = v.length();
+        let e = v / speed;
+        self.points(|x, weight| {
+            let weight = weight * self.u.value(x);
+            let tangent = [e.x, e.y, x.perp_dot(e)];
+            let normal = [e.y, -e.x, -x.dot(e)];
+            sum.value += weight * speed;
+            for i in 0..3 {
+                sum.gradient[i] += weight * tangent[i];
+                for j in 0..3 {
+                    sum.hessian[i][j] += weight / speed * normal[i] * normal[j];
+                }
+            }
+        });
         sum
     }
 
@@ -380,6 +414,7 @@ impl Region {
         sum: &mut Dissipation,
     ) {
         let middle = |r: [f64; 2]| 0.5 * (r[0] + r[1]);
+        let mut points = POINTS;
         if centre.is_finite() && depth < 40 {
             let point = |s: f64, t: f64| {
                 let (x, dx) = self.at(element, s);
@@ -396,16 +431,18 @@ impl Region {
                 }
                 return;
             }
+            let ratio = along.max(across) / distance;
+            points = FEWER.iter().find(|few| ratio <= few.0).map_or(POINTS, |few| few.1);
         }
         let [u1, u2, omega] = twist;
-        for &(ns, ws) in &RULES[POINTS] {
+        for &(ns, ws) in &RULES[if element.arc { POINTS } else { points }] {
             let (x, dx) = self.at(element, s[0] + ns * (s[1] - s[0]));
             let (foot, turn) = self.foot(x, dx);
             if turn == 0.0 {
                 continue;
             }
             let turn = ws * (s[1] - s[0]) * turn;
-            for &(nt, wt) in &RULES[POINTS] {
+            for &(nt, wt) in &RULES[points] {
                 let x = foot.lerp(x, t[0] + nt * (t[1] - t[0]));
                 let weight = turn * wt * (t[1] - t[0]) * self.u.value(x);
                 let v = DVec2::new(u1 - omega * x.y, u2 + omega * x.x);

@@ -1,153 +1,40 @@
 //! Contacts as they are: pieces of surface under a pad, each with its gap above the pad plane.
 
-use glam::DVec2;
-use serde::{Deserialize, Serialize};
+use glam::{DAffine2, DMat2, DVec2};
 
 use super::quadric::{Quadratic, Region};
-use crate::model::{Polygon, Ring};
+use crate::geometry::{
+    Bounds2, clip_ring_convex, intersect_convex, is_convex, ring_area, transform,
+};
+use crate::model::{Patch, Polygon, Ring};
 
-/// How far a piece of surface lies behind the face's pad plane `x3 = +-d/2`, as a function of the
-/// place in the pad plane. To leading order of the slope: a circle is its parabola.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
-pub enum Gap {
-    /// `height + slope . x`: the pad plane itself, a step behind it, a drafted plane, a facet.
-    Plane {
-        /// Gap at the origin \[m\].
-        #[serde(default)]
-        height: f64,
-        /// Slope along `x1`, `x2`.
-        #[serde(default)]
-        slope: DVec2,
-    },
-    /// `height + y^2 / (2 radius)`, `y` the distance from the line through `at` along `axis`.
-    Cylinder {
-        /// Radius \[m\], negative for a bore.
-        radius: f64,
-        /// Direction of the axis in the pad plane, of any length; along `x1` if not given.
-        #[serde(default = "along_x1")]
-        axis: DVec2,
-        /// A point of the crest in the pad plane \[m\].
-        #[serde(default)]
-        at: DVec2,
-        /// Gap at the crest \[m\].
-        #[serde(default)]
-        height: f64,
-    },
-    /// `height + r^2 / (2 radius)`, `r` the distance from `at`.
-    Sphere {
-        /// Radius \[m\], negative for a hollow.
-        radius: f64,
-        /// Where the sphere is highest \[m\].
-        #[serde(default)]
-        at: DVec2,
-        /// Gap there \[m\].
-        #[serde(default)]
-        height: f64,
-    },
-    /// A surface of revolution about an axis along `axis` with a round meridian: `height + x^2 / (2
-    /// meridian) + y^2 / (2 radius)`, `x` along the axis from `at`, `y` across it.
-    Barrel {
-        /// Radius about the axis \[m\].
-        radius: f64,
-        /// Radius of the meridian \[m\], negative for a waist.
-        meridian: f64,
-        /// Direction of the axis in the pad plane, of any length; along `x1` if not given.
-        #[serde(default = "along_x1")]
-        axis: DVec2,
-        /// Where the barrel is highest \[m\].
-        #[serde(default)]
-        at: DVec2,
-        /// Gap there \[m\].
-        #[serde(default)]
-        height: f64,
-    },
-}
+pub use crate::model::{Gap, Piece, Surfaces};
 
-fn along_x1() -> DVec2 {
-    DVec2::X
-}
-
-impl Default for Gap {
-    fn default() -> Self {
-        Self::Plane { height: 0.0, slope: DVec2::ZERO }
-    }
-}
-
-impl Gap {
-    /// What is wrong with its numbers, if anything.
-    pub fn fault(&self) -> Option<&'static str> {
-        let (radii, axis, rest) = match *self {
-            Self::Plane { height, slope } => ([1.0, 1.0], DVec2::X, [slope, DVec2::splat(height)]),
-            Self::Cylinder { radius, axis, at, height } => {
-                ([radius, 1.0], axis, [at, DVec2::splat(height)])
-            }
-            Self::Sphere { radius, at, height } => {
-                ([radius, 1.0], DVec2::X, [at, DVec2::splat(height)])
-            }
-            Self::Barrel { radius, meridian, axis, at, height } => {
-                ([radius, meridian], axis, [at, DVec2::splat(height)])
-            }
-        };
-        if radii.iter().any(|r| !r.is_finite() || *r == 0.0) {
-            Some("a radius that is zero or not finite")
-        } else if axis.try_normalize().is_none() {
-            Some("an axis without direction")
-        } else if rest.iter().any(|x| !x.is_finite()) {
-            Some("a number that is not finite")
-        } else {
-            None
+/// The gap as seen after the motion `map` of the pad plane, a turn, shift or mirror image. A point
+/// of a crest is the one nearest to the new origin.
+pub(crate) fn mapped(gap: &Gap, map: &DAffine2) -> Gap {
+    let turn: DMat2 = map.matrix2;
+    match *gap {
+        Gap::Plane { height, slope } => {
+            let slope = turn * slope;
+            Gap::Plane { height: height - slope.dot(map.translation), slope }
         }
-    }
-
-    /// Radius across the axis, of a surface that has one \[m\].
-    pub fn radius(&self) -> Option<f64> {
-        match *self {
-            Self::Plane { .. } => None,
-            Self::Cylinder { radius, .. }
-            | Self::Sphere { radius, .. }
-            | Self::Barrel { radius, .. } => Some(radius),
+        Gap::Cylinder { radius, axis, at, height } => {
+            let (axis, at) = (turn * axis, map.transform_point2(at));
+            let at = at - axis * (axis.dot(at) / axis.length_squared());
+            Gap::Cylinder { radius, axis, at, height }
         }
+        Gap::Sphere { radius, at, height } => {
+            Gap::Sphere { radius, at: map.transform_point2(at), height }
+        }
+        Gap::Barrel { radius, meridian, axis, at, height } => Gap::Barrel {
+            radius,
+            meridian,
+            axis: turn * axis,
+            at: map.transform_point2(at),
+            height,
+        },
     }
-}
-
-/// A piece of a face: a polygon in the pad plane and the gap over it.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Piece {
-    /// Outer boundary \[m\].
-    pub outer: Ring,
-    /// Boundaries of the holes \[m\].
-    #[serde(default)]
-    pub holes: Vec<Ring>,
-    /// The gap; none is the pad plane itself.
-    #[serde(default)]
-    pub gap: Gap,
-}
-
-impl Piece {
-    /// Its outline.
-    pub fn polygon(&self) -> Polygon {
-        Polygon { outer: self.outer.clone(), holes: self.holes.clone() }
-    }
-}
-
-/// What two pads touch, and how stiff they are.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Surfaces {
-    /// Pieces under pad I.
-    #[serde(rename = "A_I")]
-    pub face_i: Vec<Piece>,
-    /// Pieces under pad II.
-    #[serde(rename = "A_II")]
-    pub face_ii: Vec<Piece>,
-    /// Pressure per compression of the pads' layers on face I and II [Pa/m]: confined modulus over
-    /// thickness.
-    #[serde(rename = "k")]
-    pub stiffness: [f64; 2],
-    /// Thickness of the layers \[m\], for notes only.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub layer: Option<f64>,
 }
 
 /// A piece made ready: in the surface's own axes.
@@ -264,4 +151,117 @@ impl Field {
         };
         self.rings.iter().map(ring_area).sum()
     }
+}
+
+/// The surfaces seen after half a turn about `x1`, which exchanges the faces.
+pub(crate) fn mirrored(surfaces: &Surfaces) -> Surfaces {
+    let map = DAffine2::from_scale(DVec2::new(1.0, -1.0));
+    let pieces = |pieces: &[Piece]| -> Vec<Piece> {
+        pieces
+            .iter()
+            .map(|piece| {
+                let Polygon { outer, holes } = transform(&piece.polygon(), &map);
+                Piece { outer, holes, gap: mapped(&piece.gap, &map) }
+            })
+            .collect()
+    };
+    let [one, two] = surfaces.stiffness;
+    Surfaces {
+        face_i: pieces(&surfaces.face_ii),
+        face_ii: pieces(&surfaces.face_i),
+        stiffness: [two, one],
+        layer: surfaces.layer,
+    }
+}
+
+/// The numbers of a gap, of equal gaps the same.
+pub(crate) fn numbers(gap: &Gap) -> [f64; 8] {
+    let (kind, a, b, axis, at, height) = match *gap {
+        Gap::Plane { height, slope } => (0.0, 0.0, 0.0, slope, DVec2::ZERO, height),
+        Gap::Cylinder { radius, axis, at, height } => (1.0, radius, 0.0, axis, at, height),
+        Gap::Sphere { radius, at, height } => (2.0, radius, 0.0, DVec2::ZERO, at, height),
+        Gap::Barrel { radius, meridian, axis, at, height } => {
+            (3.0, radius, meridian, axis, at, height)
+        }
+    };
+    [kind, a, b, axis.x, axis.y, at.x, at.y, height]
+}
+
+/// Sides of the polygon in place of an ellipse, of equal area.
+const SIDES: usize = 48;
+
+/// The part of a piece whose gap is less than `delta`: what a layer compressed so far presses.
+/// Ellipses are polygons of the same area, so that this is for pictures and first estimates.
+pub(crate) fn pressed(piece: &Piece, delta: f64) -> Patch {
+    let bounds = Bounds2::of(&piece.outer);
+    let size = bounds.size().length();
+    if !(size > 0.0) {
+        return Patch::new();
+    }
+    let middle = bounds.centre();
+    let along = |axis: DVec2, at: DVec2, low: f64, high: f64| -> Ring {
+        // A stretch across `axis` through `at`, as long as the piece.
+        let at = at + axis * axis.dot(middle - at);
+        let corner = |x: f64, y: f64| at + size * x * axis + y * axis.perp();
+        vec![corner(-1.0, low), corner(1.0, low), corner(1.0, high), corner(-1.0, high)]
+    };
+    let windows: Vec<Ring> = match piece.gap {
+        Gap::Plane { height, slope } if slope == DVec2::ZERO => {
+            return if height < delta { vec![piece.polygon()] } else { Patch::new() };
+        }
+        Gap::Plane { height, slope } => {
+            // How far uphill of the middle the gap is `delta`.
+            let left = (delta - height - slope.dot(middle)) / slope.length();
+            if left <= -size {
+                return Patch::new();
+            }
+            vec![along(slope.normalize().perp(), middle, -left.min(size), size)]
+        }
+        Gap::Cylinder { radius, axis, at, height } => {
+            let half = (2.0 * radius * (delta - height)).max(0.0).sqrt();
+            let axis = axis.normalize();
+            match radius > 0.0 {
+                true if height < delta => vec![along(axis, at, -half, half)],
+                true => return Patch::new(),
+                false if height < delta => return vec![piece.polygon()],
+                false => {
+                    let far = half + 2.0 * size + at.distance(middle);
+                    vec![along(axis, at, half, far), along(axis, at, -far, -half)]
+                }
+            }
+        }
+        Gap::Sphere { at, height, .. } | Gap::Barrel { at, height, .. } => {
+            let (radii, axis) = match piece.gap {
+                Gap::Barrel { radius, meridian, axis, .. } => ([meridian, radius], axis),
+                _ => ([piece.gap.radius().unwrap_or(1.0); 2], DVec2::X),
+            };
+            if radii.iter().any(|radius| *radius < 0.0) {
+                return vec![piece.polygon()];
+            }
+            if height >= delta {
+                return Patch::new();
+            }
+            let step = std::f64::consts::TAU / SIDES as f64;
+            let grown = (step / step.sin()).sqrt();
+            let half = radii.map(|radius| grown * (2.0 * radius * (delta - height)).sqrt());
+            let axis = axis.normalize();
+            let corner = |k: usize| {
+                let e = DVec2::from_angle(step * k as f64);
+                at + half[0] * e.x * axis + half[1] * e.y * axis.perp()
+            };
+            vec![(0..SIDES).map(corner).collect()]
+        }
+    };
+    windows.iter().flat_map(|window| cut(piece, window)).collect()
+}
+
+/// The outline of a piece within a convex counter-clockwise ring.
+pub(crate) fn cut(piece: &Piece, window: &[DVec2]) -> Patch {
+    if piece.holes.is_empty() && is_convex(&piece.outer) {
+        let outer = clip_ring_convex(&piece.outer, window);
+        let size = Bounds2::of(&outer).size().max_element();
+        let solid = outer.len() >= 3 && ring_area(&outer) > 1e-9 * size * size;
+        return if solid { vec![Polygon { outer, holes: Vec::new() }] } else { Patch::new() };
+    }
+    intersect_convex(window, &[piece.polygon()])
 }

@@ -10,7 +10,7 @@ use serde::Deserialize;
 
 use motion::Motion;
 
-use super::{Body, Gripper, Jaw, Moving, Shape, Source, Travel, mesh, rectangle};
+use super::{Body, Gripper, Jaw, Moving, Shape, Source, Travel, layer, mesh, rectangle};
 use crate::error::{Error, Result};
 use crate::geometry::{convex_hull, is_convex, polygon, ring_area};
 use crate::model::Frame;
@@ -48,6 +48,8 @@ struct Pad {
     other: Option<Outline>,
     thickness: Option<String>,
     modulus: Option<String>,
+    poisson: Option<f64>,
+    stiffness: Option<String>,
     outer_face: Option<String>,
     friction: Option<f64>,
 }
@@ -201,6 +203,17 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
     let payload = optional("payload", Quantity::Mass, &file.payload)?;
     let pad_thickness = optional("pad.thickness", Quantity::Length, &file.pad.thickness)?;
     let pad_modulus = optional("pad.modulus", Quantity::Pressure, &file.pad.modulus)?;
+    let pad_stiffness = match file.pad.stiffness.as_deref().map(str::trim) {
+        Some("rigid") => Some(layer::RIGID),
+        _ => optional("pad.stiffness", Quantity::Stiffness, &file.pad.stiffness)?,
+    };
+    if let Some(ratio) = file.pad.poisson.filter(|ratio| !(0.0..0.5).contains(ratio)) {
+        return Err(reader.bad(
+            "pad.poisson",
+            format!("is {ratio}"),
+            "give Poisson's ratio, from 0 to below 0.5: 0.45 for rubber with some room to the sides",
+        ));
+    }
     let outer_pad = optional("pad.outer_face", Quantity::Length, &file.pad.outer_face)?;
     if let Some(friction) = file.pad.friction.filter(|friction| !(0.0..=10.0).contains(friction)) {
         return Err(reader.bad(
@@ -239,6 +252,8 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
         "pad.size",
         "pad.thickness",
         "pad.modulus",
+        "pad.poisson",
+        "pad.stiffness",
         "pad.outer_face",
         "pad.friction",
         "motion",
@@ -281,6 +296,8 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
         pad_friction: file.pad.friction,
         pad_thickness,
         pad_modulus,
+        pad_poisson: file.pad.poisson,
+        pad_stiffness,
         outer_pad,
         fingers,
         fingers_ii,

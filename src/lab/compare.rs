@@ -83,6 +83,10 @@ fn earlier(
     weights: &EarlierWeights,
 ) -> Option<EarlierScore> {
     let grip = &ranked.grip;
+    // The method knows plane contacts only.
+    if grip.surfaces.is_some() {
+        return None;
+    }
     let centre = grip.part_from_grip.point_inverse(centre_of_mass).truncate();
     let evaluation = earlier::evaluation(&grip.contact, grip.width, centre, weights)
         .filter(|value| value.is_finite())?;

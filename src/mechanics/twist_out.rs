@@ -109,11 +109,53 @@ impl TwistOut {
     }
 }
 
+/// Levers of a contact about whose `free` axes in the pad plane the part can turn without any change
+/// of the pressure: there is nothing to right there and nothing to twist out of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeTwistOut {
+    lever: TwistOut,
+    free: Vec<DVec2>,
+}
+
+impl FreeTwistOut {
+    /// Of what is pressed; `free` are unit vectors, none, one or two.
+    pub fn new(pressed: &Contact, free: Vec<DVec2>) -> Self {
+        Self { lever: TwistOut::new(pressed), free }
+    }
+
+    /// `w_min` \[m\]: along the one free axis; infinite where all are free; else
+    /// [`TwistOut::least_lever`]. `None` without contact.
+    pub fn least_lever(&self) -> Option<f64> {
+        let least = self.lever.least_lever()?;
+        Some(match self.free[..] {
+            [] => least.width,
+            [e] => self.lever.lever(e).min(self.lever.lever(-e)),
+            _ => f64::INFINITY,
+        })
+    }
+
+    /// As [`TwistOut::margin`], for the part of the moment about the axis that is not free.
+    pub fn margin(&self, grip_force: f64, load: &Wrench) -> f64 {
+        let whole = self.lever.margin(grip_force, load);
+        let [e] = self.free[..] else {
+            let all = self.free.len() == 2 && whole.is_finite();
+            return if all { 1.0 } else { whole };
+        };
+        if !whole.is_finite() {
+            return whole;
+        }
+        let (n_i, n_ii) = (grip_force + load.force.z / 2.0, grip_force - load.force.z / 2.0);
+        let q = e.dot(DVec2::new(-load.moment.y, load.moment.x));
+        let limit = self.lever.limit_moment(e * q.signum(), n_i, n_ii);
+        1.0 - q.abs() / limit
+    }
+}
+
 /// `Delta_d = sqrt(d^2 + w^2) - d` \[m\]: how far the jaws must be forced open to twist the part out,
 /// for faces `d` apart and the least lever `w`. Zero for a lever that is not positive. For a grip
 /// from inside (`d` negative) it is how far the jaws must be pressed together.
 pub fn delta_d(d: f64, w: f64) -> f64 {
-    match (w <= 0.0, d < 0.0) {
+    match (w <= 0.0 || w.is_infinite(), d < 0.0) {
         (true, _) => 0.0,
         (_, true) => d.hypot(w) - d,
         // The same without cancellation for thin levers.

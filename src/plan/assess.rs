@@ -1,17 +1,22 @@
 //! Grips of one part under one set of loads, from pose to numbers.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
+use glam::DVec2;
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
-use crate::backend::{Backend, Batch, Best, Problem, ScoreOptions, Scored, SeedSet};
+use crate::backend::{
+    Backend, Batch, Best, CurvedProblem, Problem, ScoreOptions, Scored, SeedSet, score_curved,
+};
 use crate::error::{Error, Result};
 use crate::geometry::patch_area;
 use crate::gripper::Gripper;
 use crate::load::wrench_in_grip;
-use crate::mechanics::twist_out::{self, TwistOut};
-use crate::mechanics::{Options, Pads, inverse, refused};
-use crate::model::{Grip, Patch, Status, Wrench};
+use crate::mechanics::twist_out::{self, FreeTwistOut, TwistOut};
+use crate::mechanics::{Options, Pads, curved, inverse, refused};
+use crate::model::{Grip, Patch, Status, Surfaces, Wrench};
 use crate::part::MassProperties;
 use crate::rank::{self, Weights};
 use crate::request::{Polish, Request};
@@ -183,7 +188,32 @@ impl Assessor<'_> {
         Ok(ranked)
     }
 
-    fn assess_block(&self, grips: Vec<Grip>, best: Option<&mut Best>) -> Result<Vec<RankedGrip>> {
+    fn assess_block(
+        &self,
+        grips: Vec<Grip>,
+        mut best: Option<&mut Best>,
+    ) -> Result<Vec<RankedGrip>> {
+        // Those on planes and the others by turns: mostly all of one kind.
+        let mut ranked = Vec::with_capacity(grips.len());
+        let mut grips = grips.into_iter().peekable();
+        while let Some(first) = grips.peek() {
+            let curved = first.surfaces.is_some();
+            let same = |grip: &Grip| grip.surfaces.is_some() == curved;
+            let mut run = Vec::new();
+            while let Some(grip) = grips.next_if(same) {
+                run.push(grip);
+            }
+            let best = best.as_deref_mut();
+            ranked.extend(if curved {
+                self.assess_curved(run, best)
+            } else {
+                self.assess_plane(run, best)?
+            });
+        }
+        Ok(ranked)
+    }
+
+    fn assess_plane(&self, grips: Vec<Grip>, best: Option<&mut Best>) -> Result<Vec<RankedGrip>> {
         let wrenches: Vec<Vec<Wrench>> = grips.par_iter().map(|grip| self.wrenches(grip)).collect();
         let batch = Batch {
             problems: grips
@@ -197,7 +227,7 @@ impl Assessor<'_> {
             Some(best) => {
                 let alphas: Vec<f64> = grips
                     .par_iter()
-                    .map(|grip| self.alpha(grip, &TwistOut::new(&grip.contact)).0)
+                    .map(|grip| self.alpha(grip, least(&TwistOut::new(&grip.contact))))
                     .collect();
                 let Settings { weights, pads, .. } = self.settings;
                 let merit = |index: usize, mu: f64| {
@@ -212,7 +242,56 @@ impl Assessor<'_> {
             .zip(wrenches.par_iter())
             .zip(scored)
             .filter(|(_, scored)| !scored.outranked);
-        Ok(jobs.map(|((grip, wrenches), scored)| self.measure(grip, wrenches, &scored)).collect())
+        let measure = |((grip, wrenches), scored): ((Grip, &Vec<Wrench>), Scored)| {
+            let lever = TwistOut::new(&grip.contact);
+            let margin = |wrench: &Wrench| lever.margin(self.settings.force, wrench);
+            self.measure(grip, wrenches, &scored, least(&lever), &margin)
+        };
+        Ok(jobs.map(measure).collect())
+    }
+
+    /// Grips on surfaces, each load solved to the end.
+    fn assess_curved(&self, grips: Vec<Grip>, best: Option<&mut Best>) -> Vec<RankedGrip> {
+        let ready = Surfaced::new(grips.iter(), self.settings.force);
+        let wrenches: Vec<Vec<Wrench>> = grips.par_iter().map(|grip| self.wrenches(grip)).collect();
+        let problems: Vec<CurvedProblem<'_>> = grips
+            .iter()
+            .zip(&wrenches)
+            .map(|(grip, wrenches)| self.curved_problem(grip, &ready, wrenches))
+            .collect();
+        let scored = score_curved(&problems, self.settings.score.polish);
+        let jobs = grips.into_par_iter().zip(wrenches.par_iter()).zip(scored);
+        let measure = |((grip, wrenches), scored): ((Grip, &Vec<Wrench>), Scored)| {
+            let free = ready.of(&grip).map_or_else(Vec::new, |ready| ready.free.clone());
+            let lever = FreeTwistOut::new(&grip.contact, free);
+            let margin = |wrench: &Wrench| lever.margin(self.settings.force, wrench);
+            let least = lever.least_lever().unwrap_or(0.0);
+            self.measure(grip, wrenches, &scored, least, &margin)
+        };
+        let ranked: Vec<RankedGrip> = jobs.map(measure).collect();
+        if let Some(best) = best {
+            let Settings { weights, pads, .. } = self.settings;
+            for ranked in ranked.iter().filter(|ranked| ranked.worst.status.holds()) {
+                let mu = ranked.worst.mu_s.unwrap_or(f64::INFINITY);
+                let slips = pads.verdict(Some(mu)).holds() == Some(false);
+                best.insert(rank::merit(weights.score(mu, ranked.alpha), slips));
+            }
+        }
+        ranked
+    }
+
+    fn curved_problem<'a>(
+        &self,
+        grip: &Grip,
+        ready: &'a Surfaced,
+        wrenches: &'a [Wrench],
+    ) -> CurvedProblem<'a> {
+        CurvedProblem {
+            pads: ready.of(grip).map(|ready| &ready.pads),
+            distance: grip.distance(),
+            force: self.settings.force,
+            wrenches,
+        }
     }
 
     /// The loads as a grip sees them.
@@ -234,33 +313,38 @@ impl Assessor<'_> {
         }
     }
 
-    /// Alpha \[rad\] and the least lever \[m\].
+    /// Alpha \[rad\] for the least lever \[m\].
     ///
     /// The width counts for grips from inside too: jaws that push outwards right a part up to `asin
     /// w/d`, which is more than `atan w/d`.
-    fn alpha(&self, grip: &Grip, lever: &TwistOut) -> (f64, f64) {
-        let least = lever.least_lever().map_or(0.0, |lever| lever.width);
-        (twist_out::alpha(grip.width, least, self.settings.delta, self.settings.mu_c), least)
+    fn alpha(&self, grip: &Grip, least: f64) -> f64 {
+        twist_out::alpha(grip.width, least, self.settings.delta, self.settings.mu_c)
     }
 
     /// A grip's numbers from its worst load; what takes more solving is left to
-    /// [`Assessor::finish`].
-    fn measure(&self, grip: Grip, wrenches: &[Wrench], scored: &Scored) -> RankedGrip {
+    /// [`Assessor::finish`]. `margin`: against twisting out under a load.
+    fn measure(
+        &self,
+        grip: Grip,
+        wrenches: &[Wrench],
+        scored: &Scored,
+        least: f64,
+        margin: &dyn Fn(&Wrench) -> f64,
+    ) -> RankedGrip {
         let (load, score) = scored.worst.unwrap_or((0, refused(Status::NoContact, 0)));
         let wrench = wrenches.get(load).copied().unwrap_or_default();
-        let lever = TwistOut::new(&grip.contact);
-        let (alpha, least) = self.alpha(&grip, &lever);
-        let share = |left: f64, patch: &Patch| left / patch_area(patch);
+        // Under a pull on one pad a round face is pressed more than without a load on the other.
+        let share = |left: f64, patch: &Patch| (left / patch_area(patch)).min(1.0);
         let contact_share = share(score.contact_area_i, &grip.contact.face_i)
             .min(share(score.contact_area_ii, &grip.contact.face_ii));
         RankedGrip {
             rank: 0,
             score: None,
             holds: None,
-            alpha,
+            alpha: self.alpha(&grip, least),
             delta_d: twist_out::delta_d(grip.width, least),
             contact_share,
-            twist_margin: lever.margin(self.settings.force, &wrench),
+            twist_margin: margin(&wrench),
             safety: self
                 .settings
                 .pads
@@ -282,6 +366,8 @@ impl Assessor<'_> {
                 bounds: score.bounds,
                 residual: score.residual,
             },
+            faces: None,
+            notes: Vec::new(),
             merged: Vec::new(),
             mu_by_load: scored.all.iter().map(|score| score.mu_s).collect(),
             grip,
@@ -300,39 +386,99 @@ impl Assessor<'_> {
         for block in open.chunks_mut((ANSWERS_AT_ONCE / self.loads.len().max(1)).max(1)) {
             let wrenches: Vec<Vec<Wrench>> =
                 block.par_iter().map(|ranked| self.wrenches(&ranked.grip)).collect();
-            let problems = block
-                .iter()
-                .zip(&wrenches)
-                .map(|(ranked, wrenches)| self.problem(&ranked.grip, wrenches));
-            let scored = self.backend.score(
-                &Batch { problems: problems.collect() },
-                self.seeds,
-                &options,
-            )?;
-            for (ranked, scored) in block.iter_mut().zip(scored) {
-                ranked.mu_by_load = scored.all.iter().map(|score| score.mu_s).collect();
+            let jobs = || block.iter().zip(&wrenches);
+            let plane = jobs().filter(|(ranked, _)| ranked.grip.surfaces.is_none());
+            let problems = plane.map(|(ranked, wrenches)| self.problem(&ranked.grip, wrenches));
+            let batch = Batch { problems: problems.collect() };
+            let ready = Surfaced::new(block.iter().map(|ranked| &ranked.grip), self.settings.force);
+            let curved = jobs().filter(|(ranked, _)| ranked.grip.surfaces.is_some());
+            let problems: Vec<CurvedProblem<'_>> = curved
+                .map(|(ranked, wrenches)| self.curved_problem(&ranked.grip, &ready, wrenches))
+                .collect();
+            let mut curved = score_curved(&problems, Polish::All).into_iter();
+            let mut plane = self.backend.score(&batch, self.seeds, &options)?.into_iter();
+            for ranked in block.iter_mut() {
+                let one = if ranked.grip.surfaces.is_some() { curved.next() } else { plane.next() };
+                let all = one.map_or_else(Vec::new, |scored| scored.all);
+                ranked.mu_by_load = all.iter().map(|score| score.mu_s).collect();
             }
         }
         Ok(())
     }
 
     /// Adds what only the grips of the final list need: the gripping force needed for the friction
-    /// with the safety asked for, and the largest multiple under the worst load. Both are those of
-    /// [`inverse`], all limit states looked for.
+    /// with the safety asked for, and the largest multiple under the worst load, both as [`inverse`]
+    /// has them, all limit states looked for; of contacts that are not plane also what each face
+    /// carries.
     pub fn finish(&self, grips: &mut [RankedGrip]) {
-        let PadFriction { value: Some(friction), safety } = self.settings.pads else { return };
+        let PadFriction { value: friction, safety } = self.settings.pads;
         let ScoreOptions { separation, refiner, .. } = self.settings.score;
         let options = Options { separation, refiner, ..Options::default() };
         let force = self.settings.force;
+        let ready = Surfaced::new(grips.iter().map(|ranked| &ranked.grip), force);
         grips.par_iter_mut().for_each(|ranked| {
             let (distance, wrench) = (ranked.grip.distance(), &ranked.worst.wrench);
-            let Some(pads) = Pads::new(&ranked.grip.contact) else { return };
-            let needed =
-                |friction| inverse::force_needed(&pads, distance, wrench, friction, &options);
+            let (curved, plane) = match &ranked.grip.surfaces {
+                Some(_) => (ready.of(&ranked.grip).map(|ready| &ready.pads), None),
+                None => (None, friction.and_then(|_| Pads::new(&ranked.grip.contact))),
+            };
+            if let Some(pads) = curved {
+                let answer = pads.solve(distance, force, wrench);
+                (ranked.faces, ranked.notes) = (answer.faces, answer.notes);
+            }
+            let Some(friction) = friction else { return };
+            let needed = |friction| match (curved, &plane) {
+                (Some(pads), _) => curved::force_needed(pads, distance, wrench, friction, force),
+                (None, Some(pads)) => {
+                    inverse::force_needed(pads, distance, wrench, friction, &options)
+                }
+                (None, None) => None,
+            };
             ranked.force_needed = needed(friction / safety);
             let plain = if safety == 1.0 { ranked.force_needed } else { needed(friction) };
             let multiple = plain.map_or(0.0, |needed| force / needed);
             ranked.load_multiple = multiple.is_finite().then_some(multiple);
         });
+    }
+}
+
+/// The least lever of a contact, zero without one \[m\].
+fn least(lever: &TwistOut) -> f64 {
+    lever.least_lever().map_or(0.0, |lever| lever.width)
+}
+
+/// Surfaces of some grips made ready, each once.
+struct Surfaced(FxHashMap<usize, Ready>);
+
+/// A contact that is not plane.
+struct Ready {
+    pads: curved::Pads,
+    /// Axes about which the part can turn in it.
+    free: Vec<DVec2>,
+}
+
+impl Surfaced {
+    fn new<'a>(grips: impl Iterator<Item = &'a Grip>, force: f64) -> Self {
+        let mut found: FxHashMap<usize, (&Surfaces, f64)> = FxHashMap::default();
+        for grip in grips {
+            if let Some(surfaces) = &grip.surfaces {
+                found.insert(Self::key(surfaces), (surfaces, grip.distance()));
+            }
+        }
+        let ready = found.into_par_iter().filter_map(|(key, (surfaces, distance))| {
+            let pads = curved::Pads::new(surfaces).ok()?;
+            let free = pads.free_axes(distance, force);
+            Some((key, Ready { pads, free }))
+        });
+        Self(ready.collect())
+    }
+
+    /// Grips that share surfaces lie on one site: their faces are equally far apart.
+    fn key(surfaces: &Arc<Surfaces>) -> usize {
+        Arc::as_ptr(surfaces) as usize
+    }
+
+    fn of(&self, grip: &Grip) -> Option<&Ready> {
+        self.0.get(&Self::key(grip.surfaces.as_ref()?))
     }
 }

@@ -121,8 +121,9 @@ impl PlanBuilder {
                 threads.current_num_threads()
             ));
         }
-        let propose = ProposeOptions::read(&request.candidates)
+        let mut propose = ProposeOptions::read(&request.candidates)
             .map_err(|error| error.with_options(&["scene"]))?;
+        propose.force = Some(settings.force);
         Ok(Plan {
             request,
             part,

@@ -1,16 +1,14 @@
 //! Grips displaced in their pad plane, with what the pads then touch.
 
-use std::sync::Arc;
-
 use glam::{DMat3, DVec2};
 
 use super::patch::{PatchIndex, Scratch, Touch};
 use super::site::Site;
-use super::work::{Known, Pads};
+use super::work::{Known, Pads, Touched};
 use super::{proposer::Proposer, site};
 use crate::error::Result;
 use crate::gripper::Jaws;
-use crate::model::{Contact, Frame, Grip};
+use crate::model::{Frame, Grip};
 
 /// By how much a grip stands off its pose.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -45,7 +43,7 @@ impl Proposer<'_> {
                 (local.origin.truncate(), local.rotation.x_axis.truncate().to_angle());
             let jaws = site::jaws(&local);
             let posture = (place, angle, jaws);
-            let contact = self.contact_at(site, &patches, posture, &mut scratch, &mut known);
+            let touched = self.contact_at(site, &patches, posture, &mut scratch, &mut known);
             let mut faces = [0, 1].map(|side| site.face_at(side, self.part, place));
             if jaws == Jaws::Exchanged {
                 faces.reverse();
@@ -55,7 +53,8 @@ impl Proposer<'_> {
                 face_i: faces[0],
                 face_ii: faces[1],
                 angle: grip.angle + by.turn,
-                contact,
+                contact: touched.contact,
+                surfaces: touched.surfaces,
                 ..grip.clone()
             }
         });
@@ -70,13 +69,13 @@ impl Proposer<'_> {
         (place, angle, jaws): (DVec2, f64, Jaws),
         scratch: &mut [Scratch; 2],
         known: &mut Known,
-    ) -> Arc<Contact> {
+    ) -> Touched {
         let pads = Pads::new(site.pads(self.gripper, jaws), angle);
         let mut whole = [true; 2];
         for (side, patch) in pads.sides(patches) {
             let touch = patches[patch].touch(&pads.turned[side], place, &mut scratch[side]);
             whole[side] = touch == Touch::Whole;
         }
-        self.contact(patches, &pads, place, angle, jaws, whole, scratch, known)
+        self.contact(site, patches, &pads, place, angle, jaws, whole, scratch, known)
     }
 }

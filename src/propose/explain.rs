@@ -15,6 +15,9 @@ use crate::gripper::Jaws;
 use crate::model::{Contact, Frame, Patch, Polygon};
 use crate::part::PairKind;
 
+/// Closing directions that differ by less are one \[rad\].
+const SAME_CLOSING: f64 = 1e-6;
+
 /// A stretch of two facing planes as users see it.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -126,7 +129,11 @@ impl Proposer<'_> {
         let place = || format!("faces {face_i} and {face_ii}");
         let holds = |site: &Site| {
             let has = |side: usize, face: u32| site.faces[side].contains(&face);
-            (has(0, face_i) && has(1, face_ii)) || (has(0, face_ii) && has(1, face_i))
+            // Round faces are gripped in many directions.
+            let closing = part_from_grip.rotation.z_axis;
+            let along = closing.cross(site.part_from_site.rotation.z_axis).length() < SAME_CLOSING;
+            ((has(0, face_i) && has(1, face_ii)) || (has(0, face_ii) && has(1, face_i)))
+                && (site.relief.is_none() || along)
         };
         let local = |site: &Site| site.part_from_site.point_inverse(part_from_grip.origin);
         let nearest = self.sites.iter().enumerate().filter(|(_, site)| holds(site)).min_by(
@@ -277,6 +284,10 @@ impl Proposer<'_> {
                 pad_share * 1e6
             );
             verdict.add(name, area > 0.0 && area >= share.max(pad_share), detail, reason);
+        }
+        if let Some(relief) = &prepared.site.relief {
+            let rings = [0, 1].map(|side: usize| pads.turned[side].ring());
+            return relief.outlines(&relief.touched(rings, position, angle, jaws));
         }
         let [face_i, face_ii] = patches;
         Contact { face_i, face_ii }

@@ -103,7 +103,7 @@ impl Proposer<'_> {
         let patches = site.patches(self.part, &axes, self.gripper.pad_reach());
         let (mut scratch, mut known) = ([Scratch::default(), Scratch::default()], Known::default());
         let Fit { position, angle, jaws, .. } = *fit;
-        let contact =
+        let touched =
             self.contact_at(site, &patches, (position, angle, jaws), &mut scratch, &mut known);
         let mut part_from_grip = work::frame(site, position, angle);
         part_from_grip.rotation *= jaws.turn();
@@ -118,7 +118,8 @@ impl Proposer<'_> {
             face_i: faces[0],
             face_ii: faces[1],
             angle,
-            contact,
+            contact: touched.contact,
+            surfaces: touched.surfaces,
             inside: site.kind == PairKind::Internal,
             flip_of: None,
         }

@@ -30,9 +30,9 @@ pub struct ProposeOptions {
     pub edge_angles: bool,
     /// Smallest contact area on either face, as a share of the most that a pad can touch there: the
     /// area in which the two faces overlap, or that of a pad over the middle of its bounds, at the
-    /// grip's angle, whichever is smaller.
+    /// grip's angle, whichever is smaller. Of curved faces what is pressed without a load counts.
     pub min_contact: f64,
-    /// Smallest contact area on either face, as a share of the pad's area.
+    /// Smallest contact area on either face, as a share of the pad's area; not asked of curved faces.
     pub min_pad_share: f64,
     /// Largest distance of the grip origin from the centre of mass \[m\].
     pub max_offset: Option<f64>,
@@ -69,6 +69,9 @@ pub struct ProposeOptions {
     pub scene: Option<Arc<Scene>>,
     /// Candidates per chunk, about.
     pub chunk: usize,
+    /// Gripping force, by which pads are pressed into what is not plane \[N\]; `None`: the gripper's
+    /// largest.
+    pub force: Option<f64>,
 }
 
 setters!(ProposeOptions {
@@ -92,6 +95,7 @@ setters!(ProposeOptions {
     with_approach: approach: f64,
     with_scene: scene: Option<Arc<Scene>>,
     with_chunk: chunk: usize,
+    with_force: force: Option<f64>,
 });
 
 /// A scene's meshes are too long to be written down.
@@ -147,6 +151,7 @@ impl From<&Candidates> for ProposeOptions {
             approach: candidates.approach_distance.0,
             scene: None,
             chunk: 65_536,
+            force: None,
         }
     }
 }
@@ -223,6 +228,9 @@ impl ProposeOptions {
                 "ask for one of them or both",
             ));
         }
+        if let Some(force) = self.force {
+            positive("force", force)?;
+        }
         not_negative("opening", self.opening)?;
         not_negative("smallest opening", self.min_opening)?;
         not_negative("clearance", self.clearance)?;
@@ -244,6 +252,9 @@ pub enum Rejection {
     TooFarFromCentreOfMass,
     /// Counts face pairs, not candidates: the stroke does not leave the least opening for them.
     OpeningTooSmall,
+    /// Counts face pairs, not candidates: round faces on two axes, farther apart than their radii.
+    /// The part rolls out of the grip.
+    RollsApart,
     /// The contact area on a face is below [`ProposeOptions::min_contact`].
     ContactTooSmall,
     /// The contact area on a face is below [`ProposeOptions::min_pad_share`].
@@ -286,6 +297,7 @@ impl Rejection {
             Self::ApproachOutsideCone => "approach_outside_cone".into(),
             Self::TooFarFromCentreOfMass => "too_far_from_centre_of_mass".into(),
             Self::OpeningTooSmall => "face_pair_opening_too_small".into(),
+            Self::RollsApart => "face_pair_rolls_apart".into(),
             Self::ContactTooSmall => "contact_too_small".into(),
             Self::PadShareTooSmall => "pad_share_too_small".into(),
             Self::Ground { body } => with("ground", body),

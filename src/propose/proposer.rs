@@ -14,7 +14,7 @@ pub use progress::Progress;
 use super::environment::{Environment, Way};
 use super::options::{ProposeOptions, Rejection};
 use super::patch::PatchIndex;
-use super::site::{self, Places, Site};
+use super::site::{self, Places, Site, Sites};
 use super::work;
 use crate::clash::{Sweep, Topology, Tree, sweeps};
 use crate::error::{Error, Result};
@@ -127,6 +127,8 @@ pub struct Proposer<'a> {
     pub(super) options: ProposeOptions,
     pub(super) environment: Environment,
     pub(super) sites: Vec<Site>,
+    /// Number of those on planes; the others come after them.
+    plane: usize,
     pub(super) directions: Vec<DVec3>,
     shape: Arc<Topology>,
     /// Contact of a pad that lies wholly on both faces.
@@ -150,6 +152,9 @@ struct Cursor {
     id: u64,
     /// Number of the next special candidate.
     special_id: u64,
+    /// The same of the sites on curved faces, which are counted after all others.
+    round_id: u64,
+    round_special_id: u64,
 }
 
 /// Positions `positions` of a site at one angle; the first has the number `id`.
@@ -213,13 +218,20 @@ impl<'a> Proposer<'a> {
             let opened = [reach[0] + 2.0 * options.min_opening, reach[1]];
             choice.take(part.internal_pairs(0.0, f64::INFINITY), reach, opened);
         }
-        tally.pairs = pairs.len() as u64;
         let environment = Environment::new(options);
-        let (sites, directions) =
+        let Sites { sites, directions, plane, round } =
             site::sites(part, gripper, options, &environment, &pairs, chosen.as_deref())?;
+        tally.pairs = pairs.len() as u64 + round.pairs;
+        round.widths.iter().for_each(|&width| tally.note_width(width, gripper.stroke));
+        for (reason, count) in round.rejections {
+            *tally.rejections.entry(reason.name()).or_default() += count;
+        }
         tally.nearest_approach = environment.nearest_approach(&sites);
         let stride = if options.flips || !gripper.is_symmetric() { 2 } else { 1 };
-        let grid: usize = sites.iter().map(|site| site.positions.len() * site.angles.len()).sum();
+        let grid: usize = sites[..plane].iter().map(Site::grid).sum();
+        let special: usize =
+            sites[..plane].iter().flat_map(|site| &site.special).map(Vec::len).sum();
+        let round_grid: usize = sites[plane..].iter().map(Site::grid).sum();
         let pad = vec![Polygon { outer: gripper.pad.clone(), holes: Vec::new() }]; // of both
         Ok(Self {
             part,
@@ -232,7 +244,13 @@ impl<'a> Proposer<'a> {
             whole: Arc::new(Contact { face_i: pad.clone(), face_ii: pad }),
             symmetric: gripper.is_symmetric(),
             tally,
-            next: Cursor { special_id: grid as u64 * stride, ..Cursor::default() },
+            plane,
+            next: Cursor {
+                special_id: grid as u64 * stride,
+                round_id: (grid + special) as u64 * stride,
+                round_special_id: (grid + special + round_grid) as u64 * stride,
+                ..Cursor::default()
+            },
             corners: 400.0,
             tree: None,
         })
@@ -244,8 +262,7 @@ impl<'a> Proposer<'a> {
             .iter()
             .map(|site| {
                 let special: usize = site.special.iter().map(Vec::len).sum();
-                (site.positions.len() * site.angles.len() + special) as u64
-                    * self.orientations().len() as u64
+                (site.grid() + special) as u64 * self.orientations().len() as u64
             })
             .sum()
     }
@@ -342,9 +359,11 @@ impl<'a> Proposer<'a> {
             let positions = self.next.position..end;
             candidates += positions.len();
             let stride = self.stride();
-            let next = match self.next.places {
-                Places::Grid => &mut self.next.id,
-                Places::Special => &mut self.next.special_id,
+            let next = match (self.next.site < self.plane, self.next.places) {
+                (true, Places::Grid) => &mut self.next.id,
+                (true, Places::Special) => &mut self.next.special_id,
+                (false, Places::Grid) => &mut self.next.round_id,
+                (false, Places::Special) => &mut self.next.round_special_id,
             };
             let id = *next;
             *next += positions.len() as u64 * stride;
@@ -416,16 +435,17 @@ impl Iterator for Proposer<'_> {
     }
 }
 
-/// Whether each planar face may be touched; `None`: all may.
+/// Whether each face may be touched; `None`: all may.
 fn chosen_faces(part: &Part, options: &ProposeOptions) -> Result<Option<Vec<bool>>> {
     if options.faces.is_none() && options.faces_in.is_empty() {
         return Ok(None);
     }
-    let mut chosen = vec![false; part.faces.len()];
+    let count = part.faces.len() + part.curved.len();
+    let mut chosen = vec![false; count];
     for &face in options.faces.iter().flatten() {
         let Some(chosen) = chosen.get_mut(face as usize) else {
-            let remedy = format!("the part has {} of them, counted from 0", part.faces.len());
-            return Err(Error::input("faces", format!("there is no planar face {face}"), remedy));
+            let remedy = format!("the part has {count} of them, counted from 0");
+            return Err(Error::input("faces", format!("there is no face {face}"), remedy));
         };
         *chosen = true;
     }
@@ -438,15 +458,23 @@ fn chosen_faces(part: &Part, options: &ProposeOptions) -> Result<Option<Vec<bool
                 .map(|point| face.part_from_face.point(point.extend(0.0)))
                 .all(|point| point.cmpge(low).all() && point.cmple(high).all())
         };
+        let curved = |face: &&crate::part::CurvedFace| {
+            face.triangles
+                .iter()
+                .flat_map(|&triangle| part.mesh.corners(triangle))
+                .all(|point| point.cmpge(low).all() && point.cmple(high).all())
+        };
+        let plane = part.faces.iter().filter(|face| within(face)).map(|face| face.id);
+        let curved = part.curved.iter().filter(curved).map(|face| face.id);
         let mut any = false;
-        for face in part.faces.iter().filter(|face| within(face)) {
-            chosen[face.id as usize] = true;
+        for face in plane.chain(curved) {
+            chosen[face as usize] = true;
             any = true;
         }
         if !any {
             let [a, b] = [low, high].map(|corner| (corner * 1e3).to_array());
             let problem = format!(
-                "no planar face lies wholly between ({:.2}, {:.2}, {:.2}) and ({:.2}, {:.2}, {:.2}) mm",
+                "no face lies wholly between ({:.2}, {:.2}, {:.2}) and ({:.2}, {:.2}, {:.2}) mm",
                 a[0], a[1], a[2], b[0], b[1], b[2]
             );
             return Err(Error::input(

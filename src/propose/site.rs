@@ -5,12 +5,18 @@
 //! first, and split again into stretches too far apart for one pad.
 
 mod places;
+mod relief;
+mod round;
+mod shapes;
 mod special;
 
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use places::{angles, main_direction, positions, straight_edges};
+pub(super) use relief::Relief;
+pub(super) use round::Round;
+use shapes::{project, same_shape, stretches, to_site};
 use special::{Landmarks, Posture};
 
 use super::environment::Environment;
@@ -18,8 +24,8 @@ use super::options::ProposeOptions;
 use super::patch::PatchIndex;
 use crate::clash::{Motion, Sweep, sweeps};
 use crate::error::{Error, Result};
-use crate::geometry::polygon::{self, Bounds2, rings};
-use crate::geometry::{UnionFind, contains, overlay};
+use crate::geometry::polygon::{self, Bounds2};
+use crate::geometry::{contains, overlay};
 use crate::gripper::{Gripper, Jaws};
 use crate::model::{Frame, Patch, Polygon, Ring};
 use crate::part::{FacePair, PairKind, Part, PlanarFace};
@@ -78,6 +84,8 @@ pub(super) struct Site {
     pub(super) angles: Vec<f64>,
     /// Bounds of all positions.
     pub(super) bounds: Bounds2,
+    /// What the pads touch, where it is not plane.
+    pub(super) relief: Option<Relief>,
 }
 
 /// Axes of a closing direction: rows of the matrix are the axes in the part frame, the third is the
@@ -88,8 +96,20 @@ pub(super) fn axes(direction: DVec3) -> DMat3 {
     DMat3::from_cols(x, direction.cross(x), direction).transpose()
 }
 
-/// Sites and their directions, in a stable order: by falling overlap of their largest pair.
-/// `chosen`: the faces that may be touched; `None`: all.
+/// Sites and their directions.
+#[derive(Default)]
+pub(super) struct Sites {
+    /// In a stable order: those on planes by falling overlap of their largest pair, then those on
+    /// curved and drafted faces.
+    pub(super) sites: Vec<Site>,
+    pub(super) directions: Vec<DVec3>,
+    /// Number of those on planes.
+    pub(super) plane: usize,
+    /// What came of the pairs of curved and drafted faces.
+    pub(super) round: Round,
+}
+
+/// The sites of a part. `chosen`: the faces that may be touched; `None`: all.
 pub(super) fn sites(
     part: &Part,
     gripper: &Gripper,
@@ -97,7 +117,7 @@ pub(super) fn sites(
     environment: &Environment,
     pairs: &[FacePair],
     chosen: Option<&[bool]>,
-) -> Result<(Vec<Site>, Vec<DVec3>)> {
+) -> Result<Sites> {
     let (low, high) = part.mesh.bounding_box();
     let size = (high - low).length();
     let planes = Planes::new(&part.faces, SAME_PLANE * size);
@@ -127,7 +147,10 @@ pub(super) fn sites(
     for (kind, pairs) in &groups {
         sites.extend(finder.sites(*kind, pairs)?);
     }
-    Ok((sites, finder.directions))
+    let plane = sites.len();
+    let (curved, round) = finder.round()?;
+    sites.extend(curved);
+    Ok(Sites { sites, directions: finder.directions, plane, round })
 }
 
 /// Faces sorted into planes.
@@ -171,6 +194,34 @@ impl Planes {
     }
 }
 
+/// What a site is made of, in the axes of its direction.
+struct Base<'a> {
+    kind: PairKind,
+    direction: usize,
+    sides: &'a [Vec<u32>; 2],
+    /// Where both sides are touched.
+    overlap: Patch,
+    /// Angle of the site's `x`.
+    turn: f64,
+    /// Its origin.
+    middle: DVec2,
+    /// Heights of the pads' planes on side I and II.
+    heights: [f64; 2],
+    /// See [`Site::rise`].
+    rise: f64,
+}
+
+/// Main direction of a stretch, and the middle of its bounds along it.
+fn lie(overlap: &[Polygon]) -> (f64, DVec2) {
+    let turn = main_direction(overlap);
+    let points: Vec<DVec2> = overlap
+        .iter()
+        .flat_map(|polygon| &polygon.outer)
+        .map(|&point| DVec2::from_angle(-turn).rotate(point))
+        .collect();
+    (turn, DVec2::from_angle(turn).rotate(Bounds2::of(&points).centre()))
+}
+
 /// What all sites are found from.
 struct Finder<'a> {
     part: &'a Part,
@@ -190,7 +241,7 @@ struct Finder<'a> {
 impl Finder<'_> {
     /// The sites of pairs whose planes coincide.
     fn sites(&mut self, kind: PairKind, pairs: &[&FacePair]) -> Result<Vec<Site>> {
-        let (part, gripper, options, size) = (self.part, self.gripper, self.options, self.size);
+        let (part, gripper, size) = (self.part, self.gripper, self.size);
         let (direction, sides) = self.sides(pairs);
         let face = |id: u32| &part.faces[id as usize];
         let axis = self.directions[direction];
@@ -198,84 +249,88 @@ impl Finder<'_> {
         let patches =
             [0, 1].map(|side| project(sides[side].iter().map(|&id| face(id)), &axes_from_part));
         let overlap = overlay::intersect(&patches[0], &patches[1]);
-        let [one, two] = gripper.pad_sizes();
         let reach = gripper.pad_reach();
-        let spacing = options.spacing(gripper);
-        let centre = axes_from_part * self.centre_of_mass;
-
         let mut found = Vec::new();
         for overlap in stretches(overlap, 2.0 * reach) {
-            let turn = main_direction(&overlap);
-            let middle = {
-                let turned = Bounds2::of(
-                    &overlap
-                        .iter()
-                        .flat_map(|polygon| &polygon.outer)
-                        .map(|&point| DVec2::from_angle(-turn).rotate(point))
-                        .collect::<Vec<_>>(),
-                );
-                DVec2::from_angle(turn).rotate(turned.centre())
-            };
+            let (turn, middle) = lie(&overlap);
             let heights = heights(face(sides[0][0]), face(sides[1][0]), &axes_from_part, middle);
-            let mid_height = (heights[0] + heights[1]) / 2.0;
-            let origin = middle.extend(mid_height);
-            let cells = polygon::bounds(&overlap).size() / spacing;
-            if cells.element_product() > MOST_POSITIONS {
-                let problem = format!(
-                    "{spacing} m makes {:.0} positions on one face pair",
-                    cells.element_product()
-                );
-                return Err(Error::input("spacing", problem, "choose a larger step"));
-            }
-            let local: Patch =
-                overlap.iter().map(|polygon| to_site(polygon, middle, turn)).collect();
             let rise =
                 rise(&sides, part, &axes_from_part, axis, &overlap, heights) + SAME_PLANE * size;
-            let centre_of_mass = DVec2::from_angle(-turn).rotate(centre.truncate() - middle);
-            let (positions, grid) =
-                positions(&local, spacing, one.max(two).max_element() / 2.0, centre_of_mass);
-            let edges = straight_edges(&local);
-            let angles = angles(&edges, options, one.min(two).min_element());
-            let frame = Frame {
-                rotation: axes_from_part.transpose() * DMat3::from_rotation_z(turn),
-                origin: axes_from_part.transpose() * origin,
-            };
-            let mut site = Site {
-                kind,
-                part_from_site: frame,
-                width: (heights[0] - heights[1]).abs(),
-                direction,
-                origin,
-                turn,
-                faces: sides.clone(),
-                touched: sides.clone(),
-                rise,
-                flush: SAME_PLANE * size,
-                overlap: polygon::patch_area(&local),
-                extent: grid.bounds.size(),
-                bounds: Bounds2::of(&positions),
-                positions,
-                special: vec![Vec::new(); angles.len()],
-                angles,
-            };
-            let landmarks = Landmarks {
-                overlap: &local,
-                grid: &grid,
-                positions: &site.positions,
-                edges: &edges,
-                points: [
-                    centre_of_mass,
-                    polygon::patch_moments(&local).centroid,
-                    grid.bounds.centre(),
-                ],
-            };
-            site.special = self.special(&site, &landmarks);
-            site.bounds = special::bounds(&site.special)
-                .map_or(site.bounds, |bounds| bounds.union(site.bounds));
+            let sides = &sides;
+            let base = Base { kind, direction, sides, overlap, turn, middle, heights, rise };
+            let mut site = self.site(base, None)?;
             site.touched = self.touched(&site, reach);
             found.push(site);
         }
         Ok(found)
+    }
+
+    /// A site with its places; `relief` in the axes of the direction.
+    fn site(&self, base: Base<'_>, relief: Option<Relief>) -> Result<Site> {
+        let Base { kind, direction, sides, overlap, turn, middle, heights, rise } = base;
+        let (gripper, options, size) = (self.gripper, self.options, self.size);
+        let axes_from_part = axes(self.directions[direction]);
+        let [one, two] = gripper.pad_sizes();
+        let spacing = options.spacing(gripper);
+        let mid_height = (heights[0] + heights[1]) / 2.0;
+        let origin = middle.extend(mid_height);
+        let cells = polygon::bounds(&overlap).size() / spacing;
+        if cells.element_product() > MOST_POSITIONS {
+            let problem = format!(
+                "{spacing} m makes {:.0} positions on one face pair",
+                cells.element_product()
+            );
+            return Err(Error::input("spacing", problem, "choose a larger step"));
+        }
+        let local: Patch = overlap.iter().map(|polygon| to_site(polygon, middle, turn)).collect();
+        let relief = relief.map(|relief| relief.moved(middle, turn));
+        let centre = axes_from_part * self.centre_of_mass;
+        let centre_of_mass = DVec2::from_angle(-turn).rotate(centre.truncate() - middle);
+        let (positions, grid) =
+            positions(&local, spacing, one.max(two).max_element() / 2.0, centre_of_mass);
+        let frame = Frame {
+            rotation: axes_from_part.transpose() * DMat3::from_rotation_z(turn),
+            origin: axes_from_part.transpose() * origin,
+        };
+        let mut edges = straight_edges(&local);
+        let angles = match &relief {
+            None => angles(&edges, options, one.min(two).min_element()),
+            Some(relief) => {
+                edges.retain(|edge| !relief.runs_along(edge));
+                let cone = options.approach_cone.map(|cone| frame.rotation.transpose() * cone.axis);
+                relief.angles(options, cone)
+            }
+        };
+        let mut site = Site {
+            kind,
+            part_from_site: frame,
+            width: (heights[0] - heights[1]).abs(),
+            direction,
+            origin,
+            turn,
+            faces: sides.clone(),
+            touched: sides.clone(),
+            rise,
+            flush: SAME_PLANE * size,
+            overlap: polygon::patch_area(&local),
+            extent: grid.bounds.size(),
+            bounds: Bounds2::of(&positions),
+            positions,
+            special: vec![Vec::new(); angles.len()],
+            angles,
+            relief,
+        };
+        let landmarks = Landmarks {
+            overlap: &local,
+            grid: &grid,
+            positions: &site.positions,
+            edges: &edges,
+            points: [centre_of_mass, polygon::patch_moments(&local).centroid, grid.bounds.centre()],
+        };
+        site.special = self.special(&site, &landmarks);
+        site.bounds =
+            special::bounds(&site.special).map_or(site.bounds, |bounds| bounds.union(site.bounds));
+        Ok(site)
     }
 
     /// Index of the closing direction of pairs, and their faces by the side that they lie on.
@@ -288,12 +343,7 @@ impl Finder<'_> {
         if axis[axis.abs().max_position()] < 0.0 {
             axis = -axis;
         }
-        let known =
-            |known: &DVec3| known.dot(axis) > 0.0 && known.cross(axis).length() < SAME_DIRECTION;
-        let direction = self.directions.iter().position(known).unwrap_or_else(|| {
-            self.directions.push(axis);
-            self.directions.len() - 1
-        });
+        let direction = self.direction(axis);
         let axis = self.directions[direction];
         // Sides by the sign of the normal: pairs of one group may list their faces in either order.
         let mut sides: [Vec<u32>; 2] = [Vec::new(), Vec::new()];
@@ -305,6 +355,16 @@ impl Finder<'_> {
             side.dedup();
         }
         (direction, sides)
+    }
+
+    /// Index of a closing direction.
+    fn direction(&mut self, axis: DVec3) -> usize {
+        let known =
+            |known: &DVec3| known.dot(axis) > 0.0 && known.cross(axis).length() < SAME_DIRECTION;
+        self.directions.iter().position(known).unwrap_or_else(|| {
+            self.directions.push(axis);
+            self.directions.len() - 1
+        })
     }
 
     /// The special places of a site at each angle from which it may be approached.
@@ -372,6 +432,11 @@ impl Finder<'_> {
 }
 
 impl Site {
+    /// Number of candidates of the grid.
+    pub(super) fn grid(&self) -> usize {
+        self.positions.len() * self.angles.len()
+    }
+
     /// Places at an angle: those of the grid, or the special ones.
     pub(super) fn places(&self, kind: Places, angle: usize) -> &[DVec2] {
         match kind {
@@ -435,6 +500,9 @@ impl Site {
         reach: f64,
     ) -> Vec<PatchIndex> {
         let [side_i, side_ii] = [0, 1].map(|side| -> Patch {
+            if let Some(relief) = &self.relief {
+                return relief.pressed[side].clone();
+            }
             let faces = self.touched[side].iter().map(|&id| &part.faces[id as usize]);
             project(faces, axes_from_part)
                 .iter()
@@ -447,13 +515,24 @@ impl Site {
         if same { vec![index(side_i)] } else { vec![index(side_i), index(side_ii)] }
     }
 
-    /// The face of a side that holds `point` of the site's plane, or the first.
+    /// The face of a side that holds `point` of the site's plane, or the first; of curved ones the
+    /// nearest.
     pub(super) fn face_at(&self, side: usize, part: &Part, point: DVec2) -> u32 {
         let faces = &self.faces[side];
         if faces.len() == 1 {
             return faces[0];
         }
         let point = self.part_from_site.point(point.extend(0.0));
+        if self.relief.is_some() {
+            let plane = part.faces.len();
+            let centre = |id: u32| match (id as usize).checked_sub(plane) {
+                Some(curved) => part.curved[curved].centroid,
+                None => part.faces[id as usize].centroid,
+            };
+            let near = |&&id: &&u32| centre(id).distance(point);
+            let nearest = faces.iter().min_by(|a, b| near(a).total_cmp(&near(b)));
+            return nearest.copied().unwrap_or(faces[0]);
+        }
         let holds = |&&id: &&u32| {
             let face = &part.faces[id as usize];
             let local = face.part_from_face.point_inverse(point).truncate();
@@ -505,100 +584,9 @@ fn rise(
     most
 }
 
-/// Faces projected along the closing axis into the axes' `(x, y)`, normalised.
-fn project<'a>(faces: impl Iterator<Item = &'a PlanarFace>, axes_from_part: &DMat3) -> Patch {
-    let mut patch = Patch::new();
-    for face in faces {
-        let place = |&point: &DVec2| {
-            (*axes_from_part * face.part_from_face.point(point.extend(0.0))).truncate()
-        };
-        for shape in &face.polygons {
-            let mut polygon = Polygon {
-                outer: shape.outer.iter().map(place).collect(),
-                holes: shape.holes.iter().map(|hole| hole.iter().map(place).collect()).collect(),
-            };
-            polygon::normalise(&mut polygon);
-            patch.push(polygon);
-        }
-    }
-    patch
-}
-
-fn to_site(shape: &Polygon, origin: DVec2, turn: f64) -> Polygon {
-    let turn = DVec2::from_angle(-turn);
-    let ring = |ring: &Vec<DVec2>| ring.iter().map(|&point| turn.rotate(point - origin)).collect();
-    Polygon { outer: ring(&shape.outer), holes: shape.holes.iter().map(ring).collect() }
-}
-
-/// Whether two patches have the same rings, whatever point each starts at.
-fn same_shape(a: &[Polygon], b: &[Polygon], tolerance: f64) -> bool {
-    let same_ring = |a: &[DVec2], b: &[DVec2]| {
-        let start = b.iter().position(|point| point.distance(a[0]) <= tolerance);
-        a.len() == b.len()
-            && start.is_some_and(|start| {
-                (0..a.len())
-                    .all(|index| a[index].distance(b[(start + index) % b.len()]) <= tolerance)
-            })
-    };
-    let (rings_a, rings_b): (Vec<&[DVec2]>, Vec<&[DVec2]>) =
-        (a.iter().flat_map(rings).collect(), b.iter().flat_map(rings).collect());
-    let mut free = vec![true; rings_b.len()];
-    rings_a.len() == rings_b.len()
-        && rings_a.iter().all(|ring| {
-            let found =
-                (0..rings_b.len()).find(|&index| free[index] && same_ring(ring, rings_b[index]));
-            found.is_some_and(|index| std::mem::replace(&mut free[index], false))
-        })
-}
-
-/// Splits a patch where its pieces are farther apart than `gap`, so that no pad touches two of
-/// them.
-fn stretches(patch: Patch, gap: f64) -> Vec<Patch> {
-    let mut boxes: Vec<(Bounds2, usize)> = patch
-        .iter()
-        .enumerate()
-        .map(|(index, polygon)| (Bounds2::of(&polygon.outer).grown(gap / 2.0), index))
-        .collect();
-    boxes.sort_by(|a, b| a.0.min.x.total_cmp(&b.0.min.x).then(a.1.cmp(&b.1)));
-    let mut sets = UnionFind::new(patch.len());
-    for (position, (bounds, index)) in boxes.iter().enumerate() {
-        for (other, other_index) in
-            boxes[position + 1..].iter().take_while(|(other, _)| other.min.x <= bounds.max.x)
-        {
-            if bounds.meets(*other) {
-                sets.join(*index, *other_index);
-            }
-        }
-    }
-    let mut stretches: Vec<(usize, Patch)> = Vec::new();
-    for (index, polygon) in patch.into_iter().enumerate() {
-        let root = sets.root(index);
-        match stretches.iter_mut().find(|(known, _)| *known == root) {
-            Some((_, patch)) => patch.push(polygon),
-            None => stretches.push((root, vec![polygon])),
-        }
-    }
-    stretches.into_iter().map(|(_, patch)| patch).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gripper::rectangle;
-
-    fn shape(ring: Vec<DVec2>) -> Polygon {
-        Polygon { outer: ring, holes: Vec::new() }
-    }
-
-    #[test]
-    fn far_pieces_become_sites_of_their_own() {
-        let at = |x: f64| {
-            shape(rectangle(DVec2::ONE).iter().map(|&point| point + DVec2::X * x).collect())
-        };
-        let split = stretches(vec![at(0.0), at(10.0), at(1.5), at(11.0)], 1.0);
-        assert_eq!(split.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2]);
-        assert!(stretches(Vec::new(), 1.0).is_empty());
-    }
 
     #[test]
     fn axes_are_right_handed() {

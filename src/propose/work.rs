@@ -9,11 +9,12 @@ use super::interference::View;
 use super::options::Rejection;
 use super::patch::{PatchIndex, Scratch, Touch, TurnedPad};
 use super::proposer::{Item, Prepared, Proposer};
-use super::site::Site;
+use super::site::{Relief, Site};
 use crate::clash::{Phase, Room, Sweep, Tree};
+use crate::contact::surface;
 use crate::geometry::{clip_ring_convex, polygon, ring_area};
 use crate::gripper::{Jaws, half_turn, rectangle};
-use crate::model::{Contact, Frame, Grip, Patch, Polygon, Ring};
+use crate::model::{Contact, Frame, Grip, Patch, Piece, Polygon, Ring, Surfaces};
 use crate::part::PairKind;
 
 /// What came of an item.
@@ -36,7 +37,20 @@ pub(super) struct Buffers {
 
 /// Contacts of one item by their rounded coordinates: a pad moved along a straight edge keeps its
 /// contact.
-pub(super) type Known = FxHashMap<Vec<i64>, Arc<Contact>>;
+pub(super) type Known = FxHashMap<Vec<i64>, Touched>;
+
+/// What the pads of a grip touch: areas and, where it is not plane, the surface.
+#[derive(Debug, Clone)]
+pub(super) struct Touched {
+    pub(super) contact: Arc<Contact>,
+    pub(super) surfaces: Option<Arc<Surfaces>>,
+}
+
+impl From<Arc<Contact>> for Touched {
+    fn from(contact: Arc<Contact>) -> Self {
+        Self { contact, surfaces: None }
+    }
+}
 
 /// Contacts with more corners than this hardly ever repeat; looking for them would cost more than
 /// it saves.
@@ -109,7 +123,8 @@ impl Proposer<'_> {
             let alive = std::mem::take(&mut buffers.alive);
             for &index in &alive {
                 let place = places[item.positions.start + index as usize];
-                let contact = self.contact(
+                let Touched { contact, surfaces } = self.contact(
+                    site,
                     &prepared.patches,
                     &pads,
                     place,
@@ -127,6 +142,7 @@ impl Proposer<'_> {
                     face_ii: site.face_at(1, self.part, place),
                     angle,
                     contact,
+                    surfaces,
                     inside: site.kind == PairKind::Internal,
                     flip_of: None,
                 };
@@ -137,7 +153,8 @@ impl Proposer<'_> {
                 } else if self.options.flips && self.symmetric {
                     let mut flip = grip.clone();
                     turn(&mut flip);
-                    flip.contact = self.mirrored(&grip.contact, &mut known);
+                    let touched = self.mirrored(&grip, &mut known);
+                    (flip.contact, flip.surfaces) = (touched.contact, touched.surfaces);
                     flip.flip_of = Some(grip.id);
                     flip.id += 1;
                     outcome.grips.push(grip);
@@ -302,8 +319,9 @@ impl Proposer<'_> {
         // No more of the pad than its overlap with the faces' bounds, middle over middle.
         let bounds = rectangle(site.extent);
         let most = ring_area(&clip_ring_convex(&pad.centred(), &bounds)).min(site.overlap);
-        [self.options.min_contact * most, self.options.min_pad_share * pad.area()]
-            .map(|floor| floor * (1.0 - 1e-9))
+        // Round faces touch little of a pad by their nature.
+        let pad_share = if site.relief.is_some() { 0.0 } else { self.options.min_pad_share };
+        [self.options.min_contact * most, pad_share * pad.area()].map(|floor| floor * (1.0 - 1e-9))
     }
 
     /// The part in the grip axes of a site at an angle.
@@ -319,6 +337,7 @@ impl Proposer<'_> {
     #[expect(clippy::too_many_arguments, reason = "one call; a struct would only rename them")]
     pub(super) fn contact(
         &self,
+        site: &Site,
         patches: &[PatchIndex],
         pads: &Pads,
         place: DVec2,
@@ -327,9 +346,13 @@ impl Proposer<'_> {
         whole: [bool; 2],
         scratch: &mut [Scratch; 2],
         known: &mut Known,
-    ) -> Arc<Contact> {
+    ) -> Touched {
+        if let Some(relief) = &site.relief {
+            let rings = [0, 1].map(|side: usize| pads.turned[side].ring());
+            return self.pressed(relief, relief.touched(rings, place, angle, jaws), known);
+        }
         if pads.alike && pads.sides(patches).all(|(side, _)| whole[side]) {
-            return Arc::clone(&self.whole);
+            return Arc::clone(&self.whole).into();
         }
         let mut touched = pads.sides(patches).map(|(side, patch)| -> Patch {
             let (patch, pad) = (&patches[patch], &pads.turned[side]);
@@ -352,33 +375,65 @@ impl Proposer<'_> {
     }
 
     /// The contact with exchanged jaws.
-    fn mirrored(&self, contact: &Arc<Contact>, known: &mut Known) -> Arc<Contact> {
-        if Arc::ptr_eq(contact, &self.whole) {
-            Arc::clone(&self.whole)
+    fn mirrored(&self, grip: &Grip, known: &mut Known) -> Touched {
+        if let Some(surfaces) = &grip.surfaces {
+            let contact = Arc::new(mirror(&grip.contact));
+            return Touched { contact, surfaces: Some(Arc::new(surface::mirrored(surfaces))) };
+        }
+        if Arc::ptr_eq(&grip.contact, &self.whole) {
+            Arc::clone(&self.whole).into()
         } else {
-            self.shared(mirror(contact), known)
+            self.shared(mirror(&grip.contact), known)
         }
     }
 
-    fn shared(&self, contact: Contact, known: &mut Known) -> Arc<Contact> {
-        let step = SAME_CONTACT * self.gripper.pad_reach();
+    /// Coordinates closer than this are one, for what is shared \[m\].
+    fn same(&self) -> f64 {
+        SAME_CONTACT * self.gripper.pad_reach()
+    }
+
+    fn shared(&self, contact: Contact, known: &mut Known) -> Touched {
+        let step = self.same();
         let rings =
             || [&contact.face_i, &contact.face_ii].into_iter().flatten().flat_map(polygon::rings);
         if rings().map(<[DVec2]>::len).sum::<usize>() > SHARED_CORNERS {
-            return Arc::new(contact);
+            return Arc::new(contact).into();
         }
         let mut key = Vec::new();
         for patch in [&contact.face_i, &contact.face_ii] {
             for ring in patch.iter().flat_map(polygon::rings) {
-                key.extend(ring.iter().flat_map(|point| {
-                    [(point.x / step).round() as i64, (point.y / step).round() as i64]
-                }));
-                key.push(i64::MAX);
+                push(&mut key, step, ring);
             }
             key.push(i64::MIN);
         }
-        Arc::clone(known.entry(key).or_insert_with(|| Arc::new(contact)))
+        known.entry(key).or_insert_with(|| Arc::new(contact).into()).clone()
     }
+
+    /// What is pressed of the surfaces under the pads.
+    fn pressed(&self, relief: &Relief, surfaces: Surfaces, known: &mut Known) -> Touched {
+        let step = self.same();
+        let mut key = Vec::new();
+        for piece in surfaces.face_i.iter().chain([&Piece::default()]).chain(&surfaces.face_ii) {
+            push(&mut key, step, &piece.outer);
+            piece.holes.iter().for_each(|hole| push(&mut key, step, hole));
+            let numbers = surface::numbers(&piece.gap);
+            key.extend(numbers.iter().map(|x| (x / step).round() as i64));
+            key.push(i64::MIN);
+        }
+        let touched = || Touched {
+            contact: Arc::new(relief.outlines(&surfaces)),
+            surfaces: Some(Arc::new(surfaces.clone())),
+        };
+        known.entry(key).or_insert_with(touched).clone()
+    }
+}
+
+/// Adds a ring's rounded coordinates to a key.
+fn push(key: &mut Vec<i64>, step: f64, ring: &[DVec2]) {
+    key.extend(
+        ring.iter().flat_map(|x| [(x.x / step).round() as i64, (x.y / step).round() as i64]),
+    );
+    key.push(i64::MAX);
 }
 
 /// Exchanges the jaws of a grip: half a turn about the approach axis.

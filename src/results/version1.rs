@@ -158,6 +158,7 @@ impl Old {
                 epsilon: epsilon_m,
             });
         let resolved = Resolved {
+            pad_stiffness: 0.0,
             force: Force(settings.force_n),
             spacing: Length(settings.spacing_m),
             pad_friction: settings.pad_friction,

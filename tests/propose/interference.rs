@@ -103,6 +103,8 @@ fn random_gripper(random: &mut Random) -> Gripper {
         pad_friction: None,
         pad_thickness: None,
         pad_modulus: None,
+        pad_poisson: None,
+        pad_stiffness: None,
         outer_pad: None,
         fingers: vec![tip, finger],
         fingers_ii: None,

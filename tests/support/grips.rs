@@ -54,6 +54,7 @@ pub(crate) fn grip(id: u64, part_from_grip: Frame, mu_s: f64) -> RankedGrip {
             face_ii: 1,
             angle: 0.1 * id as f64,
             contact: Arc::new(contact),
+            surfaces: None,
             inside: false,
             flip_of: None,
         },

@@ -151,6 +151,7 @@ fn candidate(
         face_ii: pair.face_ii,
         angle,
         contact: Arc::new(contact),
+        surfaces: None,
         inside: false,
         flip_of: None,
     })

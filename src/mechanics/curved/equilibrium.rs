@@ -110,10 +110,20 @@ impl<'a> Problem<'a> {
     }
 
     /// What friction would do with the pressure of a state if the force along the pads counted
-    /// that planes bring when they tilt.
-    pub(super) fn with_tilting_planes(&self, state: &State<'_>) -> Option<(DVec2, Slipping)> {
+    /// that planes bring when they tilt; `None` where that changes it by less than the share
+    /// `least`.
+    pub(super) fn with_tilting_planes(
+        &self,
+        state: &State<'_>,
+        least: f64,
+    ) -> Option<(DVec2, Slipping)> {
         let faces = [&state.faces[0], &state.faces[1]];
         let more = faces[0].tilted + faces[1].tilted;
+        // It cannot add more to the friction than it is.
+        let mu = state.slip.map_or(0.0, |slip| slip.mu);
+        if more.length() <= least * mu * (self.normal[0] + self.normal[1]) {
+            return None;
+        }
         let w = self.along(faces, self.moment_beyond(faces), more);
         Some((more, slip::solve(&self.space, faces, self.distance, w, None)?))
     }
@@ -137,8 +147,8 @@ impl<'a> Problem<'a> {
             (None, moment)
         } else {
             let w = self.along(faces, moment, DVec2::ZERO);
-            let zeta = near.and_then(|state| state.slip.as_ref()).map(|slip| &slip.zeta);
-            let slip = slip::solve(&self.space, faces, self.distance, w, zeta)?;
+            let near = near.and_then(|state| state.slip.as_ref());
+            let slip = slip::solve(&self.space, faces, self.distance, w, near)?;
             let couple = slip.shares[0] - slip.shares[1];
             (Some(slip), moment + coupling * half * DVec2::new(couple.y, -couple.x))
         };

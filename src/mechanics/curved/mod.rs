@@ -8,12 +8,14 @@
 
 mod equilibrium;
 mod face;
+mod inverse;
+mod note;
 mod slip;
 mod space;
 
 use glam::DVec2;
 use nalgebra::Vector5;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::contact::surface::{Piece, Surfaces};
 use crate::error::{Error, Result};
@@ -22,11 +24,13 @@ use crate::model::{Face as Side, Score, Slip, Status, Wrench};
 use super::{COUPLING_SEARCH, refused};
 use equilibrium::{Problem, State};
 use face::{Face, Pressed};
+pub use inverse::force_needed;
+pub use note::{Note, SoftLimit};
 use slip::{Slipping, Space};
 use space::{Kind, Rotation};
 
 /// What one face carries at the limit.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct FaceAnswer {
     /// Normal force \[N\].
     pub load: f64,
@@ -38,65 +42,13 @@ pub struct FaceAnswer {
     pub mean_pressure: f64,
     /// Greatest pressure \[Pa\].
     pub greatest_pressure: f64,
+    /// Greatest compression of the layer \[m\].
+    #[serde(default)]
+    pub compression: f64,
     /// Smallest box around what is pressed: its lower and upper corner in `(x1, x2)` \[m\].
     pub extent: [[f64; 2]; 2],
     /// What the face carries by friction: force along `x1`, `x2` \[N\] and moment about `x3` [N m].
     pub share: [f64; 3],
-}
-
-/// What a user should know beside the numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[serde(tag = "note", rename_all = "snake_case")]
-#[non_exhaustive]
-pub enum Note {
-    /// The pad is too soft or its contact too wide for the flat formula.
-    TooSoft {
-        /// The face.
-        face: Side,
-        /// Which limit is passed.
-        limit: SoftLimit,
-        /// The value: compression or half width over the layer's thickness, or half width over
-        /// radius.
-        value: f64,
-    },
-    /// The part rolls out of the grip unless friction holds it: its round faces stand farther
-    /// apart than their radii.
-    Unstable {
-        /// Stiffness against the rotation [N m per rad], negative.
-        stiffness: f64,
-    },
-    /// A pad ends within the contact of a part that can spin, and pushes it off sideways.
-    OverEdge {
-        /// Force on the body across the axis \[N\].
-        force: f64,
-    },
-    /// The part turns by this angle before it stops, more than the layers give: the rotation is
-    /// counted as free.
-    SettlesBy {
-        /// Angle \[rad\].
-        angle: f64,
-    },
-    /// The faces are of facets that could be meant to be round: they are taken as round.
-    FacetedOrRound {
-        /// Facets of the whole round.
-        facets: f64,
-    },
-    /// The part tilts by this angle and slips by half the distance times it before the limit is
-    /// there: friction may hold a little below the limit.
-    TiltsFirst {
-        /// Angle \[rad\].
-        angle: f64,
-        /// Slip \[m\].
-        slip: f64,
-    },
-    /// Planes that tilt under their load push along the pads, which the theory leaves out as the
-    /// paper does; with a plane opposite a round face it does not cancel.
-    TiltPushes {
-        /// Force on the body along `x1`, `x2` \[N\].
-        force: [f64; 2],
-        /// `mu_s` with it, for the same pressure.
-        mu_s: f64,
-    },
 }
 
 /// Change of `mu_s` from which [`Note::TiltPushes`] is given.
@@ -105,18 +57,6 @@ const TILTING_PUSH: f64 = 1e-3;
 /// Push across the axis of a part that can spin, over the normal forces, from which
 /// [`Note::OverEdge`] is given.
 const OVER_EDGE: f64 = 1e-3;
-
-/// Limits of [`Note::TooSoft`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SoftLimit {
-    /// Compression above a third of the layer.
-    Compression,
-    /// Half width above 0.4 of the radius: friction needed is overestimated by over 1.6 %.
-    Width,
-    /// Half width below the layer's thickness: the layer is no bed of springs there.
-    Thickness,
-}
 
 /// The answer for one contact of [`Surfaces`] and one load.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -147,24 +87,99 @@ pub struct Answer {
 /// A hard case is a [`Status`].
 pub fn solve(surfaces: &Surfaces, distance: f64, force: f64, wrench: &Wrench) -> Result<Answer> {
     check(surfaces, distance, force, wrench)?;
-    let faces = [
-        Face::new(&surfaces.face_i, surfaces.stiffness[0], 1.0),
-        Face::new(&surfaces.face_ii, surfaces.stiffness[1], -1.0),
-    ];
-    if faces.iter().any(|face| face.fields.is_empty()) {
-        return Ok(no_answer(Status::NoContact));
+    Ok(Pads::ready(surfaces).solve(distance, force, wrench))
+}
+
+/// Both faces of a contact made ready for many loads.
+#[derive(Debug, Clone)]
+pub struct Pads {
+    faces: [Face; 2],
+    /// Smallest radius of the round pieces of each face, and the layer's thickness, for notes.
+    radii: [Option<f64>; 2],
+    layer: Option<f64>,
+}
+
+/// A face pressed without a load.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Squeezed {
+    /// Compression of the layer at the origin of the pad plane: pieces are pressed where their gap
+    /// is less \[m\].
+    pub delta: f64,
+    /// Pressed area [m^2].
+    pub area: f64,
+    /// Mean pressure \[Pa\].
+    pub mean_pressure: f64,
+    /// Greatest pressure \[Pa\].
+    pub greatest_pressure: f64,
+}
+
+impl Pads {
+    /// From the pieces of both faces.
+    ///
+    /// # Errors
+    /// As [`solve`].
+    pub fn new(surfaces: &Surfaces) -> Result<Self> {
+        check(surfaces, 0.0, 1.0, &Wrench::default())?;
+        Ok(Self::ready(surfaces))
     }
-    let normal = [force + 0.5 * wrench.force.z, force - 0.5 * wrench.force.z];
-    if normal.iter().any(|n| *n <= 0.0) {
-        return Ok(no_answer(Status::NoNormalForce));
+
+    fn ready(surfaces: &Surfaces) -> Self {
+        let pieces: [&[Piece]; 2] = [&surfaces.face_i, &surfaces.face_ii];
+        let radius = |pieces: &[Piece]| {
+            pieces.iter().filter_map(|piece| piece.gap.radius()).map(f64::abs).reduce(f64::min)
+        };
+        Self {
+            faces: [
+                Face::new(pieces[0], surfaces.stiffness[0], 1.0),
+                Face::new(pieces[1], surfaces.stiffness[1], -1.0),
+            ],
+            radii: pieces.map(radius),
+            layer: surfaces.layer,
+        }
     }
-    let pressed = [0, 1].map(|k| faces[k].carry(normal[k], DVec2::ZERO, None));
-    let [Some(one), Some(two)] = &pressed else { return Ok(no_answer(Status::NotConverged)) };
-    let rotations = space::rotations([one, two], distance);
-    let case = Case { faces: &faces, pressed: [one, two], distance, normal, wrench, rotations };
-    let mut answer = case.solve();
-    answer.notes.extend(case.softness(surfaces, &answer));
-    Ok(answer)
+
+    /// As [`solve`]; numbers must be finite and `force` positive.
+    pub fn solve(&self, distance: f64, force: f64, wrench: &Wrench) -> Answer {
+        if self.faces.iter().any(|face| face.fields.is_empty()) {
+            return no_answer(Status::NoContact);
+        }
+        let normal = [force + 0.5 * wrench.force.z, force - 0.5 * wrench.force.z];
+        if normal.iter().any(|n| *n <= 0.0) {
+            return no_answer(Status::NoNormalForce);
+        }
+        let pressed = [0, 1].map(|k| self.faces[k].carry(normal[k], DVec2::ZERO, None));
+        let [Some(one), Some(two)] = &pressed else { return no_answer(Status::NotConverged) };
+        let rotations = space::rotations([one, two], distance);
+        let faces = &self.faces;
+        let case = Case { faces, pressed: [one, two], distance, normal, wrench, rotations };
+        let mut answer = case.solve();
+        answer.notes.extend(case.softness(self, &answer));
+        answer
+    }
+
+    /// Both faces squeezed with `force` \[N\] without a load; `None` without contact.
+    pub fn squeezed(&self, force: f64) -> Option<[Squeezed; 2]> {
+        let squeezed = |face: &Face| {
+            let pressed = face.carry(force, DVec2::ZERO, None)?;
+            Some(Squeezed {
+                delta: pressed.delta,
+                area: pressed.area,
+                mean_pressure: pressed.load / pressed.area,
+                greatest_pressure: pressed.greatest(),
+            })
+        };
+        Some([squeezed(&self.faces[0])?, squeezed(&self.faces[1])?])
+    }
+
+    /// Axes in the pad plane about which the part can turn without any change of the pressure, at a
+    /// squeeze with `force` \[N\]: none, one or two unit vectors.
+    pub fn free_axes(&self, distance: f64, force: f64) -> Vec<DVec2> {
+        let pressed = [0, 1].map(|k| self.faces[k].carry(force, DVec2::ZERO, None));
+        let [Some(one), Some(two)] = &pressed else { return Vec::new() };
+        let free = |rotation: &Rotation| matches!(rotation.kind, Kind::Free | Kind::Facets(_));
+        let rotations = space::rotations([one, two], distance);
+        rotations.iter().filter(|rotation| free(rotation)).map(|rotation| rotation.axis).collect()
+    }
 }
 
 /// A case with what is known of it before any slip.
@@ -296,7 +311,7 @@ impl<'a> Case<'a> {
         if slip > give {
             notes.push(Note::TiltsFirst { angle, slip });
         }
-        if let Some((force, pushed)) = problem.with_tilting_planes(state)
+        if let Some((force, pushed)) = problem.with_tilting_planes(state, TILTING_PUSH)
             && (pushed.mu - slipping.mu).abs() > TILTING_PUSH * slipping.mu
         {
             notes.push(Note::TiltPushes { force: force.to_array(), mu_s: pushed.mu });
@@ -329,9 +344,8 @@ impl<'a> Case<'a> {
     }
 
     /// Notes on pads too soft for the theory.
-    fn softness(&self, surfaces: &Surfaces, answer: &Answer) -> Vec<Note> {
+    fn softness(&self, pads: &Pads, answer: &Answer) -> Vec<Note> {
         let mut notes = Vec::new();
-        let pieces: [&[Piece]; 2] = [&surfaces.face_i, &surfaces.face_ii];
         for (k, face) in [Side::I, Side::II].into_iter().enumerate() {
             if answer.faces.is_none() {
                 continue;
@@ -339,19 +353,18 @@ impl<'a> Case<'a> {
             let pressed = self.pressed[k];
             let delta = pressed.compression();
             let mut note = |limit, value| notes.push(Note::TooSoft { face, limit, value });
-            if let Some(layer) = surfaces.layer
+            if let Some(layer) = pads.layer
                 && delta > layer / 3.0
             {
                 note(SoftLimit::Compression, delta / layer);
             }
-            let round = pieces[k].iter().filter_map(|piece| piece.gap.radius());
-            let Some(radius) = round.map(f64::abs).reduce(f64::min) else { continue };
+            let Some(radius) = pads.radii[k] else { continue };
             // The half width that a round piece of this compression has.
             let half = (2.0 * radius * delta).sqrt();
             if half > 0.4 * radius {
                 note(SoftLimit::Width, half / radius);
             }
-            if let Some(layer) = surfaces.layer
+            if let Some(layer) = pads.layer
                 && half < layer
             {
                 note(SoftLimit::Thickness, half / layer);
@@ -433,6 +446,7 @@ fn face_answer(face: &Pressed<'_>, slipping: &Slipping, k: usize) -> FaceAnswer 
         area: face.area,
         mean_pressure: face.load / face.area,
         greatest_pressure: face.greatest(),
+        compression: face.compression(),
         extent: face.extent().map(|x| x.to_array()),
         share: slipping.shares[k].into(),
     }

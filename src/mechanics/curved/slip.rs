@@ -85,13 +85,17 @@ const AT_REST: f64 = 1.0 - 1e-9;
 /// The same where Newton's method finds nothing, so near the tie.
 const TIED: f64 = 1.0 + 1e-6;
 
-/// Solves for the load `w` along the space; the faces are `distance` apart.
+/// How near its bounds must be for an answer found from a neighbour's without a look at the creases.
+const SURE: f64 = 1e-12;
+
+/// Solves for the load `w` along the space; the faces are `distance` apart. `start`: the answer for
+/// nearly the same pressure and load.
 pub(super) fn solve(
     space: &Space,
     faces: [&Pressed<'_>; 2],
     distance: f64,
     w: Vector5<f64>,
-    start: Option<&Vector5<f64>>,
+    start: Option<&Slipping>,
 ) -> Option<Slipping> {
     let basis = [space.basis(0, distance), space.basis(1, distance)];
     let length = length(faces);
@@ -110,16 +114,32 @@ pub(super) fn solve(
         let zeta = Vector5::zeros();
         return Some(Slipping { mu: 0.0, zeta, shares, rolls_on: None, bounds, evaluations: 0 });
     }
-    let candidates = [0, 1].map(|k| problem.rolling(space, k, distance, &w));
     let held = |candidate: &Option<Rolling>, most: f64| {
         candidate.filter(|rolling| rolling.alone <= most * rolling.answer.mu)
     };
+    let zeta = start.map(|near| &near.zeta);
+    match start.map(|near| near.rolls_on) {
+        Some(None) => {
+            let sure = |answer: &Slipping| answer.bounds.upper <= answer.mu * (1.0 + SURE);
+            if let Some(answer) = problem.interior(&w, zeta).filter(sure) {
+                return Some(problem.counted(answer));
+            }
+        }
+        Some(Some(k)) => {
+            let rolling = problem.rolling(space, k, distance, &w);
+            if let Some(rolling) = held(&rolling, AT_REST) {
+                return Some(problem.counted(rolling.answer));
+            }
+        }
+        None => {}
+    }
+    let candidates = [0, 1].map(|k| problem.rolling(space, k, distance, &w));
     let rolls = candidates.iter().find_map(|candidate| held(candidate, AT_REST));
     if let Some(rolling) = rolls {
         return Some(problem.counted(rolling.answer));
     }
     problem
-        .interior(&w, start)
+        .interior(&w, zeta)
         .or_else(|| {
             let start = problem.off_crease(&w, &candidates)?;
             problem.interior(&w, Some(&start))

@@ -51,6 +51,11 @@ impl TurnedPad {
         self.ring.iter().map(|&point| point - self.bounds.centre()).collect()
     }
 
+    /// The turned outline about the grip origin.
+    pub(in crate::propose) fn ring(&self) -> &[DVec2] {
+        &self.ring
+    }
+
     pub(in crate::propose) fn area(&self) -> f64 {
         self.area
     }

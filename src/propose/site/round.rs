@@ -1,0 +1,359 @@
+//! Sites on curved faces: closing directions in which crests of the part lie opposite each other,
+//! or opposite a plane.
+//!
+//! A crest is where a flat pad touches first: a line on a cylinder, a point on a sphere or a barrel.
+//! Directions come from the axes of round faces, in steps all round, from the normals of planes
+//! across such an axis, and from a geodesic set about spheres.
+
+use std::collections::BTreeMap;
+
+use glam::{DVec2, DVec3};
+
+use super::relief::{LEVEL, Relief, Surveyor};
+use super::shapes::{project, stretches};
+use super::{Base, Finder, SAME_PLANE, Site, axes, lie};
+use crate::error::Result;
+use crate::geometry::overlay;
+use crate::geometry::polygon::{self, Bounds2};
+use crate::geometry::sphere::directions;
+use crate::part::{CurvedFace, PairKind, Shape};
+use crate::propose::options::Rejection;
+
+/// Axes whose directions differ by less are one \[rad\].
+const SAME_AXIS: f64 = 3e-4;
+/// Closing directions that differ by less are one \[rad\].
+const SAME_CLOSING: f64 = 1e-3;
+/// At most this many planes across one axis give directions, the largest ones.
+const MOST_PLANES: usize = 24;
+/// Edge of the icosahedron seen from its middle \[rad\].
+const ICOSAHEDRON: f64 = 1.1071;
+/// Divisions of its edge at most.
+const MOST_DIVISIONS: usize = 8;
+/// Share of the distance of two crests by which their radii may fall short of it: on one axis they
+/// are the same.
+const ON_ONE_AXIS: f64 = 2e-3;
+/// Rounding of a width against the stroke \[m\].
+const STROKE: f64 = 1e-9;
+
+/// What came of the pairs of curved faces.
+#[derive(Debug, Default)]
+pub(in crate::propose) struct Round {
+    /// Pairs with sites.
+    pub(in crate::propose) pairs: u64,
+    /// Pairs without, by reason, and their widths outside of the stroke.
+    pub(in crate::propose) rejections: Vec<(Rejection, u64)>,
+    pub(in crate::propose) widths: Vec<f64>,
+}
+
+/// A place where a flat pad touches the part first.
+#[derive(Debug, Clone, Copy)]
+struct Crest {
+    face: u32,
+    /// Along the closing direction.
+    height: f64,
+    /// Across the crest; infinite on a plane.
+    radius: f64,
+    /// Around it, in the direction's axes.
+    bounds: Bounds2,
+}
+
+impl Finder<'_> {
+    /// The sites on curved faces.
+    pub(super) fn round(&mut self) -> Result<(Vec<Site>, Round)> {
+        let mut sites = Vec::new();
+        let mut seen: BTreeMap<(u32, u32), Option<Rejection>> = BTreeMap::new();
+        let mut widths = Vec::new();
+        if self.part.curved.iter().all(|face| !face.reachable || !face.outside) {
+            return Ok((sites, Round::default()));
+        }
+        let loose = self.loose();
+        for closing in self.closings() {
+            let above = levels(self.crests(closing), SAME_PLANE * self.size);
+            let below = levels(self.crests(-closing), SAME_PLANE * self.size);
+            for top in &above {
+                for bottom in &below {
+                    let outcome = self.round_sites(closing, top, bottom, &loose, &mut sites)?;
+                    let key = |level: &[Crest]| level.iter().map(|crest| crest.face).min();
+                    let (Some(outcome), Some(a), Some(b)) = (outcome, key(top), key(bottom)) else {
+                        continue;
+                    };
+                    if matches!(outcome, Some(Rejection::Stroke)) {
+                        widths.push(top[0].height + bottom[0].height);
+                    }
+                    // One of its directions is enough for a pair.
+                    let known = seen.entry((a.min(b), a.max(b))).or_insert_with(|| outcome.clone());
+                    if outcome.is_none() {
+                        *known = None;
+                    }
+                }
+            }
+        }
+        let mut round = Round { widths, ..Round::default() };
+        for outcome in seen.into_values() {
+            match outcome {
+                None => round.pairs += 1,
+                Some(reason) => {
+                    match round.rejections.iter_mut().find(|(known, _)| *known == reason) {
+                        Some((_, count)) => *count += 1,
+                        None => round.rejections.push((reason, 1)),
+                    }
+                }
+            }
+        }
+        Ok((sites, round))
+    }
+
+    /// Triangles of no face.
+    fn loose(&self) -> Vec<u32> {
+        let mut taken = vec![false; self.part.mesh.triangles.len()];
+        let plane = self.part.faces.iter().map(|face| &face.triangles);
+        let curved = self.part.curved.iter().map(|face| &face.triangles);
+        plane.chain(curved).flatten().for_each(|&triangle| taken[triangle as usize] = true);
+        (0..taken.len() as u32).filter(|&triangle| !taken[triangle as usize]).collect()
+    }
+
+    fn may_touch(&self, id: u32) -> bool {
+        self.chosen.is_none_or(|chosen| chosen.get(id as usize).is_some_and(|chosen| *chosen))
+    }
+
+    /// Faces with a crest that pads may touch.
+    fn round_faces(&self) -> impl Iterator<Item = &CurvedFace> {
+        let faces = self.part.curved.iter();
+        faces.filter(|face| face.outside && face.reachable && self.may_touch(face.id))
+    }
+
+    /// Closing directions to try, one of each two opposite ones, in a stable order.
+    fn closings(&self) -> Vec<DVec3> {
+        let mut found: Vec<DVec3> = Vec::new();
+        let mut add = |direction: DVec3| {
+            let direction = if direction[direction.abs().max_position()] < 0.0 {
+                -direction
+            } else {
+                direction
+            };
+            if !found.iter().any(|known| known.cross(direction).length() < SAME_CLOSING) {
+                found.push(direction);
+            }
+        };
+        let cone = self.options.approach_cone.map(|cone| cone.axis.normalize());
+        for axis in self.round_axes() {
+            let mut planes: Vec<_> = self
+                .part
+                .faces
+                .iter()
+                .filter(|face| face.reachable && face.normal.dot(axis).abs() < LEVEL)
+                .collect();
+            planes.truncate(MOST_PLANES);
+            // Across the axis: from the largest plane along it, or one of the part's own axes.
+            let own = DVec3::AXES[axis.abs().min_position()];
+            let first = planes.first().map_or(own, |face| face.normal);
+            let first = (first - axis * axis.dot(first)).normalize();
+            let second = axis.cross(first);
+            if let Some(across) = cone.and_then(|cone| cone.cross(axis).try_normalize()) {
+                add(across);
+            }
+            let count = (std::f64::consts::PI / self.options.angle_step).round().max(1.0) as usize;
+            for index in 0..count {
+                let turn = DVec2::from_angle(std::f64::consts::PI * index as f64 / count as f64);
+                add(first * turn.x + second * turn.y);
+            }
+            planes.iter().for_each(|face| add(face.normal));
+        }
+        let is_sphere = |face: &CurvedFace| matches!(face.shape, Shape::Sphere { .. });
+        if self.round_faces().any(is_sphere) {
+            let divisions = (ICOSAHEDRON / self.options.angle_step).round() as usize;
+            let divisions = divisions.clamp(1, MOST_DIVISIONS);
+            directions(10 * divisions * divisions + 2).into_iter().for_each(&mut add);
+            if let Some(axis) = cone {
+                let (first, second) = axis.any_orthonormal_pair();
+                for index in 0..2 * divisions {
+                    let turn = std::f64::consts::PI * index as f64 / (2 * divisions) as f64;
+                    add(first * turn.cos() + second * turn.sin());
+                }
+            }
+        }
+        found
+    }
+
+    /// Axes of faces that are round about one, the largest first.
+    fn round_axes(&self) -> Vec<DVec3> {
+        let mut axes: Vec<(DVec3, f64)> = Vec::new();
+        for face in self.round_faces() {
+            let (Shape::Cylinder { axis, .. } | Shape::Torus { axis, .. }) = &face.shape else {
+                continue;
+            };
+            let same =
+                |(known, _): &&mut (DVec3, f64)| known.cross(axis.direction).length() < SAME_AXIS;
+            match axes.iter_mut().find(same) {
+                Some((_, area)) => *area += face.area,
+                None => axes.push((axis.direction, face.area)),
+            }
+        }
+        axes.sort_by(|a, b| b.1.total_cmp(&a.1));
+        axes.into_iter().map(|(axis, _)| axis).collect()
+    }
+
+    /// The crests that face a direction.
+    fn crests(&self, closing: DVec3) -> Vec<Crest> {
+        let axes_from_part = axes(closing);
+        let place = |point: DVec3| (axes_from_part * point).truncate();
+        let mut crests = Vec::new();
+        for face in &self.part.faces {
+            let aligned = face.normal.cross(closing).length() < LEVEL;
+            if face.reachable
+                && aligned
+                && face.normal.dot(closing) > 0.0
+                && self.may_touch(face.id)
+            {
+                let bounds = polygon::bounds(&project(std::iter::once(face), &axes_from_part));
+                let height = closing.dot(face.centroid);
+                crests.push(Crest { face: face.id, height, radius: f64::INFINITY, bounds });
+            }
+        }
+        for face in self.round_faces() {
+            let level = |direction: DVec3| direction.dot(closing).abs() < LEVEL;
+            let (middle, radius, ends) = match &face.shape {
+                Shape::Cylinder { axis, radius, along, .. } if level(axis.direction) => {
+                    let ends = along.map(|along| axis.origin + axis.direction * along);
+                    (0.5 * (ends[0] + ends[1]), *radius, ends)
+                }
+                Shape::Sphere { centre, radius } => (*centre, *radius, [*centre; 2]),
+                Shape::Torus { axis, major, minor } if level(axis.direction) => {
+                    (axis.origin, major + minor, [axis.origin; 2])
+                }
+                _ => continue,
+            };
+            if self.has_crest(face, closing, middle, radius) {
+                let bounds = Bounds2::of(&ends.map(place));
+                let height = closing.dot(middle) + radius;
+                crests.push(Crest { face: face.id, height, radius, bounds });
+            }
+        }
+        crests
+    }
+
+    /// Whether the face, which may be a part of a full round, reaches its crest.
+    fn has_crest(&self, face: &CurvedFace, closing: DVec3, middle: DVec3, radius: f64) -> bool {
+        let across = match &face.shape {
+            Shape::Cylinder { axis, .. } => axis.direction.cross(closing),
+            _ => DVec3::ZERO,
+        };
+        let slack = 1e-3 * radius;
+        face.triangles.iter().any(|&triangle| {
+            let corners = self.part.mesh.corners(triangle).map(|corner| corner - middle);
+            let height = corners.iter().map(|corner| corner.dot(closing)).fold(0.0, f64::max);
+            if height < 0.5 * radius {
+                return false;
+            }
+            if across == DVec3::ZERO {
+                return height > 0.97 * radius;
+            }
+            let along = corners.map(|corner| corner.dot(across));
+            along.iter().any(|y| *y >= -slack) && along.iter().any(|y| *y <= slack)
+        })
+    }
+
+    /// Adds the sites of two levels of crests. `None`: they do not face each other; else the reason
+    /// for which there is no site, if so.
+    #[allow(clippy::option_option, reason = "told apart by the caller at once")]
+    fn round_sites(
+        &mut self,
+        closing: DVec3,
+        top: &[Crest],
+        bottom: &[Crest],
+        loose: &[u32],
+        sites: &mut Vec<Site>,
+    ) -> Result<Option<Option<Rejection>>> {
+        let heights = [top[0].height, -bottom[0].height];
+        let width = heights[0] - heights[1];
+        let flat = |level: &[Crest]| level.iter().any(|crest| crest.radius.is_infinite());
+        let reach = self.gripper.pad_reach();
+        let around = |level: &[Crest], flip: bool| {
+            let bounds = level.iter().map(|crest| crest.bounds);
+            let bounds = bounds.fold(Bounds2::EMPTY, Bounds2::union);
+            // The axes of the opposite direction.
+            if flip { self.flipped(bounds, closing) } else { bounds }
+        };
+        let boxes = [around(top, false), around(bottom, true)];
+        if width <= 0.0
+            || flat(top) && flat(bottom)
+            || !boxes[0].grown(reach).meets(boxes[1].grown(reach))
+        {
+            return Ok(None);
+        }
+        let [least, most] = self.gripper.stroke;
+        let opened = most - 2.0 * self.options.min_opening;
+        if !(least - STROKE..=most + STROKE).contains(&width) {
+            return Ok(Some(Some(Rejection::Stroke)));
+        }
+        if width > opened + STROKE {
+            return Ok(Some(Some(Rejection::OpeningTooSmall)));
+        }
+        let radius = |level: &[Crest]| level.iter().map(|crest| crest.radius).fold(0.0, f64::max);
+        if radius(top) + radius(bottom) < width * (1.0 - ON_ONE_AXIS) {
+            return Ok(Some(Some(Rejection::RollsApart)));
+        }
+        let direction = self.direction(closing);
+        let axes_from_part = axes(self.directions[direction]);
+        let common =
+            Bounds2 { min: boxes[0].min.max(boxes[1].min), max: boxes[0].max.min(boxes[1].max) };
+        let region = Bounds2 {
+            min: common.min.min(common.max) - 2.0 * reach,
+            max: common.max.max(common.min) + 2.0 * reach,
+        };
+        let layer = self.gripper.layer();
+        let pieces = [0, 1].map(|side: usize| {
+            let surveyor = Surveyor {
+                part: self.part,
+                loose,
+                axes_from_part,
+                height: heights[side],
+                side: [1.0, -1.0][side],
+                reach: layer.reach(),
+                region,
+            };
+            surveyor.pieces()
+        });
+        let force = self.options.force.unwrap_or(self.gripper.force[1]);
+        let place = common.centre();
+        let Some(relief) = Relief::new(pieces, layer, force, &self.gripper.pads(width), place)
+        else {
+            return Ok(None);
+        };
+        let overlap = overlay::intersect(&relief.pressed[0], &relief.pressed[1]);
+        let sides = [top, bottom].map(|level| {
+            let mut faces: Vec<u32> = level.iter().map(|crest| crest.face).collect();
+            faces.sort_unstable();
+            faces
+        });
+        let mut any = false;
+        for overlap in stretches(overlap, 2.0 * reach) {
+            let (turn, middle) = lie(&overlap);
+            let (kind, sides, rise) = (PairKind::External, &sides, SAME_PLANE * self.size);
+            let base = Base { kind, direction, sides, overlap, turn, middle, heights, rise };
+            sites.push(self.site(base, Some(relief.clone()))?);
+            any = true;
+        }
+        Ok(any.then_some(None))
+    }
+
+    /// Bounds in the axes of the opposite direction as bounds in those of `closing`.
+    fn flipped(&self, bounds: Bounds2, closing: DVec3) -> Bounds2 {
+        let map = axes(closing) * axes(-closing).transpose();
+        let corners = [bounds.min, bounds.max, DVec2::new(bounds.min.x, bounds.max.y)];
+        Bounds2::of(&corners.map(|corner| (map * corner.extend(0.0)).truncate()))
+    }
+}
+
+/// Crests by levels: those at one height together, the highest first.
+fn levels(mut crests: Vec<Crest>, tolerance: f64) -> Vec<Vec<Crest>> {
+    crests.sort_by(|a, b| b.height.total_cmp(&a.height).then(a.face.cmp(&b.face)));
+    let mut levels: Vec<Vec<Crest>> = Vec::new();
+    for crest in crests {
+        match levels.last_mut() {
+            Some(level) if level[0].height - crest.height <= tolerance => level.push(crest),
+            _ => levels.push(vec![crest]),
+        }
+    }
+    levels
+}

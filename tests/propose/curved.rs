@@ -1,0 +1,217 @@
+//! Grips on curved faces: where they are, what they touch, and the friction that they need.
+
+use std::sync::atomic::AtomicBool;
+
+use glam::{DMat3, DVec2, DVec3};
+use gripfast::geometry::patch_area;
+use gripfast::gripper;
+use gripfast::load::wrench_in_grip;
+use gripfast::model::{Gap, LoadCase, Slip, Status, Wrench};
+use gripfast::part::Part;
+use gripfast::plan::Plan;
+use gripfast::propose::{ProposeOptions, Proposer};
+use gripfast::request::{Choice, Request};
+use gripfast::results::{GripSet, RankedGrip};
+use gripfast::units::{Angle, Force, Length, Mass};
+
+const RADIUS: f64 = 0.010;
+const LENGTH: f64 = 0.060;
+
+/// A closed cylinder about `z` turned by `turn` about it, its facets chords.
+fn cylinder(radius: f64, length: f64, facets: u32, turn: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    let step = std::f64::consts::TAU / f64::from(facets);
+    let mut vertices = Vec::new();
+    for k in 0..facets {
+        let e = DVec2::from_angle(turn + step * f64::from(k)) * radius;
+        vertices.extend([e.extend(-0.5 * length), e.extend(0.5 * length)]);
+    }
+    let (low, high) = (2 * facets, 2 * facets + 1);
+    vertices.extend([DVec3::Z * (-0.5 * length), DVec3::Z * (0.5 * length)]);
+    let mut triangles = Vec::new();
+    for k in 0..facets {
+        let (a, b) = (2 * k, 2 * ((k + 1) % facets));
+        triangles.extend([[a, b, b + 1], [a, b + 1, a + 1], [b, a, low], [a + 1, b + 1, high]]);
+    }
+    (vertices, triangles)
+}
+
+fn shaft(turn: f64) -> Part {
+    let (vertices, triangles) = cylinder(RADIUS, LENGTH, 72, turn);
+    Part::from_triangles("shaft", &vertices, &triangles).unwrap()
+}
+
+fn load(name: &str, force: DVec3, moment: DVec3) -> LoadCase {
+    LoadCase { name: name.into(), wrench: Wrench { force, moment } }
+}
+
+fn planned(part: Part, loads: Vec<LoadCase>) -> GripSet {
+    let mut request = Request::new("", "robotiq-2f85");
+    request.mass = Some(Mass(0.2));
+    request.force = Some(Force(60.0));
+    request.candidates.spacing = Some(Length(0.010));
+    request.candidates.angle_step = Angle(45_f64.to_radians());
+    request.scoring.backend = Choice::Cpu;
+    let plan = Plan::builder(request).part(part).loads(loads).build().unwrap();
+    plan.run(&mut (), &AtomicBool::new(false)).unwrap().set
+}
+
+/// Axis of the barrel in the grip frame.
+fn barrel_axis(ranked: &RankedGrip) -> Option<DVec2> {
+    match ranked.grip.surfaces.as_ref()?.face_i.first()?.gap {
+        Gap::Cylinder { axis, .. } => Some(axis.normalize()),
+        _ => None,
+    }
+}
+
+#[test]
+fn grips_on_a_barrel_need_the_friction_of_the_closed_forms() {
+    let force = 60.0;
+    let loads = vec![
+        load("along", DVec3::new(0.0, 0.0, 9.0), DVec3::ZERO),
+        load("about", DVec3::ZERO, DVec3::new(0.0, 0.0, 0.05)),
+        load("along and about", DVec3::new(0.0, 0.0, 6.0), DVec3::new(0.0, 0.0, 0.09)),
+        load("across and about", DVec3::new(5.0, 0.0, 0.0), DVec3::new(0.0, 0.0, 0.03)),
+    ];
+    let part = shaft(0.0);
+    let centre = part.mass_properties(1.0).centre_of_mass;
+    let set = planned(part, loads.clone());
+    let mut checked = 0;
+    for ranked in &set.grips {
+        let Some(e) = barrel_axis(ranked) else { continue };
+        assert!((ranked.grip.width - 2.0 * RADIUS).abs() < 1e-9, "{}", ranked.grip.width);
+        if ranked.grip.part_from_grip.origin.distance(centre) > 1e-9 {
+            continue;
+        }
+        let wrenches: Vec<Wrench> = loads
+            .iter()
+            .map(|load| wrench_in_grip(&load.wrench, centre, &ranked.grip.part_from_grip))
+            .collect();
+        // Those whose closing direction lies along a force have another formula.
+        if wrenches.iter().any(|wrench| wrench.force.z.abs() > 1e-9) {
+            continue;
+        }
+        let needed = |wrench: &Wrench| {
+            let plane = |x: DVec3| DVec2::new(e.dot(x.truncate()), e.perp_dot(x.truncate()));
+            let (f, m) = (plane(wrench.force), plane(wrench.moment).x / RADIUS);
+            let (along, across) = (f.x.abs(), f.y.abs());
+            assert!(along.min(across) < 1e-9, "{wrench:?}");
+            if across > 1e-9 {
+                (across + m.abs()) / (2.0 * force)
+            } else {
+                along.hypot(m) / (2.0 * force)
+            }
+        };
+        let (worst, mu) =
+            wrenches.iter().map(needed).enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+        let found = ranked.worst.mu_s.unwrap();
+        assert!((found / mu - 1.0).abs() < 1e-8, "{found} {mu} {:?}", ranked.worst);
+        assert_eq!((ranked.worst.load as usize, ranked.worst.status), (worst, Status::Ok));
+        assert!(matches!(ranked.worst.slip, Some(Slip::Spin { .. })), "{:?}", ranked.worst.slip);
+        // Strip and pressure of Hertz's problem on a bed of springs: a^3 = 3 N R/(2 k L).
+        let k = ranked.grip.surfaces.as_ref().unwrap().stiffness[0];
+        let faces = ranked.faces.unwrap();
+        let outline = &ranked.grip.contact.face_i;
+        let length = patch_area(outline) / faces[0].area
+            * (faces[0].extent[1][0] - faces[0].extent[0][0])
+                .max(faces[0].extent[1][1] - faces[0].extent[0][1]);
+        let half = (1.5 * force * RADIUS / (k * length)).cbrt();
+        assert!((faces[0].area / (2.0 * half * length) - 1.0).abs() < 1e-6, "{faces:?}");
+        let greatest = 0.75 * force / (half * length);
+        assert!((faces[0].greatest_pressure / greatest - 1.0).abs() < 1e-6, "{faces:?}");
+        checked += 1;
+    }
+    assert!(checked >= 8, "{checked} of {}", set.grips.len());
+}
+
+/// Values of all grips on the barrel, rounded.
+fn values(set: &GripSet) -> Vec<[i64; 3]> {
+    let value = |ranked: &RankedGrip| {
+        let origin = ranked.grip.part_from_grip.origin;
+        let off = origin.truncate().length();
+        [ranked.worst.mu_s.unwrap() * 1e7, origin.z.abs() * 1e7, off * 1e7]
+            .map(|x| x.round() as i64)
+    };
+    let mut values: Vec<[i64; 3]> =
+        set.grips.iter().filter(|ranked| barrel_axis(ranked).is_some()).map(value).collect();
+    values.sort_unstable();
+    values
+}
+
+#[test]
+fn turning_the_part_about_its_axis_gives_the_same_grips() {
+    let loads = || {
+        vec![
+            load("along", DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO),
+            load("about", DVec3::ZERO, DVec3::new(0.0, 0.0, 0.02)),
+        ]
+    };
+    let (one, two) = (planned(shaft(0.0), loads()), planned(shaft(0.6), loads()));
+    assert!(values(&one).len() > 50);
+    assert_eq!(values(&one), values(&two));
+    // And so does standing it elsewhere, but for which of its own directions come first.
+    let turn = DMat3::from_euler(glam::EulerRot::XYZ, 0.4, -0.7, 1.1);
+    let (vertices, triangles) = cylinder(RADIUS, LENGTH, 72, 0.0);
+    let moved: Vec<DVec3> = vertices.iter().map(|v| turn * *v + DVec3::splat(0.1)).collect();
+    let part = Part::from_triangles("moved", &moved, &triangles).unwrap();
+    let turned = loads().into_iter().map(|load| LoadCase {
+        wrench: Wrench { force: turn * load.wrench.force, moment: turn * load.wrench.moment },
+        ..load
+    });
+    let three = planned(part, turned.collect());
+    let mu = |set: &GripSet| values(set).iter().map(|value| value[0]).collect::<Vec<_>>();
+    assert_eq!(mu(&one), mu(&three));
+}
+
+#[test]
+fn a_grip_on_a_barrel_is_explained_as_it_was_proposed() {
+    let (part, gripper) = (shaft(0.1), gripper::find("robotiq-2f85").unwrap());
+    let options = ProposeOptions::default()
+        .with_spacing(Some(0.012))
+        .with_angle_step(0.8)
+        .with_force(Some(60.0));
+    let mut proposer = Proposer::new(&part, &gripper, &options).unwrap();
+    let grips: Vec<_> = proposer.by_ref().flat_map(|chunk| chunk.grips).collect();
+    let curved: Vec<_> = grips.iter().filter(|grip| grip.surfaces.is_some()).collect();
+    assert!(curved.len() > 20, "{}", curved.len());
+    for grip in curved.iter().step_by(7) {
+        let explained =
+            proposer.explain_pose(grip.face_i, grip.face_ii, &grip.part_from_grip).unwrap();
+        assert!(explained.rejection.is_none(), "{explained:?}");
+        let areas = |contact: &gripfast::model::Contact| {
+            [patch_area(&contact.face_i), patch_area(&contact.face_ii)]
+        };
+        for (a, b) in areas(&explained.contact).into_iter().zip(areas(&grip.contact)) {
+            assert!((a - b).abs() < 1e-12, "{a} {b}");
+        }
+    }
+    // Numbers of candidates on planes come first and stay what they are without curved faces.
+    let plane = options.with_faces(Some((0..part.faces.len() as u32).collect()));
+    let alone: Vec<_> =
+        Proposer::new(&part, &gripper, &plane).unwrap().flat_map(|chunk| chunk.grips).collect();
+    let first: Vec<_> = grips.iter().filter(|grip| grip.surfaces.is_none()).cloned().collect();
+    assert_eq!(alone, first);
+    let last = first.iter().map(|grip| grip.id).max().unwrap_or(0);
+    assert!(curved.iter().all(|grip| grip.id > last));
+}
+
+#[test]
+fn a_shaft_is_gripped_on_its_barrel() {
+    for (file, width) in [("cyl_20x60", 0.020), ("ring", 0.040)] {
+        let Some(path) = crate::support::reference(&format!("trials/curved/{file}.stl")) else {
+            return;
+        };
+        let part = Part::read(&path, &Default::default()).unwrap();
+        let weight = 0.2 * 9.80665;
+        let gravity = DVec3::AXES
+            .into_iter()
+            .flat_map(|axis| [axis, -axis])
+            .map(|axis| load("gravity", axis * weight, DVec3::ZERO));
+        let set = planned(part, gravity.collect());
+        let best = set.grips.iter().find(|ranked| barrel_axis(ranked).is_some()).unwrap();
+        let mu = best.worst.mu_s.unwrap();
+        assert!((best.grip.width - width).abs() < 2e-6, "{file}: {}", best.grip.width);
+        // Both pads carry the weight.
+        assert!((mu / (weight / 120.0) - 1.0).abs() < 1e-6, "{file}: {mu}");
+        assert!(set.grips[0].grip.surfaces.is_some() || file != "cyl_20x60", "{file}");
+    }
+}
