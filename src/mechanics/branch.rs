@@ -3,10 +3,11 @@
 use glam::{DMat2, DVec2};
 
 use super::equilibrium::{Node, Solver, State, Vector7, unknowns};
-use super::pads::Load;
+use super::pads::{Load, Pads};
 use super::pressure::{self, face_pressure, separates};
 use super::slip;
 use crate::contact::{Field, Twist};
+use crate::model::Wrench;
 use crate::request::Refiner;
 
 /// Strength of the coupling, `mu |d| / sqrt(A)`, above which other solutions are looked for. Below
@@ -168,6 +169,63 @@ impl Solver<'_> {
         DMat2::IDENTITY + coupling * (node.slope - DMat2::IDENTITY)
     }
 }
+
+/// The limit state that a load reaches when it grows from a small part of itself, in steps short
+/// enough that Newton's method leads from each to the next, with the evaluations spent. It is there
+/// for loads close to twisting out, whose last bit of contact no mesh resolves.
+pub(super) fn by_load(
+    pads: &Pads,
+    distance: f64,
+    force: f64,
+    wrench: &Wrench,
+    refiner: Refiner,
+) -> (Option<State>, u32) {
+    let mut evaluations = 0;
+    let mut solver = |share: f64| {
+        let part = Wrench { force: share * wrench.force, moment: share * wrench.moment };
+        Solver::new(pads, pads.load(distance, force, &part), refiner)
+    };
+    let mut at = None;
+    let mut reached = 0.0;
+    for share in [0.9, 0.7, 0.5, 0.25, 0.1] {
+        let mut begin = solver(share);
+        at = begin.branch(None);
+        evaluations += begin.evaluations;
+        if at.is_some() {
+            reached = share;
+            break;
+        }
+    }
+    let Some(mut at) = at else { return (None, evaluations) };
+    let mut step = 0.5 * (1.0 - reached);
+    for _ in 0..GROW_MOST {
+        let next = f64::min(1.0, reached + step);
+        let mut onwards = solver(next);
+        let found = onwards.newton(at.z, 1.0, 8);
+        evaluations += onwards.evaluations;
+        // A jump to another state, or over the end of this one, is no step.
+        let near = |state: &State| {
+            let ratio = state.moments.iter().zip(&at.moments).map(|(new, old)| new[0] / old[0]);
+            ratio.into_iter().all(|ratio| (0.2..5.0).contains(&ratio))
+        };
+        match found.filter(near) {
+            Some(state) if next == 1.0 => return (Some(state), evaluations),
+            Some(state) => {
+                (at, reached) = (state, next);
+                step *= 1.5;
+            }
+            None => step /= 3.0,
+        }
+        if step < GROW_LEAST {
+            break;
+        }
+    }
+    (None, evaluations)
+}
+
+/// Most steps of [`by_load`], and the shortest one.
+const GROW_MOST: usize = 60;
+const GROW_LEAST: f64 = 1e-6;
 
 /// Longest step of [`Solver::follow`] in contact moment, of force times the pads' length.
 const FOLLOW_STEP: f64 = 0.25;

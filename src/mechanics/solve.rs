@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::branch::strong;
+use super::branch::{self, strong};
 use super::equilibrium::{Solver, State, Vector7};
 use super::pads::{Load, Pads};
 use super::pressure::{self, face_pressure};
@@ -159,8 +159,14 @@ pub fn solve_pads(
         branch => {
             let found = solver.limit_states(branch.as_slice());
             match (found.states.as_slice(), found.complete) {
-                ([], true) => return refused(Status::TwistedOut, solver.evaluations),
-                ([], false) => return refused(Status::NotConverged, solver.evaluations),
+                ([], complete) => {
+                    let (grown, evaluations) =
+                        branch::by_load(pads, distance, force, wrench, options.refiner);
+                    solver.evaluations += evaluations;
+                    let none = if complete { Status::TwistedOut } else { Status::NotConverged };
+                    let Some(state) = grown else { return refused(none, solver.evaluations) };
+                    (state, false)
+                }
                 ([only], complete) => (*only, complete),
                 ([least, ..], _) => (branch.unwrap_or(*least), false),
             }

@@ -53,6 +53,15 @@ const BEYOND: f64 = 0.05;
 const BEYOND_STEPS: f64 = 30.0;
 /// The same, up to which there should be one.
 const EXPECTED_STEPS: f64 = 5.0;
+/// Points with the smallest values from which Newton's method starts in any case, and how far apart
+/// they are, in units of force times the pads' length: two zeros of opposite sign close together
+/// hide from cells and signs alike.
+const LOWEST: usize = 6;
+const LOWEST_APART: f64 = 0.03;
+/// Points looked at to find where the value on the outermost ring is least, and the distances from
+/// the rim, as shares of the way to the middle, at which a zero is sought there.
+const ALONG: usize = 10;
+const DEPTHS: [f64; 5] = [1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
 /// Most points looked at, and most starts of Newton's method.
 const MOST_NODES: usize = 500;
 const MOST_STARTS: usize = 60;
@@ -125,13 +134,20 @@ impl<'s, 'a> Map<'s, 'a> {
 
     /// Contact moment of a mesh point.
     fn place(&self, ray: u32, ring: u32) -> DVec2 {
-        let whole = 1 << HALVINGS;
-        let piece = &self.pieces[(ray / whole) as usize % self.pieces.len()];
-        let along = f64::from(ray % whole) / f64::from(whole) * (piece.len() - 1) as f64;
+        let s = OUTERMOST * f64::from(ring) / f64::from(RINGS << HALVINGS);
+        self.place_at(f64::from(ray), (1.0 - s).powi(4))
+    }
+
+    /// Contact moment on a ray between those of the mesh, at a distance from the rim as a share of
+    /// the way to the middle.
+    fn place_at(&self, ray: f64, depth: f64) -> DVec2 {
+        let pieces = ray.rem_euclid(f64::from(1 << HALVINGS) * self.pieces.len() as f64)
+            / f64::from(1 << HALVINGS);
+        let piece = &self.pieces[pieces as usize % self.pieces.len()];
+        let along = pieces.fract() * (piece.len() - 1) as f64;
         let corner = (along as usize).min(piece.len() - 2);
         let end = piece[corner].lerp(piece[corner + 1], along - corner as f64);
-        let s = OUTERMOST * f64::from(ring) / f64::from(RINGS * whole);
-        self.middle + (1.0 - (1.0 - s).powi(4)) * end
+        self.middle + (1.0 - depth) * end
     }
 
     /// The map at a mesh point; `near`: a neighbour whose pressure and slip are close.
@@ -158,6 +174,7 @@ impl<'s, 'a> Map<'s, 'a> {
     /// Adds the zeros found to `states`; whether their signs add up.
     fn search(&mut self, states: &mut Vec<State>) -> bool {
         self.cells(BEND, MOST_NODES, states);
+        self.lowest(states);
         let open = self.beyond(states);
         // On slivers the outermost points can be beyond what doubles resolve: then the next ring
         // in.
@@ -248,6 +265,94 @@ impl<'s, 'a> Map<'s, 'a> {
         at
     }
 
+    /// Newton's method from the points with the smallest values.
+    fn lowest(&mut self, states: &mut Vec<State>) {
+        self.starts = 0;
+        let mut nodes: Vec<Node> = self.nodes.values().flatten().copied().collect();
+        nodes.sort_by(|a, b| {
+            let value = |node: &Node| node.g.length();
+            value(a)
+                .total_cmp(&value(b))
+                .then(a.x.x.total_cmp(&b.x.x))
+                .then(a.x.y.total_cmp(&b.x.y))
+        });
+        let mut chosen: Vec<Node> = Vec::new();
+        for node in nodes {
+            if chosen.iter().all(|other| other.x.distance(node.x) > LOWEST_APART) {
+                chosen.push(node);
+                if chosen.len() == LOWEST {
+                    break;
+                }
+            }
+        }
+        for node in chosen {
+            self.start(&node, states);
+        }
+    }
+
+    /// Zeros where the value on the outermost ring is least, from there to the rim.
+    fn along_the_rim(&mut self, states: &mut Vec<State>) {
+        let ring = RINGS << HALVINGS;
+        let mut rays: Vec<(u32, Node)> = self
+            .nodes
+            .iter()
+            .filter(|(key, _)| key.1 == ring)
+            .filter_map(|(key, node)| Some((key.0, (*node)?)))
+            .collect();
+        rays.sort_by_key(|(ray, _)| *ray);
+        let round = f64::from(1 << HALVINGS) * self.pieces.len() as f64;
+        let count = rays.len();
+        let value = |index: usize| rays[index % count].1.g.length();
+        let lows: Vec<usize> = (count..2 * count)
+            .filter(|&i| value(i) <= value(i - 1) && value(i) < value(i + 1))
+            .collect();
+        for low in lows {
+            let ray = |index: usize| f64::from(rays[index % count].0);
+            let at = ray(low);
+            let back = (at - ray(low - 1)).rem_euclid(round);
+            let on = (ray(low + 1) - at).rem_euclid(round);
+            let (ray, node) = self.least_along(at, [back, on], rays[low % count].1);
+            if node.g.length() >= BEYOND {
+                continue;
+            }
+            let mut near = node;
+            for depth in DEPTHS {
+                let x = self.place_at(ray, depth);
+                let Some(node) = self.look(x, Some(&near)).or_else(|| self.look(x, None)) else {
+                    break;
+                };
+                self.start(&node, states);
+                near = node;
+            }
+        }
+    }
+
+    /// Where the value on the outermost ring is least about the ray `at`, between those so far
+    /// before and after it.
+    fn least_along(&mut self, mut at: f64, mut around: [f64; 2], mut least: Node) -> (f64, Node) {
+        let depth = (1.0 - OUTERMOST).powi(4);
+        for step in 0..ALONG {
+            // The wider side is cut in turn.
+            let side = usize::from(around[1] > around[0]);
+            let way = 0.4 * around[side];
+            let tried = if side == 1 { at + way } else { at - way };
+            let Some(node) = self.look(self.place_at(tried, depth), Some(&least)) else {
+                around[side] = way;
+                continue;
+            };
+            if node.g.length() < least.g.length() {
+                around = if side == 1 { [way, around[1] - way] } else { [around[0] - way, way] };
+                (at, least) = (tried, node);
+            } else {
+                around[side] = way;
+            }
+            if step > 2 && around[0].max(around[1]) < 1e-6 {
+                break;
+            }
+        }
+        (at, least)
+    }
+
     /// Zeros between the outermost ring and the rim: the value on the ring is small beside them.
     /// Whether there should be one, but none was found.
     fn beyond(&mut self, states: &mut Vec<State>) -> bool {
@@ -263,9 +368,11 @@ impl<'s, 'a> Map<'s, 'a> {
             * self.pieces.iter().flatten().map(|corner| corner.length()).fold(0.0, f64::max);
         near.retain(|node| node.g.length() < BEYOND || step(node) < BEYOND_STEPS * room);
         near.sort_by(|a, b| step(a).total_cmp(&step(b)));
+        self.starts = 0;
         for node in near.iter().take(8) {
             self.start(node, states);
         }
+        self.along_the_rim(states);
         let expected = near.first().is_some_and(|node| step(node) < EXPECTED_STEPS * room);
         let outermost = 1.0 - (1.0 - OUTERMOST).powi(4);
         expected && !states.iter().any(|state| self.share(state) > outermost)

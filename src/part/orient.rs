@@ -195,6 +195,39 @@ fn signed_volume(
     if volume.abs() > 1e-3 * size.x * size.y * size.z { volume } else { 0.0 }
 }
 
+/// The points of some triangles that lie farthest along the axes and the diagonals of space. They
+/// depend on the surface, not on the order of its triangles.
+fn extremes(mesh: &Mesh, triangles: impl Iterator<Item = u32>) -> [DVec3; 14] {
+    const ALONG: [[f64; 3]; 14] = [
+        [1.0, 0.0, 0.0],
+        [-1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, -1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, -1.0],
+        [1.0, 1.0, 1.0],
+        [-1.0, 1.0, 1.0],
+        [1.0, -1.0, 1.0],
+        [1.0, 1.0, -1.0],
+        [-1.0, -1.0, 1.0],
+        [-1.0, 1.0, -1.0],
+        [1.0, -1.0, -1.0],
+        [-1.0, -1.0, -1.0],
+    ];
+    let mut found = [(f64::NEG_INFINITY, DVec3::ZERO); 14];
+    for corner in triangles.flat_map(|triangle| mesh.corners(triangle)) {
+        for (along, (most, at)) in ALONG.iter().zip(&mut found) {
+            let value = DVec3::from_array(*along).dot(corner);
+            let earlier =
+                || corner.to_array().partial_cmp(&at.to_array()).is_some_and(|o| o.is_lt());
+            if value > *most || (value == *most && earlier()) {
+                (*most, *at) = (value, corner);
+            }
+        }
+    }
+    found.map(|(_, at)| at)
+}
+
 /// Finds which closed shells lie inside which others, and from that and their senses what they
 /// bound.
 fn assign_roles(
@@ -211,14 +244,18 @@ fn assign_roles(
     order.sort_by(|&a, &b| extent(b).total_cmp(&extent(a)).then(a.cmp(&b)));
     for (position, &inner) in order.iter().enumerate() {
         let draft = &drafts[inner];
-        let Some(first) = members.of(inner).next() else { continue };
-        let point = mesh.corners(first)[0];
+        let around = |outer: usize| {
+            let container = &drafts[outer];
+            container.low.cmplt(draft.low).all() && container.high.cmpgt(draft.high).all()
+        };
+        if !order[..position].iter().any(|&outer| around(outer)) {
+            continue;
+        }
+        // A shell that passes through another lies not inside it, wherever the file begins.
+        let points = extremes(mesh, members.of(inner));
         // The smallest container decides: it is the last one found in this order.
         let parent = order[..position].iter().rev().copied().find(|&outer| {
-            let container = &drafts[outer];
-            container.low.cmplt(draft.low).all()
-                && container.high.cmpgt(draft.high).all()
-                && inside(mesh, members.of(outer), point)
+            around(outer) && points.iter().all(|point| inside(mesh, members.of(outer), *point))
         });
         let Some(parent) = parent else { continue };
         let opposite = inside_out[inner] != inside_out[parent];

@@ -117,6 +117,32 @@ fn contact_falls_with_the_moment() {
     }
 }
 
+/// The table of prisms as it was found with other code, to the five digits given there.
+#[test]
+fn prisms_become_no_cylinder_by_refinement() {
+    let t = f64::NAN;
+    let known: [(f64, [f64; 6]); 6] = [
+        (0.3, [0.0, t, t, t, t, t]),
+        (0.03, [0.0, 0.0, 0.0, 0.0, 0.0, t]),
+        (0.42426, [0.3, t, t, t, t, t]),
+        (0.3, [0.15, 0.15, t, t, t, t]),
+        (0.3, [0.28281, 0.29413, 0.29820, 0.29947, 0.29985, 0.29999]),
+        (0.24271, [0.14141, 0.14641, t, t, t, t]),
+    ];
+    let rows = gripfast::lab::figures::prism::rows().unwrap();
+    assert_eq!(rows.len(), known.len());
+    for (row, (cylinder, prisms)) in rows.iter().zip(known) {
+        // The cylinder's contact is a little wider than the line that the values are of.
+        assert!((row.cylinder - cylinder).abs() < 2e-5, "{}: {}", row.load, row.cylinder);
+        for (found, known) in row.prisms.iter().zip(prisms) {
+            match found {
+                Some(mu) => assert!((mu - known).abs() < 6e-6, "{}: {mu} {known}", row.load),
+                None => assert!(known.is_nan(), "{}: {known}", row.load),
+            }
+        }
+    }
+}
+
 fn figures(folder: &Path) -> std::process::Output {
     Command::new(env!("CARGO_BIN_EXE_gripfast"))
         .args(["figures", "-o"])

@@ -6,6 +6,7 @@ mod backend;
 mod command_line;
 mod docs_commands;
 mod export;
+mod faults;
 mod figures;
 mod flag_names;
 mod gripper;

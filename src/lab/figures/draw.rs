@@ -6,6 +6,7 @@ use glam::DVec2;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
+use super::prism::{FACES, PrismRow};
 use super::shapes;
 use super::studies::{
     BAR_MASS, BarRow, DistanceSweep, FORCE, LINE_SHARE, LineRow, SHAPE_MOMENT, SIDE,
@@ -329,6 +330,35 @@ pub(super) fn distance(sweeps: &[DistanceSweep]) -> Result<String> {
             legend: SeriesLabelPosition::LowerRight,
         };
         chart(&halves[1], axes, &curves(|sweep, i| sweep.points[i][2]))
+    })
+}
+
+/// Section 6: friction of prisms over that of the cylinder, up to where they twist out.
+pub(super) fn prisms(rows: &[PrismRow]) -> Result<String> {
+    svg((820, 520), |root| {
+        let colours = [INK, SKY, ORANGE, GREEN, BLUE, PURPLE];
+        let shown = FACES.map(f64::from);
+        let curves: Vec<Curve<'_>> = rows
+            .iter()
+            .zip(colours)
+            .map(|(row, colour)| Curve {
+                label: row.load,
+                colour,
+                width: 2,
+                points: shown
+                    .iter()
+                    .zip(&row.prisms)
+                    .map_while(|(n, mu)| Some((n.log2(), (*mu)? / row.cylinder)))
+                    .collect(),
+            })
+            .collect();
+        let axes = Axes {
+            title: "prism between plane pads; a curve ends where the next one twists out",
+            x: ("log2 of the number of faces", 2.5..8.6),
+            y: ("mu_s over that of the cylinder", -0.05..1.25),
+            legend: SeriesLabelPosition::LowerRight,
+        };
+        chart(root, axes, &curves)
     })
 }
 

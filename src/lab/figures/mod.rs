@@ -3,6 +3,7 @@
 //! [`all`] runs the studies; `docs/figures.md` says what of the paper they confirm.
 
 mod draw;
+pub mod prism;
 pub mod shapes;
 pub mod studies;
 
@@ -38,7 +39,7 @@ fn number(value: f64) -> String {
 /// # Errors
 /// Never for the inputs that the studies choose; passed on from the solver and the drawing.
 pub fn all() -> Result<Vec<Figure>> {
-    Ok(vec![separation()?, figure_4()?, figure_5()?, figure_6()?, distance()?])
+    Ok(vec![separation()?, figure_4()?, figure_5()?, figure_6()?, distance()?, prism::figure()?])
 }
 
 fn figure_5() -> Result<Figure> {
