@@ -69,6 +69,8 @@ pub use prepare::PlanBuilder;
 #[derive(Debug)]
 pub struct Plan {
     request: Request,
+    /// As the request said, before `auto` became one of the others.
+    asked_polish: Polish,
     part: Part,
     gripper: Gripper,
     mass: MassProperties,
@@ -439,6 +441,7 @@ impl Plan {
             keep: self.request.kept(),
         };
         let mut provenance = Provenance::new(self.request.clone(), resolved);
+        provenance.request.scoring.polish = self.asked_polish;
         provenance.command.clone_from(&self.command);
         provenance.backend = backend;
         provenance.complete = complete;

@@ -290,7 +290,7 @@ impl Default for Scoring {
             position_error: Length(0.0),
             closing_friction: 0.0,
             separation: Separation::Solve,
-            polish: Polish::Worst,
+            polish: Polish::Auto,
             refiner: Refiner::Newton,
             threads: None,
         }
@@ -345,6 +345,16 @@ impl Request {
         let few = self.scoring.polish == Polish::Top && !diverse && !merge_symmetric;
         let choice = if diverse { KEEP } else { 0 };
         keep.unwrap_or(if few { 0 } else { KEEP }).max(top).max(choice).max(1)
+    }
+
+    /// Whether what is shown needs none but the first grips: no file, no choice among all, no
+    /// number of grips to keep.
+    pub(crate) fn wants_first_only(&self) -> bool {
+        let Selection { diverse, merge_symmetric, keep, compare, .. } = &self.selection;
+        let Output { output, report, json, .. } = &self.output;
+        let written = output.is_some() || report.is_some() || *json;
+        let chosen = *diverse || *merge_symmetric || keep.is_some() || compare.is_some();
+        !written && !chosen && self.scoring.k1 >= 0.0
     }
 
     /// Reads a stored request: JSON where the file's name ends in `.json`, else TOML. Paths in it

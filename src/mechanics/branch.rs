@@ -2,7 +2,7 @@
 
 use glam::{DMat2, DVec2};
 
-use super::equilibrium::{Node, Solver, State, Vector7, unknowns};
+use super::equilibrium::{Node, Solver, State, Vector7, same, unknowns};
 use super::pads::{Load, Pads};
 use super::pressure::{self, face_pressure, separates};
 use super::slip;
@@ -15,9 +15,23 @@ use crate::request::Refiner;
 /// they are 0.65 % of such cases, at 4-8 23 %.
 pub const COUPLING_SEARCH: f64 = 1.0;
 
+/// Strength of the coupling above which another limit state may lie close to one in which a pad
+/// separates (seen down to 0.08).
+const COUPLING_FOLD: f64 = 0.03;
+
+fn coupling(state: &State, load: &Load) -> f64 {
+    state.mu_over_size * load.size * 2.0 * load.half_distance.abs()
+}
+
 /// Whether there may be other limit states than this one.
 pub(super) fn strong(state: &State, load: &Load) -> bool {
-    state.mu_over_size * load.size * 2.0 * load.half_distance.abs() > COUPLING_SEARCH
+    coupling(state, load) > COUPLING_SEARCH
+}
+
+/// Whether the map may fold close to this state.
+pub(super) fn folded(state: &State, pads: &Pads, load: &Load) -> bool {
+    coupling(state, load) > COUPLING_FOLD
+        && (0..2).any(|k| separates(&pads.areas[k], face_pressure(&state.q(), k)))
 }
 
 impl Solver<'_> {
@@ -162,6 +176,46 @@ impl Solver<'_> {
         }
     }
 
+    /// Another limit state beside `state`, where the map folds between the two: looked for both ways
+    /// in the direction in which the map is flattest.
+    pub(super) fn partner(&mut self, state: &State) -> Option<State> {
+        let here = self.node(&state.z)?;
+        let (flat, stretch) = flattest(here.slope);
+        let across = here.slope * flat;
+        let across = if stretch > 0.0 { across / stretch } else { flat.perp() };
+        let room = pressure::reach(self.pads, self.load.normal, here.x).max(0.0);
+        for way in [flat, -flat] {
+            let rising = across.dot(here.slope * way);
+            let mut near = here;
+            let mut before = 0.0;
+            for share in PARTNER_SHARES {
+                let h = share * room;
+                let z = self.state_near(here.x + h * way, Some(&near.z));
+                let Some(node) = z.and_then(|z| self.node(&z)) else { break };
+                let value = across.dot(node.g);
+                // Risen from here, and below: there is a zero between the last point and this one.
+                if rising * value < 0.0 {
+                    let start = if node.g.length() < near.g.length() || before == 0.0 {
+                        node.z
+                    } else {
+                        near.z
+                    };
+                    let middle = self.state_near(here.x + 0.5 * (before + h) * way, Some(&start));
+                    let found = [Some(start), middle]
+                        .into_iter()
+                        .flatten()
+                        .find_map(|z| self.newton(z, 1.0, 15).filter(|other| !same(state, other)));
+                    if found.is_some() {
+                        return found;
+                    }
+                    break;
+                }
+                (near, before) = (node, h);
+            }
+        }
+        None
+    }
+
     /// Derivative of `g` at a coupling. Its determinant is positive where the branch starts and
     /// changes its sign at a turning point; another limit state that a long step has led to most
     /// often has the other sign, too.
@@ -181,7 +235,7 @@ pub(super) fn by_load(
     refiner: Refiner,
 ) -> (Option<State>, u32) {
     let mut evaluations = 0;
-    let mut solver = |share: f64| {
+    let solver = |share: f64| {
         let part = Wrench { force: share * wrench.force, moment: share * wrench.moment };
         Solver::new(pads, pads.load(distance, force, &part), refiner)
     };
@@ -222,6 +276,19 @@ pub(super) fn by_load(
     }
     (None, evaluations)
 }
+
+/// The unit vector that a linear map stretches least, and by how much.
+fn flattest(slope: DMat2) -> (DVec2, f64) {
+    let square = slope.transpose() * slope;
+    let (a, b, c) = (square.x_axis.x, square.x_axis.y, square.y_axis.y);
+    // Half a turn on from the direction of the greatest stretch.
+    let flat = DVec2::from_angle(0.5 * (2.0 * b).atan2(a - c)).perp();
+    (flat, (slope * flat).length())
+}
+
+/// Where [`Solver::partner`] looks, as shares of the way to the rim (along it
+/// there is more room).
+const PARTNER_SHARES: [f64; 11] = [1e-3, 4e-3, 0.015, 0.05, 0.15, 0.4, 0.8, 1.6, 4.0, 10.0, 30.0];
 
 /// Most steps of [`by_load`], and the shortest one.
 const GROW_MOST: usize = 60;

@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::branch::{self, strong};
+use super::branch::{self, folded, strong};
 use super::equilibrium::{Solver, State, Vector7};
 use super::pads::{Load, Pads};
 use super::pressure::{self, face_pressure};
@@ -152,7 +152,10 @@ pub fn solve_pads(
     let seed = options.seed.map(|twist| pads.scaled_twist(twist));
     let mut solver = Solver::new(pads, load, options.refiner);
     let (state, unique) = match solver.branch(seed) {
-        Some(state) if !strong(&state, &load) => (state, true),
+        Some(state) if !strong(&state, &load) => {
+            let alone = !folded(&state, pads, &load) || solver.partner(&state).is_none();
+            (state, alone)
+        }
         None if load.half_distance == 0.0 => {
             return refused(out_of_reach(pads, &load), solver.evaluations);
         }

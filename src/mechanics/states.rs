@@ -175,6 +175,10 @@ impl<'s, 'a> Map<'s, 'a> {
     fn search(&mut self, states: &mut Vec<State>) -> bool {
         self.cells(BEND, MOST_NODES, states);
         self.lowest(states);
+        for known in states.clone() {
+            let partner = self.solver.partner(&known);
+            states.extend(partner.filter(|found| !states.iter().any(|state| same(state, found))));
+        }
         let open = self.beyond(states);
         // On slivers the outermost points can be beyond what doubles resolve: then the next ring
         // in.

@@ -11,7 +11,7 @@ use crate::gripper::{self, Gripper};
 use crate::load::LoadSet;
 use crate::part::{MassProperties, Part, ReadOptions};
 use crate::propose::ProposeOptions;
-use crate::request::Request;
+use crate::request::{Polish, Request};
 use crate::results::LoadCase;
 
 /// Density at which a part is taken where no load depends on its mass [kg/m^3].
@@ -39,11 +39,19 @@ pub struct PlanBuilder {
     gripper: Option<Gripper>,
     loads: Option<Vec<LoadCase>>,
     command: Vec<String>,
+    first_only: bool,
 }
 
 impl PlanBuilder {
     pub(super) fn new(request: Request) -> Self {
-        Self { request, part: None, gripper: None, loads: None, command: Vec::new() }
+        Self {
+            request,
+            part: None,
+            gripper: None,
+            loads: None,
+            command: Vec::new(),
+            first_only: false,
+        }
     }
 
     /// This part, instead of the file that the request names.
@@ -68,6 +76,14 @@ impl PlanBuilder {
         self
     }
 
+    /// Only [`super::Outcome::shown`] and the counts will be looked at: unless the request says
+    /// otherwise, grips that cannot be among those shown are left unsolved and counted.
+    #[must_use]
+    pub fn first_only(mut self) -> Self {
+        self.first_only = true;
+        self
+    }
+
     /// The command line that led here, for the provenance of the result.
     #[must_use]
     pub fn command(mut self, command: Vec<String>) -> Self {
@@ -80,8 +96,13 @@ impl PlanBuilder {
     /// # Errors
     /// As [`Plan::new`].
     pub fn build(self) -> Result<Plan> {
-        let Self { request, part, gripper, loads, command } = self;
+        let Self { mut request, part, gripper, loads, command, first_only } = self;
         request.check()?;
+        let asked_polish = request.scoring.polish;
+        if asked_polish == Polish::Auto {
+            let first = first_only && request.wants_first_only();
+            request.scoring.polish = if first { Polish::Top } else { Polish::Worst };
+        }
         let gripper = gripper.map_or_else(|| gripper::find(&request.gripper), Ok)?;
         let settings = Settings::new(&request, &gripper)?;
         let sources = if loads.is_none() { Some(load_set(&request)?) } else { None };
@@ -126,6 +147,7 @@ impl PlanBuilder {
         propose.force = Some(settings.force);
         Ok(Plan {
             request,
+            asked_polish,
             part,
             gripper,
             mass,

@@ -97,6 +97,8 @@ words! {
         Top = "top",
         /// All of them.
         All = "all",
+        /// As `top` where nobody looks at more than the first grips, else as `worst`.
+        Auto = "auto",
     }
 
     /// Which minimiser refines a solution.

@@ -8,6 +8,7 @@ mod earlier_method;
 mod exact;
 mod invariances;
 mod named;
+mod near_lift_off;
 mod paper_method;
 mod random;
 mod reference_cases;

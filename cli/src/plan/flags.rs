@@ -188,7 +188,8 @@ struct ScoringArgs {
     #[arg(long, value_parser = words!(Separation))]
     separation: Option<Separation>,
     /// What gets the final f64 solution: the loads that can be a grip's worst; the same, and only
-    /// for grips that can be among the best ones kept; or all loads (kept in the result).
+    /// for grips that can be among the best ones kept; or all loads (kept in the result). Auto: top
+    /// where the table is all that is asked for, else worst.
     #[arg(long, value_parser = words!(Polish))]
     polish: Option<Polish>,
     /// Minimiser that polishes the final answers.
