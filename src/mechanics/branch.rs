@@ -187,33 +187,53 @@ impl Solver<'_> {
         for way in [flat, -flat] {
             let rising = across.dot(here.slope * way);
             let mut near = here;
-            let mut before = 0.0;
+            let (mut before, mut highest) = (0.0, 0.0_f64);
             for share in PARTNER_SHARES {
                 let h = share * room;
                 let z = self.state_near(here.x + h * way, Some(&near.z));
                 let Some(node) = z.and_then(|z| self.node(&z)) else { break };
-                let value = across.dot(node.g);
-                // Risen from here, and below: there is a zero between the last point and this one.
-                if rising * value < 0.0 {
-                    let start = if node.g.length() < near.g.length() || before == 0.0 {
-                        node.z
-                    } else {
-                        near.z
-                    };
-                    let middle = self.state_near(here.x + 0.5 * (before + h) * way, Some(&start));
-                    let found = [Some(start), middle]
+                let value = across.dot(node.g) * rising.signum();
+                // Risen from here, and lower again: a zero may be near, or between the last point
+                // and this one.
+                let fallen = value < highest;
+                highest = highest.max(value);
+                if fallen {
+                    let last = across.dot(near.g) * rising.signum();
+                    let crossing = before + (h - before) * (last / (last - value)).clamp(0.1, 0.9);
+                    let between = self.state_near(here.x + crossing * way, Some(&near.z));
+                    let found = [between, Some(node.z)]
                         .into_iter()
                         .flatten()
-                        .find_map(|z| self.newton(z, 1.0, 15).filter(|other| !same(state, other)));
+                        .find_map(|z| self.settle_at(z).filter(|other| !same(state, other)));
                     if found.is_some() {
                         return found;
                     }
-                    break;
+                    if value < 0.0 {
+                        break;
+                    }
                 }
                 (near, before) = (node, h);
             }
         }
         None
+    }
+
+    /// The limit state near `z`: by Newton's method on the map, then on all seven equations.
+    fn settle_at(&mut self, mut z: Vector7) -> Option<State> {
+        for _ in 0..SETTLE_MOST {
+            let node = self.node(&z)?;
+            if node.g.length() < SETTLED {
+                break;
+            }
+            let step = node.slope.inverse() * node.g;
+            let next = [1.0, 0.3, 0.1].into_iter().find_map(|t| {
+                let z = self.state_near(node.x - t * step, Some(&node.z))?;
+                self.node(&z).filter(|next| next.g.length() < node.g.length())
+            });
+            let Some(next) = next else { break };
+            z = next.z;
+        }
+        self.newton(z, 1.0, 15)
     }
 
     /// Derivative of `g` at a coupling. Its determinant is positive where the branch starts and
@@ -289,6 +309,10 @@ fn flattest(slope: DMat2) -> (DVec2, f64) {
 /// Where [`Solver::partner`] looks, as shares of the way to the rim (along it
 /// there is more room).
 const PARTNER_SHARES: [f64; 11] = [1e-3, 4e-3, 0.015, 0.05, 0.15, 0.4, 0.8, 1.6, 4.0, 10.0, 30.0];
+
+/// Most steps of [`Solver::settle_at`] on the map, and the value at which they end.
+const SETTLE_MOST: usize = 12;
+const SETTLED: f64 = 1e-7;
 
 /// Most steps of [`by_load`], and the shortest one.
 const GROW_MOST: usize = 60;
