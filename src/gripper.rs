@@ -5,6 +5,7 @@ pub mod catalogue;
 pub mod check;
 pub mod drawing;
 pub mod file;
+mod import;
 pub mod layer;
 mod mesh;
 mod travel;
@@ -20,6 +21,7 @@ use crate::model::{Contact, Frame, Grip, Ring};
 pub use catalogue::find;
 pub use check::check;
 pub use file::{parse, read};
+pub use import::{Imported, import};
 pub use layer::Layer;
 pub use travel::{Travel, TravelRow};
 

@@ -1,7 +1,7 @@
 //! `gripfast gripper`: the shipped grippers, and a look at one.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args as ClapArgs, Subcommand};
@@ -48,12 +48,42 @@ enum Action {
         #[arg(long, value_name = "FILE")]
         svg: Option<PathBuf>,
     },
+    /// Makes a gripper file from a robot model (URDF): stroke and motion from its joints, boxes round
+    /// its links. What a model cannot say is marked as unverified.
+    #[command(
+        after_help = "EXAMPLES:\n  gripfast gripper import hand.urdf --jaw left_finger_pad --jaw right_finger_pad -o hand.toml\n\n\
+Name the two links that touch the part. Expand xacro files first."
+    )]
+    Import {
+        /// Robot model.
+        file: PathBuf,
+        /// Link that touches the part; twice, the first becomes jaw I.
+        #[arg(long, value_name = "LINK", required = true)]
+        jaw: Vec<String>,
+        /// Gripper file to write; standard output when not given.
+        #[arg(short, long, value_name = "FILE")]
+        output: Option<PathBuf>,
+        /// Name of the gripper [default: the model's].
+        #[arg(long)]
+        name: Option<String>,
+        /// Draw it with its dimensions into this SVG file.
+        #[arg(long, value_name = "FILE")]
+        svg: Option<PathBuf>,
+    },
+    /// Makes a gripper file: asks for the dimensions on a terminal, or takes them as flags.
+    #[command(after_help = "EXAMPLES:\n  gripfast gripper new bench.toml\n  \
+gripfast gripper new bench.toml --name Bench --stroke 2mm,60mm --force 15N,120N --pad 24mm,16mm --finger 63mm,16mm,14mm --palm 70mm,90mm,90mm --throat 37mm")]
+    New(Box<crate::gripper_new::Args>),
 }
 
 /// Runs the subcommand.
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     match args.action {
         Action::List => list()?,
+        Action::Import { file, jaw, output, name, svg } => {
+            import(&file, &jaw, output.as_deref(), name.as_deref(), svg.as_deref())?;
+        }
+        Action::New(args) => crate::gripper_new::run(*args)?,
         Action::Show { gripper } => {
             write!(terminal::output(), "{}", catalogue::text(&gripper)?)?;
         }
@@ -62,12 +92,53 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             let mut out = terminal::output();
             writeln!(out, "{}", describe(&gripper))?;
             if let Some(path) = svg {
-                file::write(&path, |writer| writer.write_all(drawing::svg(&gripper).as_bytes()))?;
+                draw(&gripper, &path)?;
                 writeln!(out, "drawing: {}", path.display())?;
             }
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the drawing of a gripper.
+pub(crate) fn draw(gripper: &Gripper, path: &Path) -> anyhow::Result<()> {
+    Ok(file::write(path, |writer| writer.write_all(drawing::svg(gripper).as_bytes()))?)
+}
+
+fn import(
+    path: &Path,
+    jaws: &[String],
+    output: Option<&Path>,
+    name: Option<&str>,
+    svg: Option<&Path>,
+) -> anyhow::Result<()> {
+    let [one, other] = jaws else {
+        anyhow::bail!(gripfast::error::Error::input(
+            "--jaw",
+            format!("{} links are named", jaws.len()),
+            "name the two that touch the part: --jaw A --jaw B"
+        ));
+    };
+    let found = gripper::import(path, [one, other], name)?;
+    match output {
+        Some(output) => {
+            file::write(output, |writer| writer.write_all(found.text.as_bytes()))?;
+            terminal::say(&format!("wrote {}", output.display()));
+        }
+        None => write!(terminal::output(), "{}", found.text)?,
+    }
+    for note in &found.notes {
+        terminal::say(&format!("to look at: {note}"));
+    }
+    let gripper = gripper::parse(&found.text, "the imported gripper")?;
+    for warning in gripper::check(&gripper) {
+        terminal::say(&format!("warning: {warning}"));
+    }
+    if let Some(path) = svg {
+        draw(&gripper, path)?;
+        terminal::say(&format!("drawing: {}", path.display()));
+    }
+    Ok(())
 }
 
 fn list() -> anyhow::Result<()> {
@@ -102,7 +173,7 @@ fn list() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn describe(gripper: &Gripper) -> String {
+pub(crate) fn describe(gripper: &Gripper) -> String {
     let mut table = new_table(&["dimension", "value", "source"]);
     let mut row = |key: String, value: String| {
         let source = gripper.sources.get(&key).map_or("no source given".to_string(), |source| {

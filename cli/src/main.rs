@@ -23,6 +23,7 @@ mod export;
 mod figures;
 mod flags;
 mod gripper;
+mod gripper_new;
 mod part;
 mod pick;
 mod plan;

@@ -1,0 +1,164 @@
+use super::*;
+use crate::gripper::{Jaw, Moving, Travel, parse};
+
+fn imported(text: &str, jaws: [&str; 2]) -> (crate::gripper::Gripper, Imported) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hand.urdf");
+    std::fs::write(&path, text).unwrap();
+    let found = import(&path, jaws, None).unwrap();
+    (parse(&found.text, "imported").unwrap(), found)
+}
+
+fn link(name: &str, size: [f64; 3], at: [f64; 3]) -> String {
+    let list = |v: [f64; 3]| v.map(|x| x.to_string()).join(" ");
+    format!(
+        "<link name=\"{name}\"><collision><origin xyz=\"{}\" rpy=\"0 0 0\"/><geometry><box size=\"{}\"/></geometry></collision></link>\n",
+        list(at),
+        list(size)
+    )
+}
+
+fn joint(
+    name: &str,
+    kind: &str,
+    parent: &str,
+    child: &str,
+    at: [f64; 3],
+    axis: &str,
+    rest: &str,
+) -> String {
+    let at = at.map(|x| x.to_string()).join(" ");
+    format!(
+        "<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"{at}\" rpy=\"0 0 0\"/><axis xyz=\"{axis}\"/>{rest}</joint>\n"
+    )
+}
+
+#[test]
+fn a_parallel_hand_with_a_mount_and_a_mimic() {
+    let limit = "<limit lower=\"0\" upper=\"0.04\" effort=\"70\" velocity=\"1\"/>";
+    let text = format!(
+        "<robot name=\"hand\">{}{}{}{}{}{}{}</robot>",
+        "<link name=\"mount\"/>",
+        link("palm", [0.06, 0.2, 0.06], [0.0, 0.0, 0.03]),
+        link("left", [0.018, 0.01, 0.05], [0.0, 0.005, 0.025]),
+        link("right", [0.018, 0.01, 0.05], [0.0, -0.005, 0.025]),
+        joint("fix", "fixed", "mount", "palm", [0.0, 0.0, 0.01], "1 0 0", ""),
+        joint("finger", "prismatic", "palm", "left", [0.0, 0.0, 0.06], "0 1 0", limit),
+        joint(
+            "other",
+            "prismatic",
+            "palm",
+            "right",
+            [0.0, 0.0, 0.06],
+            "0 -1 0",
+            &format!("{limit}<mimic joint=\"finger\" multiplier=\"1\" offset=\"0\"/>")
+        ),
+    );
+    let (gripper, found) = imported(&text, ["left", "right"]);
+    assert_eq!(gripper.stroke, [0.0, 0.08]);
+    assert_eq!((gripper.moving, gripper.is_symmetric()), (Moving::Both, true));
+    let [pad, _] = gripper.pad_sizes();
+    assert!((pad - DVec2::new(0.05, 0.018)).length() < 1e-9, "{pad}");
+    // The finger reaches from its pad 10 mm outwards; the palm ends 25 mm behind the pads' middle.
+    let [low, high] = gripper.bodies(Jaw::I)[0].bounds();
+    assert!((low - DVec3::new(-0.025, -0.009, 0.0)).length() < 1e-9, "{low}");
+    assert!((high - DVec3::new(0.025, 0.009, 0.01)).length() < 1e-9, "{high}");
+    let [low, high] = gripper.palm[0].bounds();
+    assert!((high.x + 0.025).abs() < 1e-9 && (low.x + 0.085).abs() < 1e-9);
+    assert!((high.z - 0.1).abs() < 1e-9 && (high.y - 0.03).abs() < 1e-9);
+    let flange = gripper.grip_from_flange.unwrap();
+    assert!((flange.origin - DVec3::new(-0.095, 0.0, 0.0)).length() < 1e-9, "{}", flange.origin);
+    assert!((flange.rotation.z_axis - DVec3::X).length() < 1e-9);
+    assert!((gripper.travel.joint(0.03, gripper.stroke).unwrap() - 0.015).abs() < 1e-9);
+    assert_eq!(gripper.force[1], 70.0);
+    for key in ["force", "pad.size", "flange", "finger.left", "palm.palm"] {
+        assert!(!gripper.sources[key].verified, "{key}");
+    }
+    assert!(found.notes.iter().any(|note| note.contains("pad.friction")), "{:?}", found.notes);
+}
+
+#[test]
+fn cranks_give_a_table_that_follows_them() {
+    // Cranks of 57.12 mm from -5.43 degrees, each pad kept parallel by a second joint.
+    let (crank, angle) = (0.05712_f64, (-5.43_f64).to_radians());
+    let limit = "<limit lower=\"0\" upper=\"0.8\" effort=\"5\" velocity=\"1\"/>";
+    let mut text = String::from("<robot name=\"linkage\">");
+    text += &link("base", [0.07, 0.07, 0.05], [0.0, 0.0, 0.0]);
+    for (side, sign) in [("l", 1.0), ("r", -1.0)] {
+        let (arm, tip) = (format!("arm_{side}"), format!("tip_{side}"));
+        text += &link(&arm, [0.01, 0.006, 0.05], [0.0, 0.0, 0.03]);
+        text += &link(&tip, [0.02, 0.006, 0.03], [0.0, sign * 0.003, 0.015]);
+        // A positive joint opens: about -x for the one at +y.
+        let axis = if sign > 0.0 { "-1 0 0" } else { "1 0 0" };
+        let master = format!("drive_{side}");
+        let mimic = if side == "r" { "<mimic joint=\"drive_l\"/>" } else { "" };
+        let out = crank * angle.sin();
+        text += &joint(
+            &master,
+            "revolute",
+            "base",
+            &arm,
+            [0.0, -sign * out, 0.06],
+            axis,
+            &format!("{limit}{mimic}"),
+        );
+        let back = if sign > 0.0 { "1 0 0" } else { "-1 0 0" };
+        text += &joint(
+            &format!("level_{side}"),
+            "revolute",
+            &arm,
+            &tip,
+            [0.0, sign * crank * angle.sin(), crank * angle.cos()],
+            back,
+            &format!("{limit}<mimic joint=\"drive_l\" multiplier=\"1\"/>"),
+        );
+    }
+    text += "</robot>";
+    let (gripper, _) = imported(&text, ["tip_l", "tip_r"]);
+    assert!(matches!(gripper.travel, Travel::Table { .. }) && gripper.is_symmetric());
+    let exact = Travel::Arc { crank, angle, joint: None, alone: false };
+    let most = 2.0 * crank * ((angle + 0.8).sin() - angle.sin());
+    assert!((gripper.stroke[1] - most).abs() < 1e-6, "{:?} {most}", gripper.stroke);
+    for step in 0..=100 {
+        let gap = most * f64::from(step) / 100.0;
+        let off = gripper.travel.advance(gap) - exact.advance(gap);
+        assert!(off.abs() < 5e-5, "{gap}: {off}");
+        let turn = (angle.sin() + gap / 2.0 / crank).asin() - angle;
+        let joint = gripper.travel.joint(gap, gripper.stroke).unwrap();
+        assert!((joint - turn).abs() < 1.5e-3, "{gap}: {joint} {turn}");
+    }
+    // The arms are boxes round all their positions.
+    let arm = gripper.palm.iter().find(|body| body.name == "arm_l").unwrap();
+    assert!(arm.bounds()[1].z > crank * 0.7 * (angle + 0.8).sin());
+}
+
+#[test]
+fn a_fixed_jaw_is_told() {
+    let limit = "<limit lower=\"0\" upper=\"0.05\" effort=\"0\" velocity=\"1\"/>";
+    let text = format!(
+        "<robot name=\"arm\">{}{}{}{}{}</robot>",
+        link("wrist", [0.05, 0.05, 0.04], [0.0, 0.0, 0.02]),
+        link("fixed", [0.02, 0.01, 0.06], [0.0, -0.005, 0.03]),
+        link("moving", [0.015, 0.008, 0.06], [0.0, 0.004, 0.03]),
+        joint("weld", "fixed", "wrist", "fixed", [0.0, 0.0, 0.04], "1 0 0", ""),
+        joint("slide", "prismatic", "wrist", "moving", [0.0, 0.0, 0.04], "0 1 0", limit),
+    );
+    let (gripper, found) = imported(&text, ["moving", "fixed"]);
+    assert_eq!((gripper.moving, gripper.stroke), (Moving::I, [0.0, 0.05]));
+    assert!(gripper.pad_ii.is_some() && gripper.fingers_ii.is_some());
+    assert!(found.notes.iter().any(|note| note.contains("force is not in the model")));
+    // The other way round the other jaw moves.
+    assert_eq!(imported(&text, ["fixed", "moving"]).0.moving, Moving::II);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("arm.urdf");
+    std::fs::write(&path, &text).unwrap();
+    for (jaws, word) in [
+        (["moving", "hand"], "use one of: wrist, fixed, moving"),
+        (["fixed", "wrist"], "no joint moves"),
+    ] {
+        let message = import(&path, jaws, None).unwrap_err().to_string();
+        assert!(message.contains(word), "{message}");
+    }
+    std::fs::write(&path, "no model").unwrap();
+    assert!(import(&path, ["a", "b"], None).unwrap_err().to_string().contains("no URDF"));
+}
