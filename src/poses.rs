@@ -62,6 +62,8 @@ struct Raw {
 pub fn read(path: &Path, options: &Options, gripper: &Gripper) -> Result<Vec<Pose>> {
     let format = match options.format {
         Some(format) => format,
+        // Rows alone, which we do not write.
+        None if path.extension().is_some_and(|ending| ending == "npy") => Format::GraspNet,
         None => Format::from_path(path)?,
     };
     let place = path.display().to_string();

@@ -12,6 +12,7 @@ mod pick_rank;
 mod pick_scene;
 mod plan_library;
 mod plan_scene;
+mod poses;
 mod report_browser;
 #[path = "../support/mod.rs"]
 mod support;

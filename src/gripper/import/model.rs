@@ -311,7 +311,7 @@ impl Model {
             Geometry::Mesh { filename, scale } => {
                 let scale = scale.map_or(DVec3::ONE, |scale| DVec3::from_array(*scale));
                 let path = self.mesh_file(filename);
-                let hulls = path.and_then(|path| mesh::hulls(&path, Some(Unit::M)).ok());
+                let hulls = path.and_then(|path| mesh::hulls(&path, Some(Unit::Metre)).ok());
                 let scaled = |hull: Vec<DVec3>| hull.into_iter().map(|p| p * scale).collect();
                 hulls.unwrap_or_default().into_iter().map(scaled).collect()
             }
