@@ -35,7 +35,7 @@ fn python(package: &str) -> Result<PathBuf, String> {
 }
 
 /// Runs a reader on a file; `None` when it cannot run and need not.
-fn read(reader: &str, package: &str, path: &Path) -> Option<Value> {
+pub(crate) fn read(reader: &str, package: &str, path: &Path) -> Option<Value> {
     let python = match python(package) {
         Ok(python) => python,
         Err(reason) => {

@@ -14,5 +14,6 @@ mod plan_library;
 mod plan_scene;
 mod poses;
 mod report_browser;
+mod robot_models;
 #[path = "../support/mod.rs"]
 mod support;
