@@ -8,7 +8,7 @@ use std::path::Path;
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::model::Frame;
 use model::Model;
 

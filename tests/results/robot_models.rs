@@ -39,11 +39,7 @@ fn model() -> Option<(Vec<State>, String)> {
     assert_eq!(places.len(), values.len());
     let states = values.into_iter().zip(places).map(|(joint, pads)| {
         let [one, other] = [point(&pads[0]), point(&pads[1])];
-        State {
-            joint,
-            gap: one.distance(other) - 2.0 * HALF_PAD,
-            height: ((one + other) / 2.0).z,
-        }
+        State { joint, gap: one.distance(other) - 2.0 * HALF_PAD, height: ((one + other) / 2.0).z }
     });
     Some((states.collect(), found["file"].as_str().unwrap().to_owned()))
 }
