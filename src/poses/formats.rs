@@ -305,8 +305,9 @@ fn npy_parts(bytes: &[u8]) -> Option<(&str, &[u8])> {
 fn npy(place: &str, bytes: &[u8]) -> Result<Vec<f64>> {
     let (header, data) = npy_parts(bytes).ok_or_else(|| wrong(place, "is no array of NumPy"))?;
     let header: String = header.split_whitespace().collect();
-    let rows = format!(",{COLUMNS})");
-    if !(header.contains("'fortran_order':False") && header.contains(&rows)) {
+    let rows = [format!(",{COLUMNS})"), format!(",{COLUMNS},)")];
+    let rows = rows.iter().any(|rows| header.contains(rows.as_str()));
+    if !(header.contains("'fortran_order':False") && rows) {
         return Err(wrong(place, format!("is not rows of {COLUMNS} numbers: {header}")));
     }
     if header.contains("'<f8'") {

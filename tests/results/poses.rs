@@ -14,6 +14,8 @@ use gripfast::results::GripSet;
 use gripfast::units::{Angle, Density, Length};
 
 const TILT: f64 = 0.05;
+/// Grips that are exported and read back.
+const TOP: usize = 30;
 
 fn plan(gripper: &str) -> Plan {
     let part = crate::support::root().join("data/parts/l_bracket.stl");
@@ -42,12 +44,12 @@ fn exports_read_back_are_the_same_grips() {
                 continue;
             }
             for origin in [None, Some(Origin::Stated(Stated::Flange)), Some(Origin::Behind(0.07))] {
-                let options = Options::default().with_origin(origin);
+                let options = Options::default().with_origin(origin).with_top(Some(TOP));
                 let path = folder.path().join(format!("grips{}", endings[0]));
                 export::write(&set, format, &path, &options, None).unwrap();
                 // What the file states about its frame is enough.
                 let list = poses::read(&path, &poses::Options::default(), plan.gripper()).unwrap();
-                assert_eq!(list.len(), set.grips.len(), "{format:?}");
+                assert_eq!(list.len(), TOP, "{format:?}");
                 let assessed = plan.assess(&list, TILT).unwrap();
                 for (pose, ranked) in assessed.poses.iter().zip(&set.grips) {
                     assert!(pose.is_grip(), "{format:?} {origin:?}: {pose:?}");
@@ -61,7 +63,7 @@ fn exports_read_back_are_the_same_grips() {
                     let [one, two] = [again, ranked].map(|grip| grip.worst.mu_s.unwrap());
                     assert!((one / two - 1.0).abs() < 1e-6, "{format:?}: {one} {two}");
                 }
-                assert_eq!(assessed.set.summary.ranked, set.summary.ranked, "{format:?}");
+                assert_eq!(assessed.set.summary.ranked, TOP as u64, "{format:?}");
             }
         }
     }

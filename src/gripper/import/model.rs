@@ -24,6 +24,27 @@ pub(super) struct Model {
     above: Vec<Option<usize>>,
 }
 
+/// The text with the prefixes of its elements declared: models carry elements of simulators
+/// (`drake:..`) without.
+fn bound(text: &str) -> String {
+    let mut known: Vec<&str> = Vec::new();
+    for piece in text.split('<').skip(1) {
+        let name = piece.split([' ', '>', '/', '\n', '\t', '\r']).next().unwrap_or_default();
+        if let Some((prefix, _)) = name.split_once(':')
+            && !known.contains(&prefix)
+            && !text.contains(&format!("xmlns:{prefix}="))
+        {
+            known.push(prefix);
+        }
+    }
+    let declared: String = known
+        .iter()
+        .filter(|prefix| prefix.chars().all(|letter| letter.is_ascii_alphanumeric()))
+        .map(|prefix| format!(" xmlns:{prefix}=\"urn:{prefix}\""))
+        .collect();
+    text.replacen("<robot", &format!("<robot{declared}"), 1)
+}
+
 fn frame(pose: &Pose) -> Frame {
     let [roll, pitch, yaw] = *pose.rpy;
     let rotation =
@@ -34,7 +55,7 @@ fn frame(pose: &Pose) -> Frame {
 impl Model {
     pub(super) fn read(path: &Path) -> Result<Self> {
         let place = path.display().to_string();
-        let text = crate::file::read_text(path)?;
+        let text = bound(&crate::file::read_text(path)?);
         let robot = urdf_rs::read_from_string(&text).map_err(|error| {
             Error::format(
                 &place,
