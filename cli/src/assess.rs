@@ -30,7 +30,7 @@ FILES: CSV (columns x_m, y_m, z_m, qx, qy, qz, qw; id), isaac_grasp, moveit, gra
 result file of gripfast. Axes and origin are those that exports of the format hold (docs/formats.md), or as the file itself or \
 --convention and --origin say. Everything else is asked as of `gripfast plan`.\n\nEXIT CODES:\n  0  at least one pose is a grip    1  none is    2  bad input or usage"
 )]
-pub(crate) struct Args {
+pub(crate) struct AssessArgs {
     /// File of poses.
     #[arg(long, value_name = "FILE")]
     poses: PathBuf,
@@ -52,7 +52,7 @@ pub(crate) struct Args {
 }
 
 /// Runs the subcommand.
-pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(args: AssessArgs) -> anyhow::Result<ExitCode> {
     let options = poses::Options {
         format: args.format.as_deref().map(|name| Format::parse("--format", name)).transpose()?,
         convention: args

@@ -73,7 +73,7 @@ Name the two links that touch the part. Expand xacro files first."
     /// Makes a gripper file: asks for the dimensions on a terminal, or takes them as flags.
     #[command(after_help = "EXAMPLES:\n  gripfast gripper new bench.toml\n  \
 gripfast gripper new bench.toml --name Bench --stroke 2mm,60mm --force 15N,120N --pad 24mm,16mm --finger 63mm,16mm,14mm --palm 70mm,90mm,90mm --throat 37mm")]
-    New(Box<crate::gripper_new::Args>),
+    New(Box<crate::gripper_new::NewArgs>),
 }
 
 /// Runs the subcommand.

@@ -15,7 +15,7 @@ use crate::terminal;
 
 /// The dimensions of a gripper whose jaws are boxes. What is not given is asked for on a terminal.
 #[derive(Debug, ClapArgs)]
-pub(crate) struct Args {
+pub(crate) struct NewArgs {
     /// Gripper file to write; its drawing goes beside it (.svg).
     file: PathBuf,
     /// Name, for tables and pages.
@@ -134,7 +134,7 @@ impl Asker {
 }
 
 /// Runs the subcommand.
-pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+pub(crate) fn run(args: NewArgs) -> anyhow::Result<()> {
     if args.file.exists() && !args.overwrite {
         anyhow::bail!(Error::input(
             args.file.display().to_string(),

@@ -56,7 +56,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Plan(Box<plan::Args>),
-    Assess(Box<assess::Args>),
+    Assess(Box<assess::AssessArgs>),
     Part(part::Args),
     Solve(solve::Args),
     Why(why::Args),
