@@ -38,6 +38,25 @@ pub enum ErrorKind {
     Cancelled,
 }
 
+impl ErrorKind {
+    /// Its name in files and for other languages, in snake case.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::File => "file",
+            Self::Format => "format",
+            Self::Geometry => "geometry",
+            Self::Value => "value",
+            Self::Unsupported => "unsupported",
+            Self::NotFound => "not_found",
+            Self::Mismatch => "mismatch",
+            Self::Limit => "limit",
+            Self::Busy => "busy",
+            Self::Device => "device",
+            Self::Cancelled => "cancelled",
+        }
+    }
+}
+
 /// What can go wrong outside the mechanics: the kind, the place, the problem and the remedy, in
 /// words of the domain.
 ///

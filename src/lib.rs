@@ -34,6 +34,7 @@
 //! | candidate grips without scores; why a pose is none | [`propose::Proposer`] |
 //! | load cases: gravity, accelerations, lists, trajectories | [`load::LoadSet`] |
 //! | a gripper: files, checks, the catalogue | [`gripper::Gripper`] |
+//! | many parts, grippers and load sets; nothing lost | [`batch::run`] |
 //! | the order of grips of one's own | [`rank::rank`] |
 //! | the first grip that is free in a scene | [`pick::Picker`] |
 //! | the paper's own method and figures | [`lab`] |
@@ -86,6 +87,7 @@ macro_rules! setters {
 pub use glam;
 
 pub mod backend;
+pub mod batch;
 pub mod case;
 pub(crate) mod clash;
 #[doc(hidden)] // the integrals: tests and benches look at them

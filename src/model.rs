@@ -304,6 +304,60 @@ pub struct Grip {
     pub flip_of: Option<u64>,
 }
 
+/// A candidate that is no grip.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Negative {
+    /// Number of the candidate, as [`Grip::id`].
+    pub id: u64,
+    /// Grip frame in the part frame.
+    pub part_from_grip: Frame,
+    /// Distance between the two faces \[m\].
+    pub width: f64,
+    /// Planar face of the part under pad I.
+    pub face_i: u32,
+    /// Planar face of the part under pad II.
+    pub face_ii: u32,
+    /// As [`Grip::angle`] \[rad\].
+    pub angle: f64,
+    /// As [`Grip::inside`].
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub inside: bool,
+    /// Why it is none, as in the counts of rejections: `part_interference:fingertip`,
+    /// `twisted_out`, ..
+    pub reason: String,
+}
+
+impl Negative {
+    /// A grip that does not hold, for this reason.
+    pub fn new(grip: &Grip, reason: String) -> Self {
+        Self {
+            id: grip.id,
+            part_from_grip: grip.part_from_grip,
+            width: grip.width,
+            face_i: grip.face_i,
+            face_ii: grip.face_ii,
+            angle: grip.angle,
+            inside: grip.inside,
+            reason,
+        }
+    }
+
+    /// The grip that it would be, without its contact.
+    pub fn grip(&self) -> Grip {
+        Grip {
+            id: self.id,
+            part_from_grip: self.part_from_grip,
+            width: self.width,
+            face_i: self.face_i,
+            face_ii: self.face_ii,
+            angle: self.angle,
+            contact: Arc::default(),
+            inside: self.inside,
+            flip_of: None,
+        }
+    }
+}
+
 /// JSON has no infinity and no nan: both are written as null, and null is read as infinity.
 pub(crate) mod null_is_infinite {
     use serde::{Deserialize, Deserializer, Serializer};

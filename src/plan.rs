@@ -28,6 +28,7 @@ mod assess;
 pub mod checkpoint;
 mod collect;
 mod limits;
+mod negatives;
 pub mod noise;
 mod output;
 mod outside;
@@ -255,6 +256,7 @@ impl Plan {
             keep: self.request.kept(),
             race: scoring.polish == Polish::Top,
             ids: self.request.selection.ids.as_deref(),
+            sample: self.request.selection.negatives,
             partial: partial.as_ref(),
             resume: self.request.output.resume,
         };
@@ -287,11 +289,13 @@ impl Plan {
         &self,
         proposer: &Proposer<'_>,
         assessor: &Assessor<'_>,
-        found: Found,
+        mut found: Found,
     ) -> Result<(GripSet, Vec<u64>)> {
         let selection = &self.request.selection;
         let (low, high) = self.part.mesh.bounding_box();
         let (centre, size) = (self.mass.centre_of_mass, (high - low).length());
+        let lost = found.collector.take_lost();
+        let negatives = if found.complete { self.negatives(proposer, lost) } else { Vec::new() };
         let ranking = found.collector.finish(centre, size, &self.rank_options());
         let mut rejections = proposer.tally().rejections.clone();
         for (reason, count) in &ranking.rejections {
@@ -320,6 +324,7 @@ impl Plan {
                 rejections,
                 comparison,
             },
+            negatives,
             grips,
         };
         Ok((set, shown))

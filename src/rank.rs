@@ -252,35 +252,75 @@ fn size_and_spread(patch: &Patch) -> [f64; 2] {
     ]
 }
 
-/// Keeps the first of each set of equal grips, from grips in order; each one kept names the others.
-fn merge(grips: Vec<(f64, RankedGrip)>, centre_of_mass: DVec3) -> Vec<(f64, RankedGrip)> {
-    let mut kept: Vec<(f64, RankedGrip)> = Vec::with_capacity(grips.len());
-    let mut shapes: Vec<[f64; 8]> = Vec::with_capacity(grips.len());
-    let mut near = 0; // the first kept grip whose score is not clearly larger
-    let mut slipping = false;
-    for (score, mut grip) in grips {
-        if slips(&grip) && !slipping {
-            // The scores start anew.
-            (near, slipping) = (kept.len(), true);
+/// Sorts grips in order into families of equal ones.
+#[derive(Default)]
+struct Families {
+    /// Score and shape of the first of each.
+    first: Vec<(f64, [f64; 8])>,
+    /// The first family whose score is not clearly larger than that of the last grip.
+    near: usize,
+    /// Whether the last grip slips.
+    slipping: bool,
+}
+
+impl Families {
+    /// The family of the next grip, by its number; a new one has the next number.
+    fn take(&mut self, score: f64, grip: &RankedGrip, centre_of_mass: DVec3) -> usize {
+        if slips(grip) && !self.slipping {
+            // The scores start again.
+            (self.near, self.slipping) = (self.first.len(), true);
         }
         let larger = |other: f64| {
             other != score && (other.is_infinite() || other - score > SAME_SCORE * other.abs())
         };
-        while near < kept.len() && larger(kept[near].0) {
-            near += 1;
+        while self.first.get(self.near).is_some_and(|first| larger(first.0)) {
+            self.near += 1;
         }
-        let shape = geometry(&grip, centre_of_mass);
-        let same =
-            |other: &[f64; 8]| shape.iter().zip(other).all(|(a, b)| (a - b).abs() <= SAME_LENGTH);
-        if let Some(found) = shapes[near..].iter().position(same) {
-            kept[near + found].1.merged.push(grip.grip.id);
+        let shape = geometry(grip, centre_of_mass);
+        let same = |(_, other): &(f64, [f64; 8])| {
+            shape.iter().zip(other).all(|(a, b)| (a - b).abs() <= SAME_LENGTH)
+        };
+        let found = self.first[self.near..].iter().position(same);
+        found.map_or_else(
+            || {
+                self.first.push((score, shape));
+                self.first.len() - 1
+            },
+            |found| self.near + found,
+        )
+    }
+}
+
+/// Keeps the first of each set of equal grips, from grips in order; each one kept names the others.
+fn merge(grips: Vec<(f64, RankedGrip)>, centre_of_mass: DVec3) -> Vec<(f64, RankedGrip)> {
+    let mut kept: Vec<(f64, RankedGrip)> = Vec::with_capacity(grips.len());
+    let mut families = Families::default();
+    for (score, mut grip) in grips {
+        let family = families.take(score, &grip, centre_of_mass);
+        if let Some((_, first)) = kept.get_mut(family) {
+            first.merged.push(grip.grip.id);
         } else {
             grip.merged.clear();
-            shapes.push(shape);
             kept.push((score, grip));
         }
     }
     kept
+}
+
+/// For each of the ranked `grips`, best first, the id of the first one that it equals: a symmetry of
+/// the part maps them to each other, or exchanging the jaws does. Its own id where it is the first.
+pub fn families(grips: &[RankedGrip], centre_of_mass: DVec3) -> Vec<u64> {
+    let mut families = Families::default();
+    let mut firsts: Vec<u64> = Vec::new();
+    let family = |grip: &RankedGrip| {
+        let score = grip.score.unwrap_or(f64::INFINITY);
+        let family = families.take(score, grip, centre_of_mass);
+        if family == firsts.len() {
+            firsts.push(grip.grip.id);
+        }
+        firsts[family]
+    };
+    grips.iter().map(family).collect()
 }
 
 /// At most `top` of the ranked `grips` that differ in place, approach and face pair, best first.

@@ -202,6 +202,9 @@ pub struct Selection {
     /// Beside the score the evaluation function of the earlier method, with these weights.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub compare: Option<EarlierWeights>,
+    /// Candidates that are no grips to keep as a sample, shared among the reasons as evenly as their
+    /// counts allow.
+    pub negatives: usize,
 }
 
 /// Where the answer goes.
@@ -308,6 +311,7 @@ impl Default for Selection {
             pose_noise: None,
             noise_samples: 64,
             compare: None,
+            negatives: 0,
         }
     }
 }
@@ -330,6 +334,8 @@ impl Default for Output {
 const KEEP: usize = 10_000;
 /// Most displaced poses for each grip.
 const MOST_SAMPLES: u32 = 1_000_000;
+/// Most poses that are no grips in a result.
+const MOST_NEGATIVES: usize = 1_000_000;
 
 impl Request {
     /// A request for this part and gripper with the default of every other option. Most loads need
@@ -478,6 +484,14 @@ impl Selection {
                 format!("give 1 to {MOST_SAMPLES}"),
             )
             .with_options(&["noise_samples"]));
+        }
+        if self.negatives > MOST_NEGATIVES {
+            return Err(Error::input(
+                "negatives",
+                format!("is {}", self.negatives),
+                format!("give at most {MOST_NEGATIVES}"),
+            )
+            .with_options(&["negatives"]));
         }
         if let Some(EarlierWeights { k1, k2, k3, epsilon }) = self.compare {
             for weight in [k1, k2, k3] {

@@ -14,7 +14,7 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::mechanics::curved::{FaceAnswer, Note};
-use crate::model::{Bounds, Grip, Pressure, Slip, Status, Wrench};
+use crate::model::{Bounds, Grip, Negative, Pressure, Slip, Status, Wrench};
 use crate::part::MassProperties;
 use crate::request::Request;
 use crate::units::{Force, Length};
@@ -45,6 +45,9 @@ pub struct GripSet {
     pub loads: Vec<LoadCase>,
     /// What was proposed, and why the others fell.
     pub summary: Summary,
+    /// A sample of the candidates that are no grips, when asked for, in the order of their ids.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub negatives: Vec<Negative>,
     /// Best first: those that hold, then those that slip.
     pub grips: Vec<RankedGrip>,
 }

@@ -44,9 +44,10 @@ if [ -n "${GRIPFAST_BROWSER:-}" ] && ! [ viewer/node_modules/.package-lock.json 
 fi
 
 # Independent readers of the export formats.
-if [ ! -x target/readers/bin/python ]; then
+if ! cmp -s tests/readers/requirements.txt target/readers/requirements.txt; then
     python3 -m venv target/readers
     target/readers/bin/pip install -q --disable-pip-version-check -r tests/readers/requirements.txt
+    cp tests/readers/requirements.txt target/readers/requirements.txt
 fi
 export GRIPFAST_PYTHON="$PWD/target/readers/bin/python"
 
@@ -71,3 +72,24 @@ cargo test --workspace --features "$features" --no-fail-fast
 for example in plan_a_part own_contacts own_loads own_gripper; do
     "${CARGO_TARGET_DIR:-target}/debug/examples/$example" >/dev/null
 done
+
+# The Python package: the wheel alone in a clean environment, then its tests beside what they read
+# results with.
+if [ ! -x target/maturin/bin/maturin ]; then
+    python3 -m venv target/maturin
+    target/maturin/bin/pip install -q --disable-pip-version-check "maturin>=1.9.4,<2"
+fi
+rm -rf target/wheels target/clean
+export PYO3_PYTHON="$PWD/target/maturin/bin/python"
+target/maturin/bin/maturin build -q -m python/Cargo.toml --features full,shared --out target/wheels
+python3 -m venv target/clean
+target/clean/bin/pip install -q --disable-pip-version-check target/wheels/gripfast-*.whl
+target/clean/bin/python -c 'import gripfast; assert len(gripfast.plan("data/parts/hex_nut.stl", "generic", mass="9g", spacing="6mm")) > 0'
+if ! cmp -s python/tests/requirements.txt target/pytest/requirements.txt; then
+    python3 -m venv target/pytest
+    target/pytest/bin/pip install -q --disable-pip-version-check -r python/tests/requirements.txt
+    cp python/tests/requirements.txt target/pytest/requirements.txt
+fi
+target/pytest/bin/pip install -q --disable-pip-version-check --force-reinstall --no-deps target/wheels/gripfast-*.whl
+export GRIPFAST_PROGRAM="${CARGO_TARGET_DIR:-target}/debug/gripfast"
+target/pytest/bin/pytest -q -rs python/tests

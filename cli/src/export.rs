@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args as ClapArgs;
-use gripfast::export::{self, Convention, Format, Joint, Options, Origin};
+use gripfast::export::{self, Convention, Dialect, Format, Joint, Options, Origin};
 use gripfast::part::{Part, ReadOptions, Unit};
 use gripfast::plan::GLB_TOP;
 use gripfast::results::{GripSet, PadFriction};
@@ -20,7 +20,7 @@ use crate::choice::ChoiceArgs;
 gripfast export a.json b.json -o all.csv --holding --diverse --top 20\n  \
 gripfast export grips.json --format isaac_grasp -o grips.yaml --joint panda_finger_joint1:0.5 --origin 103.4mm\n  \
 gripfast export grips.json --format moveit -o -\n\nFORMATS (docs/formats.md describes each field):\n  \
-json, jsonl   native          csv, parquet  a table\n  isaac_grasp   YAML            graspgen      JSON\n  moveit        YAML            graspnet      .npz\n  acronym       HDF5            glb           part with grippers, to look at"
+json, jsonl   native          csv, parquet  a table\n  isaac_grasp   YAML            graspgen      JSON\n  moveit        YAML            graspnet      .npz\n  acronym       HDF5            glb           part with grippers, to look at\n  usd           OpenUSD text      intrinsic     JSON\n  robot         mm and the angles of --dialect"
 )]
 pub(crate) struct Args {
     /// Result file written by `gripfast plan -o`, JSON or JSON Lines. Several go into one table (csv,
@@ -67,7 +67,11 @@ pub(crate) struct Args {
     /// first, so that a name from a file is never calculated.
     #[arg(long)]
     spreadsheet: bool,
-    /// The part's mesh (glb); the file named in the result when not given.
+    /// Angles of the robot: ur (rotation vector), kuka (A, B, C), abb (quaternion) or fanuc (W, P, R)
+    /// (robot).
+    #[arg(long, value_name = "NAME", default_value = "ur")]
+    dialect: String,
+    /// The part's mesh (glb, usd); the file named in the result when not given.
     #[arg(long, value_name = "FILE")]
     part: Option<PathBuf>,
 }
@@ -135,7 +139,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         .with_safety(args.safety)
         .with_approach(length("--approach-distance", &args.approach_distance)?)
         .with_part_frame(args.part_frame.clone())
-        .with_spreadsheet(args.spreadsheet);
+        .with_spreadsheet(args.spreadsheet)
+        .with_dialect(Dialect::parse("--dialect", &args.dialect)?);
     let mut filter = args.choice.filter();
     let mut sets = Vec::with_capacity(args.grips.len());
     for file in &args.grips {
@@ -173,10 +178,8 @@ fn write(args: &Args, sets: &[GripSet], format: Format, options: &Options) -> an
         }
         return Ok(export::write_tables(sets, format, &args.output, options)?);
     };
-    let part = match format {
-        Format::Glb => Some(read_part(set, file, args.part.as_deref())?),
-        _ => None,
-    };
+    let part =
+        if format.draws() { Some(read_part(set, file, args.part.as_deref())?) } else { None };
     let mesh = part.as_ref().map(|part| &part.mesh);
     if to_stdout {
         export::write_to(set, format, &mut output, options, mesh)?;

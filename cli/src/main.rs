@@ -15,6 +15,7 @@ macro_rules! words {
 
 mod assess;
 mod backend;
+mod batch;
 mod bench;
 mod choice;
 mod defaults;
@@ -57,6 +58,7 @@ struct Cli {
 enum Command {
     Plan(Box<plan::Args>),
     Assess(Box<assess::AssessArgs>),
+    Batch(Box<batch::Args>),
     Part(part::Args),
     Solve(solve::Args),
     Why(why::Args),
@@ -146,6 +148,7 @@ fn run() -> ExitCode {
                 Command::Part(args) => part::run(args),
                 Command::Plan(args) => plan::run(*args),
                 Command::Assess(args) => assess::run(*args),
+                Command::Batch(args) => batch::run(*args),
                 Command::Solve(args) => solve::run(args),
                 Command::Why(args) => why::run(args),
                 Command::Score(args) => score::run(args),

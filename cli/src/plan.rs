@@ -20,7 +20,8 @@ use super::why;
 use crate::terminal;
 use watch::Watch;
 
-pub(crate) use flags::{Args, share, with_defaults};
+pub(crate) use flags::{Args, JobArgs, share, with_defaults};
+pub(crate) use watch::Interrupt;
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (why, print) = (args.why(), args.print_request);
@@ -51,7 +52,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !plan.request().output.yes && !agreed(&plan.ahead()?)? {
         return Ok(ExitCode::from(2));
     }
-    let interrupt = watch::Interrupt::watched()?;
+    let interrupt = Interrupt::watched()?;
     let outcome = plan.run(&mut watch, &interrupt.stop);
     watch.end();
     let outcome = outcome?;

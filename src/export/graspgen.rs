@@ -40,14 +40,37 @@ struct Notes<'a> {
 
 pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result<()> {
     let grips = view.grips();
+    // The candidates that are no grips come after the grips.
+    let negatives = &view.set.negatives;
     let file = File {
         object: Object { file: &view.set.part.file, scale: view.set.part.unit_m },
         grasps: Grasps {
-            transforms: grips.iter().map(|grip| matrix(&view.pose(grip))).collect(),
-            object_in_gripper: grips.iter().map(|grip| view.holds(grip)).collect(),
-            width: grips.iter().map(|grip| view.gap(grip)).collect(),
-            min_friction: grips.iter().map(|grip| grip.worst.mu_s).collect(),
-            id: grips.iter().map(|grip| grip.grip.id).collect(),
+            transforms: grips
+                .iter()
+                .map(|grip| view.pose(grip))
+                .chain(negatives.iter().map(|pose| view.negative_pose(pose)))
+                .map(|frame| matrix(&frame))
+                .collect(),
+            object_in_gripper: grips
+                .iter()
+                .map(|grip| view.holds(grip))
+                .chain(negatives.iter().map(|_| false))
+                .collect(),
+            width: grips
+                .iter()
+                .map(|grip| view.gap(grip))
+                .chain(negatives.iter().map(|pose| view.gap_at(&pose.grip())))
+                .collect(),
+            min_friction: grips
+                .iter()
+                .map(|grip| grip.worst.mu_s)
+                .chain(negatives.iter().map(|_| None))
+                .collect(),
+            id: grips
+                .iter()
+                .map(|grip| grip.grip.id)
+                .chain(negatives.iter().map(|pose| pose.id))
+                .collect(),
         },
         gripfast: Notes {
             tool_frame: view.tool_frame(),

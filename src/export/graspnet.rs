@@ -63,12 +63,32 @@ pub(super) fn write(view: &View<'_>, writer: &mut impl Write) -> std::io::Result
         api_scores.iter().map(|value| value.to_le_bytes()),
     )?;
     array(&mut archive, "ids", "<u8", &[grips.len()], ids.iter().map(|value| value.to_le_bytes()))?;
-    // A NumPy text: four bytes for each character.
-    let frame = view.tool_frame();
-    let kind = format!("<U{}", frame.chars().count());
-    let letters = frame.chars().map(|letter| u32::from(letter).to_le_bytes());
-    array(&mut archive, "tool_frame", &kind, &[], letters)?;
+    let poses: Vec<f64> = grips
+        .iter()
+        .flat_map(|grip| super::matrix(&view.pose(grip)).into_iter().flatten())
+        .collect();
+    let poses = poses.iter().map(|value| value.to_le_bytes());
+    array(&mut archive, "poses", "<f8", &[grips.len(), 4, 4], poses)?;
+    for (name, value) in [
+        ("part_file", view.set.part.file.as_str()),
+        ("gripper_name", view.name()),
+        ("tool_frame", &view.tool_frame()),
+    ] {
+        text(&mut archive, name, value)?;
+    }
     writer.write_all(archive.finish().map_err(std::io::Error::other)?.get_ref())
+}
+
+/// A text without dimensions: NumPy holds it as characters of four bytes.
+fn text<W: Write + Seek>(
+    archive: &mut zip::ZipWriter<W>,
+    name: &str,
+    value: &str,
+) -> std::io::Result<()> {
+    // NumPy has no text of length zero.
+    let value = if value.is_empty() { " " } else { value };
+    let kind = format!("<U{}", value.chars().count());
+    array(archive, name, &kind, &[], value.chars().map(|sign| u32::from(sign).to_le_bytes()))
 }
 
 /// One member of the archive in NumPy's format 1.0: magic, version, header length, a Python

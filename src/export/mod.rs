@@ -4,27 +4,33 @@
 //! [`Origin`], metres, right-handed.
 
 mod acronym;
+mod columns;
 mod glb;
 mod graspgen;
 mod graspnet;
+mod intrinsic;
 mod isaac;
 mod moveit;
 mod parquet;
+mod robot;
 mod table;
 mod tool;
+mod usd;
 mod yaml;
 
 use std::io::Write;
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::gripper::Gripper;
-use crate::model::Frame;
+use crate::model::{Frame, Grip, Negative};
 use crate::part::Mesh;
 use crate::results::{GripSet, PadFriction, RankedGrip, Verdict};
 
+pub use columns::negatives_table;
+pub use robot::Dialect;
 pub use table::{Column, Table, Values, table};
 pub use tool::{Convention, Joint, Origin, Stated, grip_from_tool, tool_in_grip};
 
@@ -54,11 +60,17 @@ pub enum Format {
     Acronym,
     /// Binary glTF: the part with grippers in place.
     Glb,
+    /// OpenUSD text: the part with SimReady's grasp identifiers.
+    Usd,
+    /// Intrinsic's `ManualGraspAnnotations` as JSON.
+    Intrinsic,
+    /// Poses in millimetres with the angles of a robot maker, see [`Dialect`].
+    Robot,
 }
 
 impl Format {
     /// Every format with its name on the command line and the file endings that stand for it.
-    pub const ALL: [(Self, &'static str, &'static [&'static str]); 10] = [
+    pub const ALL: [(Self, &'static str, &'static [&'static str]); 13] = [
         (Self::Json, "json", &[".json"]),
         (Self::JsonLines, "jsonl", &[".jsonl", ".ndjson"]),
         (Self::Csv, "csv", &[".csv"]),
@@ -69,6 +81,9 @@ impl Format {
         (Self::GraspNet, "graspnet", &[".npz"]),
         (Self::Acronym, "acronym", &[".h5", ".hdf5"]),
         (Self::Glb, "glb", &[".glb"]),
+        (Self::Usd, "usd", &[".usda"]),
+        (Self::Intrinsic, "intrinsic", &[".intrinsic.json"]),
+        (Self::Robot, "robot", &[".robot.csv"]),
     ];
 
     /// The format of this name.
@@ -120,6 +135,11 @@ impl Format {
             })
     }
 
+    /// Whether this format draws the part: [`write()`] wants its mesh.
+    pub fn draws(self) -> bool {
+        matches!(self, Self::Glb | Self::Usd)
+    }
+
     /// Tool axes that readers of this format expect.
     pub fn convention(self) -> Convention {
         match self {
@@ -166,6 +186,8 @@ pub struct Options {
     pub part_frame: String,
     /// Texts of a CSV table that a spreadsheet would take for a formula get an apostrophe first.
     pub spreadsheet: bool,
+    /// Angles of the robot (robot).
+    pub dialect: Dialect,
 }
 
 setters!(Options {
@@ -179,6 +201,7 @@ setters!(Options {
     with_approach: approach: f64,
     with_part_frame: part_frame: String,
     with_spreadsheet: spreadsheet: bool,
+    with_dialect: dialect: Dialect,
 });
 
 impl Default for Options {
@@ -194,6 +217,7 @@ impl Default for Options {
             approach: 0.1,
             part_frame: "part".into(),
             spreadsheet: false,
+            dialect: Dialect::default(),
         }
     }
 }
@@ -256,35 +280,56 @@ impl<'a> View<'a> {
 
     /// The tool frame in the part frame.
     fn pose(&self, grip: &RankedGrip) -> Frame {
-        let mut pose = grip.grip.part_from_grip.compose(&self.grip_from_tool(grip));
-        let axes = [
-            &mut pose.rotation.x_axis,
-            &mut pose.rotation.y_axis,
-            &mut pose.rotation.z_axis,
-            &mut pose.origin,
-        ];
-        axes.into_iter().for_each(|vector| *vector = tidy(*vector));
-        pose
+        tidied(grip.grip.part_from_grip.compose(&self.grip_from_tool(grip)))
+    }
+
+    /// The tool frame in the part frame of a candidate that is no grip.
+    fn negative_pose(&self, pose: &Negative) -> Frame {
+        let tool = match (self.options.origin, &self.gripper) {
+            (Origin::Stated(_), Some(gripper)) => {
+                gripper.palm_place(gripper.jaw_gap(&pose.grip())).compose(&self.grip_from_tool)
+            }
+            _ => self.grip_from_tool,
+        };
+        tidied(pose.part_from_grip.compose(&tool))
     }
 
     /// Distance of the pads in the grip \[m\].
     fn gap(&self, grip: &RankedGrip) -> f64 {
-        self.gripper.as_ref().map_or(grip.grip.width, |gripper| gripper.jaw_gap(&grip.grip))
+        self.gap_at(&grip.grip)
+    }
+
+    /// As [`View::gap`], of any pose.
+    fn gap_at(&self, grip: &Grip) -> f64 {
+        self.gripper.as_ref().map_or(grip.width, |gripper| gripper.jaw_gap(grip))
     }
 
     /// Distance of the pads before closing \[m\]: as asked for, as planned, or as far as the stroke
     /// allows.
     fn opened(&self, grip: &RankedGrip) -> f64 {
-        let gap = self.gap(grip);
+        self.opened_at(&grip.grip)
+    }
+
+    /// As [`View::opened`], of any pose.
+    fn opened_at(&self, grip: &Grip) -> f64 {
+        let gap = self.gap_at(grip);
         match (self.options.opening, &self.gripper) {
-            (Some(opened), _) if grip.grip.inside => opened.min(gap),
+            (Some(opened), _) if grip.inside => opened.min(gap),
             (Some(opened), _) => opened.max(gap),
             (None, Some(gripper)) => {
                 let planned = self.set.provenance.request.candidates.opening;
-                gripper.opened_gap(&grip.grip, planned.0)
+                gripper.opened_gap(grip, planned.0)
             }
             (None, None) => gap,
         }
+    }
+
+    /// Whether half a turn about the tool's z axis exchanges the jaws: it is the approach, through
+    /// the middle of the pads.
+    fn turns_about_the_tool_axis(&self) -> bool {
+        let tool = &self.grip_from_tool;
+        (tool.rotation.z_axis - DVec3::X).length() < 1e-9
+            && DVec2::new(tool.origin.y, tool.origin.z).length() < 1e-9
     }
 
     /// What the pads give and what is asked of them.
@@ -342,6 +387,18 @@ fn tidy(vector: DVec3) -> DVec3 {
     vector.map(|value| if value.abs() < ROUNDING { 0.0 } else { value })
 }
 
+/// A frame whose numbers are tidy.
+fn tidied(mut pose: Frame) -> Frame {
+    let axes = [
+        &mut pose.rotation.x_axis,
+        &mut pose.rotation.y_axis,
+        &mut pose.rotation.z_axis,
+        &mut pose.origin,
+    ];
+    axes.into_iter().for_each(|vector| *vector = tidy(*vector));
+    pose
+}
+
 /// Rows of the homogeneous matrix of a frame.
 fn matrix(frame: &Frame) -> [[f64; 4]; 4] {
     let r = frame.rotation.transpose();
@@ -355,7 +412,7 @@ fn matrix(frame: &Frame) -> [[f64; 4]; 4] {
 }
 
 /// Writes `set` to `path`, whole or not at all. `part` is the part's mesh, which only
-/// [`Format::Glb`] draws.
+/// formats that draw it need ([`Format::draws`]).
 ///
 /// # Errors
 /// When the format is not built in, needs something that the set lacks (a gripper that can be read,
@@ -466,6 +523,18 @@ pub fn tool_frame(set: &GripSet, format: Format, options: &Options) -> Result<Op
     }
 }
 
+/// The content of a Parquet file (Zstandard) with these columns.
+///
+/// # Errors
+/// When Parquet is not built in.
+pub fn parquet_file(table: &Table) -> Result<Vec<u8>> {
+    check(Format::Parquet)?;
+    let mut content = Vec::new();
+    parquet::write(table, &serde_json::Value::Null, &mut content)
+        .map_err(|error| Error::io(Path::new("parquet"), "write", error))?;
+    Ok(content)
+}
+
 /// Refuses a format that this build lacks, before anything is computed or written.
 ///
 /// # Errors
@@ -512,5 +581,8 @@ fn write_view(
         Format::GraspNet => graspnet::write(view, writer),
         Format::Acronym => acronym::write(view, writer),
         Format::Glb => glb::write(view, writer, part),
+        Format::Usd => usd::write(view, writer, part),
+        Format::Intrinsic => intrinsic::write(view, writer),
+        Format::Robot => table::write_csv(&robot::table(view), view.options.spreadsheet, writer),
     }
 }

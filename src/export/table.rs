@@ -76,7 +76,7 @@ impl Values {
 impl Table {
     /// Adds the rows of another table below; a column that only one of them has is empty in the
     /// rows of the other.
-    pub(super) fn append(&mut self, other: Self) {
+    pub fn append(&mut self, other: Self) {
         let rows = self.rows;
         for column in other.columns {
             match self.columns.iter_mut().find(|known| known.name == column.name) {

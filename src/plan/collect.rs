@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use crate::model::Negative;
+use crate::propose::scatter;
 use crate::rank::{self, Ranking, Weights};
 use crate::results::{PadFriction, RankedGrip};
 
@@ -25,9 +27,21 @@ pub struct Collector {
     /// Of these, those that do not slip.
     holding: u64,
     rejections: BTreeMap<String, u64>,
+    /// Grips that do not hold kept for each reason, at most.
+    #[serde(default)]
+    sample: usize,
+    /// A sample of these by reason, by their [`scatter`] numbers.
+    #[serde(default)]
+    lost: BTreeMap<String, Vec<Negative>>,
 }
 
 impl Collector {
+    /// One that also keeps some grips that do not hold: `sample` for each reason at most, the same
+    /// ones in whatever chunks they come.
+    pub fn sampling(sample: usize) -> Self {
+        Self { sample, ..Self::default() }
+    }
+
     /// Takes a chunk; afterwards at most `2 keep` grips, those that tie with them, and the chunk
     /// are held. Grips that slip fall first.
     pub fn add(
@@ -48,7 +62,9 @@ impl Collector {
                     self.kept.push(grip);
                 }
                 None => {
-                    *self.rejections.entry(rank::status_name(grip.worst.status)).or_default() += 1
+                    let reason = rank::status_name(grip.worst.status);
+                    *self.rejections.entry(reason.clone()).or_default() += 1;
+                    self.lose(&grip, reason);
                 }
             }
         }
@@ -61,6 +77,25 @@ impl Collector {
             self.kept.truncate(self.kept.partition_point(|grip| merit(grip) >= least));
             self.full = 2 * self.kept.len();
         }
+    }
+
+    /// Keeps a grip that does not hold if it belongs to the sample.
+    fn lose(&mut self, grip: &RankedGrip, reason: String) {
+        if self.sample == 0 {
+            return;
+        }
+        let lost = self.lost.entry(reason.clone()).or_default();
+        let key = scatter(grip.grip.id);
+        let place = lost.partition_point(|known| scatter(known.id) < key);
+        if place < self.sample {
+            lost.insert(place, Negative::new(&grip.grip, reason));
+            lost.truncate(self.sample);
+        }
+    }
+
+    /// The sample of the grips that do not hold, by reason.
+    pub fn take_lost(&mut self) -> BTreeMap<String, Vec<Negative>> {
+        std::mem::take(&mut self.lost)
     }
 
     /// Counts grips of a chunk that were left unsolved because they cannot be among the best.

@@ -102,6 +102,7 @@ impl Plan {
                 ("seeds", json!(self.seeds.len())),
                 ("keep", json!(self.request.kept())),
                 ("ids", json!(self.request.selection.ids)),
+                ("negatives", json!(self.request.selection.negatives)),
             ]
             .map(|(name, value)| (name.to_owned(), value)),
         )
@@ -128,6 +129,8 @@ pub(super) struct Search<'a> {
     pub(super) race: bool,
     /// Only these candidates are scored.
     pub(super) ids: Option<&'a [u64]>,
+    /// Grips that do not hold to keep for each reason.
+    pub(super) sample: usize,
     pub(super) partial: Option<&'a Partial>,
     pub(super) resume: bool,
 }
@@ -147,7 +150,7 @@ impl Search<'_> {
         stop: &AtomicBool,
     ) -> Result<Found> {
         let mut found = Found {
-            collector: Collector::default(),
+            collector: Collector::sampling(self.sample),
             complete: true,
             backend: self.assessor.backend.name(),
             checkpoint: None,

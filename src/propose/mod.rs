@@ -15,6 +15,7 @@ mod interference;
 mod options;
 mod patch;
 mod proposer;
+mod sample;
 mod site;
 mod work;
 
@@ -23,3 +24,4 @@ pub use explain::{Check, Explanation, SiteInfo};
 pub use fit::{Fit, Misfit};
 pub use options::{Cone, Ground, ProposeOptions, Rejection};
 pub use proposer::{Chunk, Progress, Proposer, Tally};
+pub use sample::scatter;

@@ -172,7 +172,7 @@ impl Proposer<'_> {
 
     /// Leaves in `buffers.alive` the item's positions without a reason against them, and counts the
     /// others.
-    fn survivors(
+    pub(super) fn survivors(
         &self,
         item: &Item,
         prepared: &Prepared<'_>,

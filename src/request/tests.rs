@@ -61,6 +61,7 @@ keep = 77
 pose_noise = "1mm,2deg"
 noise_samples = 9
 compare = "1,2,3,4mm"
+negatives = 20
 
 [output]
 output = "grips.json"

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{FORMAT, GripSet, LoadCase, PartSummary, Provenance, RankedGrip, Summary, VERSION};
 use crate::error::{Error, Result};
+use crate::model::{Frame, Negative};
 
 /// Largest departure of a pose from a rotation that is taken for rounding.
 const ROTATION_TOLERANCE: f64 = 1e-6;
@@ -30,6 +31,8 @@ struct Head<'a> {
     gripper: &'a serde_json::Value,
     loads: &'a [LoadCase],
     summary: &'a Summary,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    negatives: &'a [Negative],
 }
 
 impl GripSet {
@@ -48,6 +51,7 @@ impl GripSet {
             gripper,
             loads,
             summary: Summary::default(),
+            negatives: Vec::new(),
             grips: Vec::new(),
         }
     }
@@ -124,12 +128,7 @@ impl GripSet {
                     "write the file again with `gripfast plan`",
                 )
             };
-            let pose = ranked.grip.part_from_grip;
-            let drift = pose.rotation * pose.rotation.transpose() - DMat3::IDENTITY;
-            if !(drift.to_cols_array().iter().all(|entry| entry.abs() <= ROTATION_TOLERANCE)
-                && pose.rotation.determinant() > 0.0
-                && pose.origin.is_finite())
-            {
+            if !is_pose(&ranked.grip.part_from_grip) {
                 return Err(wrong("part_from_grip is not a rotation and an origin".into()));
             }
             if !(ranked.grip.width.is_finite() && ranked.grip.width >= 0.0) {
@@ -157,7 +156,14 @@ impl GripSet {
                 )));
             }
         }
-        Ok(())
+        match self.negatives.iter().find(|pose| !is_pose(&pose.part_from_grip)) {
+            None => Ok(()),
+            Some(pose) => Err(Error::input(
+                format!("{place}, negatives (id {})", pose.id),
+                "part_from_grip is not a rotation and an origin",
+                "write the file again with `gripfast plan`",
+            )),
+        }
     }
 
     /// Writes native JSON, a line per grip, whole or not at all.
@@ -191,6 +197,9 @@ impl GripSet {
         field(writer, "gripper", head.gripper)?;
         field(writer, "loads", &head.loads)?;
         field(writer, "summary", head.summary)?;
+        if !head.negatives.is_empty() {
+            field(writer, "negatives", &head.negatives)?;
+        }
         writer.write_all(b"\"grips\": [")?;
         for (index, grip) in self.grips.iter().enumerate() {
             writer.write_all(if index == 0 { b"\n" } else { b",\n" })?;
@@ -228,6 +237,7 @@ impl GripSet {
             gripper: &self.gripper,
             loads: &self.loads,
             summary: &self.summary,
+            negatives: &self.negatives,
         }
     }
 
@@ -284,6 +294,14 @@ impl GripSet {
             )),
         }
     }
+}
+
+/// Whether a frame is a rotation, up to rounding, and an origin.
+fn is_pose(frame: &Frame) -> bool {
+    let drift = frame.rotation * frame.rotation.transpose() - DMat3::IDENTITY;
+    drift.to_cols_array().iter().all(|entry| entry.abs() <= ROTATION_TOLERANCE)
+        && frame.rotation.determinant() > 0.0
+        && frame.origin.is_finite()
 }
 
 fn field(writer: &mut impl Write, name: &str, value: &impl Serialize) -> std::io::Result<()> {

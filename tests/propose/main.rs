@@ -6,6 +6,7 @@ mod bodies;
 mod curved;
 mod interference;
 mod motion;
+mod negatives;
 mod options;
 mod parts;
 mod places;

@@ -11,7 +11,8 @@ data = h5py.File(sys.argv[1], "r")
 transforms = numpy.array(data["grasps/transforms"])
 success = numpy.array(data["grasps/qualities/flex/object_in_gripper"])
 own = data["grasps/qualities/gripfast"]
-rows = zip(own["id"][()], transforms, own["width"][()], own["min_friction"][()])
+friction = [None if numpy.isnan(value) else value for value in own["min_friction"][()]]
+rows = zip(own["id"][()], transforms, own["width"][()], friction)
 grips = [grip(id, matrix[:3, 3], matrix[:3, :3], width, mu_s) for id, matrix, width, mu_s in rows]
 report(
     grips,

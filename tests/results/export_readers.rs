@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use glam::{DMat3, DVec3};
-use gripfast::export::{self, Convention, Format, Joint, Options, Origin, Stated};
+use gripfast::export::{self, Convention, Dialect, Format, Joint, Options, Origin, Stated};
+use gripfast::model::Negative;
 use gripfast::part::Mesh;
 use gripfast::results::GripSet;
 use serde_json::Value;
@@ -422,5 +423,135 @@ fn glb() {
         let (low, high) = (numbers(&finger[0]), numbers(&finger[1]));
         assert!((low[2] + 0.04).abs() < 1e-7 && (high[2] - 0.01).abs() < 1e-7, "{low:?} {high:?}");
         assert!(low[1] > 0.0 || high[1] < 0.0);
+    }
+}
+
+#[test]
+fn usd() {
+    let set = grips::grip_set(12);
+    for options in
+        [Options::default(), Options::default().with_convention(Some(Convention::GraspGen))]
+    {
+        let Some(found) =
+            round_trip(&set, Format::Usd, "grips.usda", ("read_usd.py", "pxr"), &options, 1e-15)
+        else {
+            return;
+        };
+        assert!((found["volume"].as_f64().unwrap() - 4.8e-5).abs() < 1e-11);
+        assert_eq!(
+            (&found["part"], &found["names"][1]),
+            (&"box.stl".into(), &"grasp_identifier_01".into())
+        );
+        for (line, grip) in found["lines"].as_array().unwrap().iter().zip(&set.grips) {
+            let [low, high] = [0, 1].map(|end: usize| DVec3::from_slice(&numbers(&line[end])));
+            let frame = &grip.grip.part_from_grip;
+            // Along the closing axis, through the middle of the grip, from beyond face to beyond face.
+            assert!(((low + high) / 2.0 - frame.origin).length() < 1e-8, "points are f32");
+            let along = (high - low).dot(frame.rotation.z_axis);
+            assert!((along - (high - low).length()).abs() < 1e-8 && along > grip.grip.width);
+        }
+    }
+}
+
+#[test]
+fn intrinsic() {
+    // Its messages hold no ids: the reader numbers the grips.
+    let mut set = grips::grip_set(5);
+    for (place, grip) in set.grips.iter_mut().enumerate() {
+        grip.grip.id = place as u64;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("grips.intrinsic.json");
+    let options = Options::default();
+    export::write(&set, Format::Intrinsic, &path, &options, None).unwrap();
+    let Some(mut found) = read("read_intrinsic.py", "google.protobuf", &path) else { return };
+    for (row, grip) in found["grips"].as_array_mut().unwrap().iter_mut().zip(&set.grips) {
+        row["width"] = grip.grip.width.into();
+    }
+    compare(&found, &set, Format::Intrinsic, "intrinsic", &options, 1e-15);
+    let scores = numbers(&found["scores"]);
+    assert!(scores.windows(2).all(|pair| pair[0] > pair[1]) && scores[0] <= 1.0, "{scores:?}");
+    let rotations = numbers(&found["rotations"]);
+    assert!(rotations.iter().all(|&turns| turns == 1.0 || turns == 2.0), "{rotations:?}");
+    // Away from the axis of the approach half a turn is another place.
+    let options = options.with_convention(Some(Convention::GraspNet));
+    export::write(&set, Format::Intrinsic, &path, &options, None).unwrap();
+    let found = read("read_intrinsic.py", "google.protobuf", &path).unwrap();
+    assert_eq!(numbers(&found["rotations"]), [1.0; 5]);
+}
+
+#[test]
+fn robot() {
+    let set = grips::grip_set(7);
+    for (dialect, name) in Dialect::ALL {
+        let options = Options::default().with_dialect(dialect).with_origin(Origin::Behind(0.05));
+        let reader = ("read_robot.py", "numpy");
+        let Some(found) =
+            round_trip(&set, Format::Robot, "grips.robot.csv", reader, &options, 1e-14)
+        else {
+            return;
+        };
+        assert_eq!(found["part"][0], "box.stl", "{name}");
+        let columns = found["columns"].as_array().unwrap();
+        assert_eq!(columns[5], dialect.columns()[0]);
+    }
+}
+
+#[test]
+fn files_for_many_parts_name_part_gripper_and_frame() {
+    let set = grips::grip_set(2);
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, format: Format| {
+        let path = folder.path().join(name);
+        export::write(&set, format, &path, &Options::default(), None).unwrap();
+        path
+    };
+    let csv = std::fs::read_to_string(write("grips.csv", Format::Csv)).unwrap();
+    let name = set.gripper["name"].as_str().unwrap().replace('"', "\"\"");
+    assert!(csv.lines().nth(1).unwrap().contains("box.stl") && csv.contains(&name), "{csv}");
+    let npz = write("grips.npz", Format::GraspNet);
+    let python = match python("numpy") {
+        Ok(python) => python,
+        Err(_) => return,
+    };
+    let code = "import numpy, sys; d = numpy.load(sys.argv[1]); print(d['part_file'], d['poses'].shape, d['tool_frame'], d['gripper_name'])";
+    let output = Command::new(python).args(["-c", code]).arg(npz).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        text.starts_with("box.stl (2, 4, 4) x approach, y closing")
+            && text.contains(set.gripper["name"].as_str().unwrap()),
+        "{text} {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+}
+
+#[cfg(feature = "hdf5")]
+#[test]
+fn candidates_that_are_no_grips_are_failures_of_the_label_formats() {
+    let mut set = grips::grip_set(3);
+    for id in [50, 51] {
+        let mut pose = set.grips[1].grip.clone();
+        (pose.id, pose.width) = (id, 0.03);
+        pose.part_from_grip.origin.x += 0.01;
+        set.negatives.push(Negative::new(&pose, format!("reason {id}")));
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for (format, file, reader, package) in [
+        (Format::Acronym, "grips.h5", "read_acronym.py", "h5py"),
+        (Format::GraspGen, "grips.graspgen.json", "read_graspgen.py", "json"),
+    ] {
+        let path = folder.path().join(file);
+        export::write(&set, format, &path, &Options::default(), None).unwrap();
+        let Some(found) = read(reader, package, &path) else { return };
+        let ids: Vec<u64> = found["grips"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|row| row["id"].as_u64().unwrap())
+            .collect();
+        assert_eq!(ids, [7, 8, 9, 50, 51], "{file}");
+        assert_eq!(found["held"], serde_json::json!([true, true, true, false, false]), "{file}");
+        let x = numbers(&found["grips"][3]["position"])[0];
+        assert!((x - set.negatives[0].part_from_grip.origin.x).abs() < 1e-15);
     }
 }

@@ -34,6 +34,28 @@ pub(crate) struct Args {
     /// shown beside the others.
     #[arg(long, short, required_unless_present = "request")]
     gripper: Vec<String>,
+    /// Loads: gravity, gravity:-z, gravity:N, gravity-cone:-z:30deg, ball:N, ball:N:10N, FILE.csv,
+    /// joined by commas.
+    #[arg(long)]
+    loads: Option<String>,
+    /// A stored request (TOML, or JSON where the name ends in .json); flags beside it override it.
+    #[arg(long, value_name = "FILE")]
+    request: Option<PathBuf>,
+    /// Prints the request that these flags make, as TOML, and ends.
+    #[arg(long)]
+    pub(super) print_request: bool,
+
+    #[command(flatten)]
+    job: JobArgs,
+    #[command(flatten, next_help_heading = "Output")]
+    output: OutputArgs,
+    #[command(flatten, next_help_heading = "Long runs")]
+    long: LongArgs,
+}
+
+/// The flags of a job, whatever its part, gripper and loads are.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct JobArgs {
     /// Mass of the part, e.g. 350g.
     #[arg(long, conflicts_with = "density")]
     mass: Option<Mass>,
@@ -63,25 +85,13 @@ pub(crate) struct Args {
     /// Acceleration in any direction on top of gravity, e.g. 2g.
     #[arg(long)]
     accel: Option<Acceleration>,
-    /// Loads: gravity, gravity:-z, gravity:N, gravity-cone:-z:30deg, ball:N, ball:N:10N, FILE.csv,
-    /// joined by commas.
-    #[arg(long)]
-    loads: Option<String>,
-    /// A stored request (TOML, or JSON where the name ends in .json); flags beside it override it.
-    #[arg(long, value_name = "FILE")]
-    request: Option<PathBuf>,
-    /// Prints the request that these flags make, as TOML, and ends.
-    #[arg(long)]
-    pub(super) print_request: bool,
 
     #[command(flatten, next_help_heading = "Candidates")]
     candidates: CandidateArgs,
     #[command(flatten, next_help_heading = "Scoring")]
     scoring: ScoringArgs,
-    #[command(flatten, next_help_heading = "Output")]
-    output: OutputArgs,
-    #[command(flatten, next_help_heading = "Long runs")]
-    long: LongArgs,
+    #[command(flatten, next_help_heading = "Choice")]
+    choice: ChoiceArgs,
     #[command(flatten, next_help_heading = "More about each grip")]
     more: MoreArgs,
 }
@@ -201,11 +211,8 @@ struct ScoringArgs {
 }
 
 #[derive(Debug, ClapArgs)]
-struct OutputArgs {
-    /// Grips to print.
-    #[arg(long, value_name = "N")]
-    top: Option<usize>,
-    /// Print grips that differ in place, face pair and approach.
+struct ChoiceArgs {
+    /// Choose grips that differ in place, face pair and approach.
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
     diverse: Option<bool>,
     /// Lists one of the grips that a symmetry of the part maps to each other, for all of them.
@@ -214,6 +221,13 @@ struct OutputArgs {
     /// Only the candidates with these ids, e.g. 3,17 from an earlier table of the same search.
     #[arg(long, value_delimiter = ',', value_name = "IDS")]
     ids: Option<Vec<u64>>,
+}
+
+#[derive(Debug, ClapArgs)]
+struct OutputArgs {
+    /// Grips to print.
+    #[arg(long, value_name = "N")]
+    top: Option<usize>,
     /// Best grips to keep in the result file, and with --diverse that many that differ [default:
     /// 10000; with --polish top as many as --top prints].
     #[arg(long, value_name = "N")]
@@ -270,6 +284,10 @@ struct MoreArgs {
     /// correlation, and the grips whose place differs most.
     #[arg(long, value_name = "K1,K2,K3,EPSILON", num_args = 0..=1, require_equals = true, default_missing_value = "")]
     compare: Option<EarlierWeights>,
+    /// Keeps this many candidates that are no grips in the result, shared among the reasons as
+    /// evenly as their counts allow: negatives for training and tests.
+    #[arg(long, value_name = "N")]
+    negatives: Option<usize>,
 }
 
 /// A share as a number or in percent.
@@ -308,18 +326,38 @@ impl Args {
             Some(path) => Request::read(path)?,
             None => Request::default(),
         };
+        if let Some(loads) = &self.loads {
+            request.loads = loads.split(',').map(|source| source.trim().to_owned()).collect();
+        }
+        give!(self => request; part);
+        if let [gripper] = &self.gripper[..] {
+            request.gripper.clone_from(gripper);
+        }
+        self.job.give(&mut request)?;
+        let (flags, long) = (self.output, self.long);
+        give!(flags => request.selection; top, keep);
+        give!(flags => request.output; output, report, json, quiet);
+        give!(long => request.output; yes, resume, checkpoint);
+        if request.output.resume && request.output.output.is_none() {
+            return Err(Error::input(
+                "--resume",
+                "needs the result file whose run it resumes",
+                "add --output FILE",
+            ));
+        }
+        Ok(request)
+    }
+}
+
+impl JobArgs {
+    /// Sets the fields of a request for which a flag was given.
+    pub(crate) fn give(self, request: &mut Request) -> gripfast::error::Result<()> {
         // One takes the place of the other.
         if self.mass.is_some() || self.density.is_some() {
             (request.mass, request.density) = (None, None);
         }
-        if let Some(loads) = &self.loads {
-            request.loads = loads.split(',').map(|source| source.trim().to_owned()).collect();
-        }
         give!(self => request;
-            part, mass, density, com, inertia, force, unit, max_memory, outside_buffers, accel);
-        if let [gripper] = &self.gripper[..] {
-            request.gripper.clone_from(gripper);
-        }
+            mass, density, com, inertia, force, unit, max_memory, outside_buffers, accel);
         let (flags, group) = (self.candidates, &mut request.candidates);
         give!(flags => group;
             spacing, angle_step, edge_angles, min_contact, min_pad_share, max_offset, approach,
@@ -335,23 +373,13 @@ impl Args {
         give!(flags => group;
             backend, adapter, seeds, k1, k2, pad_friction, safety, position_error, closing_friction,
             separation, polish, refiner, threads);
-        let (flags, more, group) = (self.output, self.more, &mut request.selection);
-        give!(flags => group; top, diverse, merge_symmetric, ids, keep);
-        give!(more => group; pose_noise, noise_samples, compare);
+        let (choice, more, group) = (self.choice, self.more, &mut request.selection);
+        give!(choice => group; diverse, merge_symmetric, ids);
+        give!(more => group; pose_noise, noise_samples, compare, negatives);
         if more.noise_samples.is_some() && group.pose_noise.is_none() {
             return Err(Error::input("--noise-samples", "needs --pose-noise", "add that flag"));
         }
-        let (long, group) = (self.long, &mut request.output);
-        give!(flags => group; output, report, json, quiet);
-        give!(long => group; yes, resume, checkpoint);
-        if group.resume && group.output.is_none() {
-            return Err(Error::input(
-                "--resume",
-                "needs the result file whose run it resumes",
-                "add --output FILE",
-            ));
-        }
-        Ok(request)
+        Ok(())
     }
 }
 
@@ -410,7 +438,7 @@ mod tests {
         --inertia 3gmm2,3gmm2,3gmm2,0gmm2,0gmm2,0gmm2 --ids 3,17 --position-error 1mm --closing-friction 0.1 --separation discard \
         --polish all --refiner shanno --threads 2 --top 3 --diverse --merge-symmetric --keep 77 \
         -o out.json --report out.html --json -q --yes --resume --checkpoint 9s --pose-noise 1mm,2deg \
-        --noise-samples 9 --compare=1,2,3,4mm";
+        --noise-samples 9 --compare=1,2,3,4mm --negatives 20";
 
     fn args(line: &str) -> Args {
         let command = crate::Cli::command();

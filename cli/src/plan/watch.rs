@@ -75,16 +75,16 @@ fn progress_bar(total: u64, quiet: bool) -> ProgressBar {
 
 /// A request to stop from outside: the run ends after the chunk in flight with what it has; a
 /// second one ends the program at once.
-pub(super) struct Interrupt {
+pub(crate) struct Interrupt {
     /// Set by the first one.
-    pub(super) stop: Arc<AtomicBool>,
+    pub(crate) stop: Arc<AtomicBool>,
     /// The exit code that it asks for, 0 without one.
     code: Arc<AtomicUsize>,
 }
 
 impl Interrupt {
     /// From now on interrupts are taken.
-    pub(super) fn watched() -> std::io::Result<Self> {
+    pub(crate) fn watched() -> std::io::Result<Self> {
         use signal_hook::consts::{SIGINT, SIGTERM};
         use signal_hook::flag;
         let (stop, code) = (Arc::<AtomicBool>::default(), Arc::<AtomicUsize>::default());
@@ -99,7 +99,7 @@ impl Interrupt {
     }
 
     /// The exit code of an interrupted program.
-    pub(super) fn code(&self) -> Option<u8> {
+    pub(crate) fn code(&self) -> Option<u8> {
         u8::try_from(self.code.load(Ordering::Relaxed)).ok().filter(|&code| code > 0)
     }
 }

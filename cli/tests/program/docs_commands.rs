@@ -12,12 +12,13 @@ use std::fs::File;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-const PAGES: [&str; 5] = [
+const PAGES: [&str; 6] = [
     "README.md",
     "docs/tutorial.md",
     "docs/gripper-file.md",
     "docs/mechanics.md",
     "docs/sizing.md",
+    "docs/batches.md",
 ];
 
 /// A command of a page and the output shown under it.

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod backend;
+mod batch;
 mod command_line;
 mod docs_commands;
 mod export;

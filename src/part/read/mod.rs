@@ -28,11 +28,17 @@ use crate::memory::Budget;
 pub use step::{StepProcess, serve_step};
 
 /// Suffixes that are read, for messages.
-const KNOWN: &str = if cfg!(feature = "step") {
+pub(crate) const KNOWN: &str = if cfg!(feature = "step") {
     "stl, obj, ply, off, 3mf, gltf, glb, step (each also as .gz)"
 } else {
     "stl, obj, ply, off, 3mf, gltf, glb (each also as .gz)"
 };
+
+/// Whether a file's name says that it is a part: one that some build of this library reads.
+pub(crate) fn is_part(path: &Path) -> bool {
+    let known = ["stl", "obj", "ply", "off", "3mf", "gltf", "glb", "step", "stp"];
+    known.contains(&suffix(path).0.as_str())
+}
 
 /// Reads the triangles of `path` in the file's own unit.
 ///

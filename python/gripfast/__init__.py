@@ -1,0 +1,64 @@
+"""Finds and ranks every two-finger grip (grasp) on a CAD part by the smallest friction coefficient
+that holds it.
+
+>>> import gripfast
+>>> result = gripfast.plan("data/parts/hex_nut.stl", "generic", density="7850kg/m3", spacing="6mm")
+>>> result.poses.shape[1:], bool(result.mu_s[0] > 0)
+((4, 4), True)
+
+Arrays are in SI units, in the part's frame where nothing else is said. Options are the fields of a
+request file, the same as the flags of ``gripfast plan`` with underscores; quantities are texts with
+a unit. The same input gives the same numbers as the program, bit for bit.
+"""
+
+from __future__ import annotations
+
+from ._batch import Batch, Job, Report, Store, run_job
+from ._core import Gripper, Loads, Page, Part, Request, Result, plan, read, score
+from ._errors import (
+    BusyError,
+    CancelledError,
+    DeviceError,
+    FileError,
+    FormatError,
+    GeometryError,
+    GripfastError,
+    LimitError,
+    MismatchError,
+    NotFoundError,
+    OptionError,
+    PanicError,
+    UnsupportedError,
+)
+from ._gripfast import __version__
+
+__all__ = [
+    "Batch",
+    "BusyError",
+    "CancelledError",
+    "DeviceError",
+    "FileError",
+    "FormatError",
+    "GeometryError",
+    "GripfastError",
+    "Gripper",
+    "Job",
+    "LimitError",
+    "Loads",
+    "MismatchError",
+    "NotFoundError",
+    "OptionError",
+    "Page",
+    "PanicError",
+    "Part",
+    "Report",
+    "Request",
+    "Result",
+    "Store",
+    "UnsupportedError",
+    "__version__",
+    "plan",
+    "read",
+    "run_job",
+    "score",
+]

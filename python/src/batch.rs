@@ -1,0 +1,141 @@
+//! Batches: jobs as JSON, so that they travel to other machines, and the folder that keeps what
+//! comes of them.
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+
+use gripfast::batch::{self, Batch, Counts, Entry, Finished, Job, Report, Watch, Workers};
+use gripfast::error::Error;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::errors::{OrRaise, from_json, json};
+use crate::parts::Part;
+use crate::watch::{News, Teller, watched};
+
+/// The jobs of a batch: what the file of a batch says, as JSON, over the shared request. One JSON
+/// text for each.
+#[pyfunction]
+pub(crate) fn batch_jobs(description: &str) -> PyResult<Vec<String>> {
+    let batch = Batch::from_json("batch", description).or_raise()?;
+    batch.jobs().or_raise()?.iter().map(json).collect()
+}
+
+fn jobs(texts: &[String]) -> PyResult<Vec<Job>> {
+    texts.iter().map(|text| from_json("job", text)).collect()
+}
+
+struct Tell(Teller);
+
+impl Watch for Tell {
+    fn job(&mut self, entry: &Entry, counts: Counts) {
+        let text = serde_json::to_string(entry).unwrap_or_default();
+        self.0.tell(News::Job(text, counts.ended, counts.jobs));
+    }
+}
+
+/// Does all jobs here; what came of them, as JSON.
+#[pyfunction]
+#[pyo3(signature = (texts, folder, resume=false, workers=None, threads=None, listener=None))]
+pub(crate) fn batch_run(
+    py: Python<'_>,
+    texts: Vec<String>,
+    folder: PathBuf,
+    resume: bool,
+    workers: Option<usize>,
+    threads: Option<usize>,
+    listener: Option<Py<PyAny>>,
+) -> PyResult<String> {
+    let jobs = jobs(&texts)?;
+    let workers = Workers { jobs: workers, threads };
+    let report = watched(py, listener.as_ref(), move |teller, stop| {
+        batch::run(&jobs, &folder, resume, workers, &mut Tell(teller), stop)
+    })?;
+    json(&report.or_raise()?)
+}
+
+/// Does one job, on a part in memory where it is given: its entry as JSON, and its result.
+#[pyfunction]
+#[pyo3(signature = (text, part=None, threads=None))]
+pub(crate) fn run_job<'py>(
+    py: Python<'py>,
+    text: &str,
+    part: Option<&Part>,
+    threads: Option<usize>,
+) -> PyResult<(String, Bound<'py, PyBytes>)> {
+    let job: Job = from_json("job", text)?;
+    let part = part.map(|part| (*part.inner).clone());
+    let finished =
+        watched(py, None, move |_, stop: &AtomicBool| batch::run_job(&job, part, threads, stop))?;
+    // Only an interrupt stops it, which is raised before.
+    let Some(Finished { entry, content }) = finished else {
+        let error = Error::new(gripfast::error::ErrorKind::Cancelled, "job", "was stopped", "");
+        return Err(error).or_raise();
+    };
+    Ok((json(&entry)?, PyBytes::new(py, &content)))
+}
+
+/// The entry, as JSON, of a job that never came back.
+#[pyfunction]
+pub(crate) fn lost_job(text: &str, problem: &str) -> PyResult<String> {
+    json(&batch::lost_job(&from_json("job", text)?, problem).entry)
+}
+
+/// The folder of a batch, open.
+#[pyclass(frozen, module = "gripfast._gripfast")]
+pub(crate) struct Store {
+    inner: Mutex<Option<batch::Store>>,
+}
+
+impl Store {
+    fn with<T>(
+        &self,
+        work: impl FnOnce(&mut batch::Store) -> gripfast::error::Result<T>,
+    ) -> PyResult<T> {
+        let mut inner = self.inner.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let store = inner.as_mut().ok_or_else(|| {
+            Error::input("batch", "its folder is closed", "open it again to resume")
+        });
+        work(store.or_raise()?).or_raise()
+    }
+}
+
+#[pymethods]
+impl Store {
+    #[new]
+    #[pyo3(signature = (texts, folder, resume=false))]
+    fn open(texts: Vec<String>, folder: PathBuf, resume: bool) -> PyResult<Self> {
+        let store = batch::Store::open(&jobs(&texts)?, &folder, resume).or_raise()?;
+        Ok(Self { inner: Mutex::new(Some(store)) })
+    }
+
+    /// Numbers of the jobs that are to be done.
+    fn pending(&self) -> PyResult<Vec<usize>> {
+        self.with(|store| Ok(store.pending()))
+    }
+
+    /// Jobs that have ended, and jobs in all.
+    fn counts(&self) -> PyResult<(usize, usize)> {
+        self.with(|store| {
+            let Counts { jobs, ended, .. } = store.counts();
+            Ok((ended, jobs))
+        })
+    }
+
+    /// Keeps what came of a job.
+    fn record(&self, py: Python<'_>, entry: &str, content: &[u8]) -> PyResult<()> {
+        let finished = Finished { entry: from_json("entry", entry)?, content: content.to_vec() };
+        py.detach(|| self.with(|store| store.record(&finished)))
+    }
+
+    /// Writes what is left to be written and closes the folder; what came of the batch, as JSON.
+    fn finish(&self, py: Python<'_>) -> PyResult<String> {
+        let store = self.inner.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take();
+        let report: Report = match store {
+            Some(store) => py.detach(|| store.finish()).or_raise()?,
+            None => Report::default(),
+        };
+        json(&report)
+    }
+}
