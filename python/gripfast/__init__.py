@@ -13,6 +13,14 @@ a unit. The same input gives the same numbers as the program, bit for bit.
 
 from __future__ import annotations
 
+import os as _os
+import sys as _sys
+
+# Without a desktop, the layer of Mesa's Vulkan that asks the display server for the preferred adapter
+# prints an error for every look at the adapters; gripfast ranks them itself.
+if _sys.platform == "linux" and "XDG_RUNTIME_DIR" not in _os.environ:
+    _os.environ.setdefault("NODEVICE_SELECT", "1")
+
 from ._batch import Batch, Job, Report, Store, run_job
 from ._core import Gripper, Loads, Page, Part, Request, Result, plan, read, score
 from ._errors import (

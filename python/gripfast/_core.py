@@ -82,7 +82,7 @@ class Part:
     @property
     def file(self) -> str:
         """The file it was read from; empty for a part of arrays."""
-        return os.fspath(self._native.file)
+        return self._native.file
 
     @property
     def vertices(self) -> Floats:
@@ -589,9 +589,13 @@ class Result:
         those of :meth:`export`."""
         import pyarrow
 
-        text = json.dumps(options)
-        columns = self._native.columns(negatives, text)
-        return pyarrow.table({column["name"]: _arrow(column) for column in columns})
+        columns = self._native.columns(negatives, json.dumps(options))
+        arrays = [_arrow(column) for column in columns]
+        fields = [
+            pyarrow.field(column["name"], array.type, nullable="valid" in column)
+            for column, array in zip(columns, arrays)
+        ]
+        return pyarrow.Table.from_arrays(arrays, schema=pyarrow.schema(fields))
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
         """For polars, DuckDB and whatever else speaks Arrow."""

@@ -64,7 +64,8 @@ def run(
     parcels: dict[str, Any] = {}
     with _Listener(progress, None, "job") as hear:
         while waiting or running:
-            slots = ray.cluster_resources().get("CPU", 1.0) / max(num_cpus, 0.01)
+            cluster: Any = ray
+            slots = cluster.cluster_resources().get("CPU", 1.0) / max(num_cpus, 0.01)
             while waiting and len(running) < (1 + _AHEAD) * max(slots, 1.0):
                 number = waiting.pop()
                 part = jobs[number].request["part"]

@@ -84,8 +84,8 @@ impl Part {
     }
 
     #[getter]
-    fn file(&self) -> PathBuf {
-        self.inner.file.clone()
+    fn file(&self) -> String {
+        self.inner.file.display().to_string()
     }
 
     /// Metres in a unit of the file.

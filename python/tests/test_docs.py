@@ -50,7 +50,7 @@ def test_the_readme_s_five_lines_run(folder):
         [sys.executable, "-c", lines], cwd=folder, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    assert "mu_s" in done.stdout
+    assert done.stdout.startswith("[0.0") and (folder / "bracket.html").exists()
 
 
 @pytest.mark.parametrize("module", [gripfast, gripfast._core])
@@ -81,7 +81,10 @@ def test_the_types_hold():
     package = Path(gripfast.__file__).parent
     assert (package / "py.typed").exists()
     for line in (
-        ["-m", "mypy", "--strict", "--no-error-summary", "-p", "gripfast"],
+        [
+            "-m", "mypy", "--strict", "--no-error-summary", "--disable-error-code=import-untyped",
+            "-p", "gripfast",
+        ],
         ["-m", "mypy.stubtest", "gripfast._gripfast"],
     ):
         done = subprocess.run(
