@@ -83,9 +83,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         batch.request = Request::read(path)?;
     }
     job.give(&mut batch.request)?;
-    if let Some(top) = top_k {
-        batch.request.selection.top = top;
-    }
+    batch.top = top_k.or(batch.top);
     if !gripper.is_empty() {
         batch.grippers.clear();
         batch.add_grippers(&gripper);

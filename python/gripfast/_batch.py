@@ -71,8 +71,8 @@ class Batch:
     """Parts x grippers x load sets.
 
     ``Batch(["parts/"], ["robotiq-2f85", "franka-hand"], density="2700kg/m3", top=50)``: parts are
-    files and folders; ``loads`` is a list of load sets, each as in a request; options are fields of
-    a request. ``Batch.read("jobs.toml")`` reads the file of ``gripfast batch``.
+    files and folders; ``loads`` is a list of load sets, each as in a request; ``top`` is the number of
+    grips kept of each job (100); options are fields of a request. ``Batch.read("jobs.toml")`` reads the file of ``gripfast batch``.
     """
 
     def __init__(
@@ -88,6 +88,8 @@ class Batch:
         told: dict[str, Any] = json.loads(json.dumps(description or {}))
         shared = Request.from_dict(told.get("request", {})) if request is None else request
         shared = Request._of(shared._json)
+        if (top := options.pop("top", None)) is not None:
+            told["top"] = top
         shared.update(**options)
         told["request"] = shared.to_dict()
         if isinstance(parts, (str, os.PathLike)) or isinstance(grippers, str):

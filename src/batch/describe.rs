@@ -41,6 +41,9 @@ pub struct Batch {
     pub grippers: Vec<Variant>,
     /// The load sets; none: the loads of the shared request.
     pub loads: Vec<Variant>,
+    /// Grips kept of each job; absent: what the shared request shows where that is not its default,
+    /// else [`TOP`].
+    pub top: Option<usize>,
 }
 
 /// One part with one gripper under one load set.
@@ -77,6 +80,7 @@ struct Written {
     part: Vec<Table>,
     gripper: Vec<Table>,
     loads: Vec<Table>,
+    top: Option<usize>,
 }
 
 impl Batch {
@@ -115,7 +119,8 @@ impl Batch {
     }
 
     fn written(place: &str, written: Written) -> Result<Self> {
-        let mut batch = Self { request: request(written.request, place)?, ..Self::default() };
+        let mut batch =
+            Self { request: request(written.request, place)?, top: written.top, ..Self::default() };
         batch.add_parts(&written.parts)?;
         batch.grippers = written.grippers.iter().map(|name| gripper(name)).collect();
         let entries = [
@@ -199,9 +204,9 @@ impl Batch {
     pub fn jobs(&self) -> Result<Vec<Job>> {
         let mut base = self.request.clone();
         base.output = crate::request::Output::default();
-        if base.selection.top == Request::default().selection.top {
-            base.selection.top = TOP;
-        }
+        let shown = base.selection.top;
+        let few = shown == Request::default().selection.top;
+        base.selection.top = self.top.unwrap_or(if few { TOP } else { shown });
         // Those beyond need no more work than it takes to see that.
         if !base.selection.diverse && !base.selection.merge_symmetric {
             base.selection.keep.get_or_insert(base.selection.top);

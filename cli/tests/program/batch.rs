@@ -266,6 +266,7 @@ fn a_file_of_jobs_says_what_each_part_and_gripper_has_of_its_own() {
         r#"
 grippers = ["generic"]
 parts = ["data/parts/hex_nut.stl"]
+top = 10
 
 [request]
 density = "7850kg/m3"
@@ -296,10 +297,11 @@ candidates = { angle_step = "45deg" }
 "#,
     )
     .unwrap();
-    let output = run(&[jobs.to_str().unwrap(), "-o", out.to_str().unwrap(), "--top-k", "3"]);
+    let output = run(&[jobs.to_str().unwrap(), "-o", out.to_str().unwrap()]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let entries = manifest(&out);
     assert_eq!(entries.len(), 8, "{:?}", entries.keys());
+    assert!(entries.values().all(|entry| entry["grips"] == 10));
     let of = |id: &str| &entries[id]["request"];
     let key = of("key / gentle / gravity accel 1g");
     assert_eq!((&key["mass"], &key["force"]), (&"11g".into(), &"20N".into()));
