@@ -76,7 +76,7 @@ pub fn read(path: &Path, options: &Options, gripper: &Gripper) -> Result<Vec<Pos
         Format::GraspGen => formats::graspgen(&place, &bytes)?,
         Format::GraspNet => formats::graspnet(&place, bytes)?,
         Format::Acronym => formats::acronym(&place, bytes)?,
-        Format::Parquet | Format::Glb => {
+        Format::Parquet | Format::Glb | Format::Usd | Format::Intrinsic | Format::Robot => {
             return Err(Error::input(
                 place,
                 "poses are not read from this format",

@@ -8,11 +8,12 @@ use gripfast::geometry::patch_area;
 use gripfast::gripper;
 use gripfast::model::{Patch, Wrench};
 use gripfast::part::{Part as ReadPart, ReadOptions, Unit};
-use gripfast::pick::{Picker, Scene};
+use gripfast::pick::Picker;
 use gripfast::plan::Outcome;
 use gripfast::propose::{ProposeOptions, Proposer};
 use gripfast::rank;
 use gripfast::results::{GripSet, RankedGrip};
+use gripfast::scene::Scene;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
@@ -380,7 +381,7 @@ fn export_options(text: &str) -> PyResult<Options> {
     #[serde(deny_unknown_fields, default)]
     struct Given {
         convention: Option<String>,
-        origin: String,
+        origin: Option<String>,
         top: Option<usize>,
         opening: Option<f64>,
         joint: Vec<String>,
@@ -395,7 +396,7 @@ fn export_options(text: &str) -> PyResult<Options> {
             let Options { approach, part_frame, .. } = Options::default();
             Self {
                 convention: None,
-                origin: "pads".to_owned(),
+                origin: None,
                 top: None,
                 opening: None,
                 joint: Vec::new(),
@@ -413,7 +414,8 @@ fn export_options(text: &str) -> PyResult<Options> {
     let joints = joints.collect::<gripfast::error::Result<Vec<_>>>().or_raise()?;
     let mut options = Options::default();
     options.convention = convention.transpose().or_raise()?;
-    options.origin = Origin::parse("origin", &given.origin).or_raise()?;
+    let origin = given.origin.map(|text| Origin::parse("origin", &text));
+    options.origin = origin.transpose().or_raise()?;
     (options.top, options.opening) = (given.top, given.opening);
     options.pad_friction = given.pad_friction;
     (options.approach, options.part_frame) = (given.approach, given.part_frame);

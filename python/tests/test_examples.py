@@ -20,7 +20,7 @@ def test_the_loader_for_moveit_reads_what_export_writes(tmp_path):
     spec.loader.exec_module(loader)
     result = gripfast.plan("data/parts/hex_nut.stl", "robotiq-2f85", **COARSE)
     file = tmp_path / "grips.moveit.yaml"
-    result.export(file, top=5, joint=["finger_joint:motion"])
+    result.export(file, top=5, joint=["finger_joint:motion"], origin="pads")
     grips = loader.load(str(file))
     assert [grip.id for grip in grips] == [str(id) for id in result.ids[:5]]
     poses = result.tool_poses("moveit")

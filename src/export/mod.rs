@@ -285,7 +285,7 @@ impl<'a> View<'a> {
 
     /// The tool frame in the part frame of a candidate that is no grip.
     fn negative_pose(&self, pose: &Negative) -> Frame {
-        let tool = match (self.options.origin, &self.gripper) {
+        let tool = match (self.origin, &self.gripper) {
             (Origin::Stated(_), Some(gripper)) => {
                 gripper.palm_place(gripper.jaw_gap(&pose.grip())).compose(&self.grip_from_tool)
             }

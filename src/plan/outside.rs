@@ -124,6 +124,7 @@ impl Plan {
                 assessor: &assessor,
                 keep: self.request.kept(),
                 race: scoring.polish == Polish::Top,
+                sample: 0,
                 partial: None,
                 resume: false,
                 ids: None,
@@ -237,6 +238,7 @@ impl Plan {
                 rejections,
                 comparison: None,
             },
+            negatives: Vec::new(),
             grips: ranking.grips,
         })
     }
