@@ -484,7 +484,8 @@ fn intrinsic() {
 fn robot() {
     let set = grips::grip_set(7);
     for (dialect, name) in Dialect::ALL {
-        let options = Options::default().with_dialect(dialect).with_origin(Some(Origin::Behind(0.05)));
+        let options =
+            Options::default().with_dialect(dialect).with_origin(Some(Origin::Behind(0.05)));
         let reader = ("read_robot.py", "numpy");
         let Some(found) =
             round_trip(&set, Format::Robot, "grips.robot.csv", reader, &options, 1e-14)
