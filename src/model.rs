@@ -352,6 +352,7 @@ impl Negative {
             face_ii: self.face_ii,
             angle: self.angle,
             contact: Arc::default(),
+            surfaces: None,
             inside: self.inside,
             flip_of: None,
         }
