@@ -77,11 +77,13 @@ impl Proposer<'_> {
     /// All places in the order of their numbers, and how many there are.
     fn stretches(&self) -> (Vec<Stretch>, u64) {
         let (mut stretches, mut first) = (Vec::new(), 0);
-        for places in [Places::Grid, Places::Special] {
-            for (index, site) in self.sites.iter().enumerate() {
-                for angle in 0..site.angles.len() {
-                    stretches.push(Stretch { site: index, places, angle, first });
-                    first += site.places(places, angle).len() as u64;
+        for sites in [0..self.plane, self.plane..self.sites.len()] {
+            for places in [Places::Grid, Places::Special] {
+                for site in sites.clone() {
+                    for angle in 0..self.sites[site].angles.len() {
+                        stretches.push(Stretch { site, places, angle, first });
+                        first += self.sites[site].places(places, angle).len() as u64;
+                    }
                 }
             }
         }
