@@ -128,7 +128,7 @@ pub struct Proposer<'a> {
     pub(super) environment: Environment,
     pub(super) sites: Vec<Site>,
     /// Number of those on planes; the others come after them.
-    plane: usize,
+    pub(super) plane: usize,
     pub(super) directions: Vec<DVec3>,
     shape: Arc<Topology>,
     /// Contact of a pad that lies wholly on both faces.
