@@ -264,6 +264,13 @@ impl Plan {
         for remark in proposer.tally().remarks(&self.gripper, &self.propose) {
             observer.note(&remark);
         }
+        let curved = self.part.curved.iter().filter(|face| face.outside && face.reachable).count();
+        if self.propose.curved.is_none() && !proposer.tries_curved() && curved > 0 {
+            observer.note(&format!(
+                "the part has {curved} curved faces that pads can close on: they are tried when the \
+                 option curved is set, which takes long with many loads"
+            ));
+        }
         let (complete, checkpoint) = (found.complete, found.checkpoint.clone());
         let (set, shown) = self.finish(&proposer, &assessor, found)?;
         let written = self.write(&set, complete)?;

@@ -28,6 +28,9 @@ pub struct ProposeOptions {
     pub angle_step: f64,
     /// Approach along and across the edges of the gripped faces as well.
     pub edge_angles: bool,
+    /// Propose grips that close on curved faces from outside; `None`: where no two plane faces lie
+    /// within the stroke.
+    pub curved: Option<bool>,
     /// Smallest contact area on either face, as a share of the most that a pad can touch there: the
     /// area in which the two faces overlap, or that of a pad over the middle of its bounds, at the
     /// grip's angle, whichever is smaller. Of curved faces what is pressed without a load counts.
@@ -78,6 +81,7 @@ setters!(ProposeOptions {
     with_spacing: spacing: Option<f64>,
     with_angle_step: angle_step: f64,
     with_edge_angles: edge_angles: bool,
+    with_curved: curved: Option<bool>,
     with_min_contact: min_contact: f64,
     with_min_pad_share: min_pad_share: f64,
     with_max_offset: max_offset: Option<f64>,
@@ -134,6 +138,7 @@ impl From<&Candidates> for ProposeOptions {
             spacing: candidates.spacing.map(|spacing| spacing.0),
             angle_step: candidates.angle_step.0,
             edge_angles: candidates.edge_angles,
+            curved: candidates.curved,
             min_contact: candidates.min_contact,
             min_pad_share: candidates.min_pad_share,
             max_offset: candidates.max_offset.map(|offset| offset.0),

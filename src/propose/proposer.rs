@@ -267,6 +267,11 @@ impl<'a> Proposer<'a> {
             .sum()
     }
 
+    /// Whether there are candidates on curved faces.
+    pub fn tries_curved(&self) -> bool {
+        self.sites.len() > self.plane
+    }
+
     /// Counts so far.
     pub fn tally(&self) -> &Tally {
         &self.tally

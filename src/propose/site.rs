@@ -148,8 +148,14 @@ pub(super) fn sites(
         sites.extend(finder.sites(*kind, pairs)?);
     }
     let plane = sites.len();
-    let (curved, round) = finder.round()?;
-    sites.extend(curved);
+    let mut round = Round::default();
+    let named = |faces: &Vec<u32>| faces.iter().any(|&face| face as usize >= part.faces.len());
+    let asked = options.faces.as_ref().is_some_and(named) || sites.is_empty();
+    if options.curved.unwrap_or(asked) {
+        let curved;
+        (curved, round) = finder.round()?;
+        sites.extend(curved);
+    }
     Ok(Sites { sites, directions: finder.directions, plane, round })
 }
 

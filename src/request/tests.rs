@@ -22,6 +22,7 @@ accel = "2g"
 spacing = "2.5 mm"
 angle_step = "7deg"
 edge_angles = false
+curved = true
 min_contact = 0.3
 min_pad_share = 0.1
 max_offset = "0.1ft"

@@ -107,6 +107,10 @@ struct CandidateArgs {
     /// Approach along and across the edges of the gripped faces as well.
     #[arg(long, value_name = "true|false", hide_possible_values = true)]
     edge_angles: Option<bool>,
+    /// Closes on curved faces from outside, too. Every load of such a grip is solved, so it takes
+    /// long with many loads [default: only where no two plane faces lie within the stroke].
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
+    curved: Option<bool>,
     /// Smallest contact area on either face, as a share of the most that the face pair allows (pad
     /// or overlap).
     #[arg(long, value_name = "SHARE", value_parser = share)]
@@ -360,7 +364,7 @@ impl JobArgs {
             mass, density, com, inertia, force, unit, max_memory, outside_buffers, accel);
         let (flags, group) = (self.candidates, &mut request.candidates);
         give!(flags => group;
-            spacing, angle_step, edge_angles, min_contact, min_pad_share, max_offset, approach,
+            spacing, angle_step, edge_angles, curved, min_contact, min_pad_share, max_offset, approach,
             ground, scene, faces, grips, flips, opening, min_opening, clearance, approach_distance);
         for (given, regions) in
             [(flags.keep_out, &mut group.keep_out), (flags.faces_in, &mut group.faces_in)]
@@ -429,7 +433,7 @@ mod tests {
 
     /// Every flag that is a field, with a value that is not its default.
     const LINE: &str = "gripfast plan part.stl --gripper my.toml --mass 350g --force 40N --unit in --max-memory 2GB --outside-buffers \
-        --accel 2g --loads gravity,ball:3 --spacing 2mm --angle-step 7deg --edge-angles false \
+        --accel 2g --loads gravity,ball:3 --spacing 2mm --angle-step 7deg --edge-angles false --curved \
         --min-contact 0.3 --min-pad-share 0.1 --max-offset 9mm --approach -z:45deg --ground +z:1mm \
         --keep-out 0mm,0mm,0mm:1mm,1mm,1mm --scene cell.toml --faces 0,2 --faces-in 0mm,0mm,0mm:1mm,1mm,1mm \
         --grips both --flips --opening 4mm --min-opening 1mm --clearance 1mm \
