@@ -103,6 +103,7 @@ fn one_bad_part_stops_nothing_and_every_job_says_what_became_of_it() {
 
     let entries = manifest(&out);
     assert_eq!(entries.len(), 10);
+    let mut fewer = 0;
     for (id, entry) in &entries {
         let outcome = match id.split('.').next().unwrap() {
             "nut" | "sub/key" => "grips",
@@ -127,11 +128,17 @@ fn one_bad_part_stops_nothing_and_every_job_says_what_became_of_it() {
             _ => {
                 assert_eq!(entry["health"]["watertight"], true);
                 assert_eq!(entry["health"]["warnings"], serde_json::json!([]));
-                assert_eq!((&entry["grips"], &entry["negatives"]), (&7.into(), &12.into()));
+                assert_eq!(entry["grips"], 7);
+                // As many as were asked for, where so many candidates fell.
+                let negatives = entry["negatives"].as_u64().unwrap();
+                assert!((1..=12).contains(&negatives), "{id}: {negatives}");
+                fewer += usize::from(negatives < 12);
                 assert!(entry["best_mu_s"].as_f64().unwrap() > 0.0);
             }
         }
     }
+
+    assert!(fewer <= 2, "{fewer}");
 
     // The rows are the grips of `plan`, number for number.
     let file = folder.path().join("plan.json");

@@ -376,7 +376,7 @@ fn defects_that_change_the_shape_are_reported() {
         let clean = read(scratch.path(), &plain(&t), None).unwrap();
         let read = |bytes: Vec<u8>| read(scratch.path(), &bytes, None);
         let size = diagonal(&t);
-        let mut random = Random::new(11);
+        let mut random = Random::new(5);
 
         let holed: Vec<Triangle> = t
             .iter()
@@ -510,6 +510,33 @@ fn defects_that_change_the_shape_are_reported() {
         assert!(message.contains(&format!("states {} triangles", n + 5)), "{message}");
         let message = read(binary(&t, b"", u32::MAX, 0)).unwrap_err().to_string();
         assert!(message.contains("states 4294967295 triangles"), "{message}");
+    }
+}
+
+/// Noise of 1e-5 of the size keeps every large plane, whatever the noise.
+#[test]
+#[ignore = "known fault: in some two of six cases the widest planes of a V-slot bar break up"]
+fn small_noise_keeps_every_large_plane() {
+    let Some(folder) = shared() else { return };
+    let scratch = tempfile::tempdir().unwrap();
+    let t = load(&folder.join("gen/gen_vslot_20x20_100.stl"));
+    let clean = read(scratch.path(), &plain(&t), None).unwrap();
+    for seed in 0..6 {
+        let mut random = Random::new(seed);
+        let mut moves = std::collections::HashMap::new();
+        let spoiled: Vec<Triangle> = t
+            .iter()
+            .map(|triangle| {
+                triangle.map(|corner| {
+                    let by = moves
+                        .entry(corner.to_array().map(f64::to_bits))
+                        .or_insert_with(|| random.vector() * 1e-5 * diagonal(&t));
+                    corner + *by
+                })
+            })
+            .collect();
+        let part = read(scratch.path(), &plain(&spoiled), None).unwrap();
+        assert_contains("v-slot", &format!("noise {seed}"), &clean, &part, DVec3::ZERO);
     }
 }
 

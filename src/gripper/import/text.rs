@@ -34,7 +34,7 @@ pub(super) fn write(model: &Model, hand: &Hand, name: Option<&str>) -> Result<Im
     let _ = writeln!(
         text,
         "# Made by `gripfast gripper import` from {}.\n\
-         # Check each [unverified] value, then `gripfast gripper check FILE --svg FILE.svg`.\n\
+         # Check each [unverified] value, then have it drawn: `gripfast gripper check FILE`.\n\
          # Axes: x1 approach (palm towards fingertips), x3 closing, x2 across; origin midway between the pads, jaws closed.\n\n\
          name = {}\n\
          stroke = [\"{}\", \"{}\"]\n\
