@@ -12,6 +12,10 @@ use pyo3::prelude::*;
 
 use crate::errors::{OrRaise, json};
 
+/// Areas (n), normals (n, 3), centroids (n, 3).
+type FaceArrays<'py> =
+    (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+
 /// A part, read and checked.
 #[pyclass(frozen, module = "gripfast._gripfast")]
 pub(crate) struct Part {
@@ -122,11 +126,7 @@ impl Part {
     }
 
     /// Planar faces: areas (n), normals (n, 3), centroids (n, 3).
-    fn faces<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)>
-    {
+    fn faces<'py>(&self, py: Python<'py>) -> PyResult<FaceArrays<'py>> {
         let faces = &self.inner.faces;
         let vectors = |value: &dyn Fn(&part::PlanarFace) -> DVec3| {
             let flat = faces.iter().flat_map(|face| value(face).to_array()).collect();

@@ -14,6 +14,9 @@ use pyo3::prelude::*;
 use crate::errors::{OrRaise, from_json};
 use crate::watch::watched;
 
+/// Numbers and statuses, a row for each contact.
+type Scores<'py> = (Bound<'py, PyArray2<f64>>, Vec<Vec<String>>);
+
 /// The smallest friction of each contact under each load, (n, m), nan where none holds; and the
 /// statuses. `contacts` is JSON, `wrenches` (n, m, 6) in the grip frame about its origin.
 #[pyfunction]
@@ -24,7 +27,7 @@ pub(crate) fn score<'py>(
     forces: PyReadonlyArray1<'py, f64>,
     wrenches: PyReadonlyArray3<'py, f64>,
     backend: &str,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, Vec<Vec<String>>)> {
+) -> PyResult<Scores<'py>> {
     let contacts: Vec<Arc<Contact>> =
         from_json::<Vec<Contact>>("contacts", contacts)?.into_iter().map(Arc::new).collect();
     let (distances, forces, rows) = (distances.as_array(), forces.as_array(), wrenches.as_array());

@@ -195,7 +195,7 @@ const SIDES: usize = 48;
 pub(crate) fn pressed(piece: &Piece, delta: f64) -> Patch {
     let bounds = Bounds2::of(&piece.outer);
     let size = bounds.size().length();
-    if !(size > 0.0) {
+    if size.is_nan() || size <= 0.0 {
         return Patch::new();
     }
     let middle = bounds.centre();

@@ -88,7 +88,7 @@ pub fn throat(gripper: &Gripper) -> Option<f64> {
     let top = gripper.palm.iter().map(|body| body.bounds()[1].x).fold(f64::NEG_INFINITY, f64::max);
     let rear = |pad: &Ring| Bounds2::of(pad).min.x;
     let rear = gripper.pads(0.0).iter().map(rear).fold(f64::NEG_INFINITY, f64::max);
-    top.is_finite().then(|| rear - top)
+    top.is_finite().then_some(rear - top)
 }
 
 /// The pad of a jaw in the grip frame's `(x1, x2)`.
