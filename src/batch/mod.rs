@@ -1,4 +1,5 @@
-//! Many parts, grippers and load sets: each combination is a job, and each job is a [`Request`].
+//! Many parts, grippers and load sets: each combination is a job, and each job is a
+//! [`crate::request::Request`].
 //!
 //! [`Batch`] says which jobs there are; [`run_job`] does one of them, wherever; [`Store`] keeps what
 //! came of them in a folder, so that nothing finished is lost or done twice; [`run`] does all of
