@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from typing import final
 
 _Path = str | os.PathLike[str]
 _Listener = Callable[..., None] | None
@@ -13,6 +14,27 @@ _Listener = Callable[..., None] | None
 __version__: str
 parquet: bool
 
+__all__ = [
+    "__version__",
+    "parquet",
+    "Part",
+    "Gripper",
+    "Result",
+    "Store",
+    "plan",
+    "request_default",
+    "request_check",
+    "request_set",
+    "request_from_toml",
+    "request_to_toml",
+    "score",
+    "batch_jobs",
+    "batch_run",
+    "run_job",
+    "lost_job",
+]
+
+@final
 class Part:
     @staticmethod
     def read(
@@ -46,6 +68,7 @@ class Part:
         self,
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
 
+@final
 class Gripper:
     @staticmethod
     def find(name_or_path: str) -> Gripper: ...
@@ -57,6 +80,7 @@ class Gripper:
     def catalogue() -> list[str]: ...
     def json(self) -> str: ...
 
+@final
 class Result:
     @staticmethod
     def read(path: _Path) -> Result: ...
@@ -97,6 +121,7 @@ class Result:
         world_from_part: npt.NDArray[np.float64] | None = None,
     ) -> tuple[int | None, list[str]]: ...
 
+@final
 class Store:
     def __new__(cls, texts: list[str], folder: _Path, resume: bool = False) -> Store: ...
     def pending(self) -> list[int]: ...

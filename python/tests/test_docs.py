@@ -85,7 +85,7 @@ def test_the_types_hold():
             "-m", "mypy", "--strict", "--no-error-summary", "--disable-error-code=import-untyped",
             "-p", "gripfast",
         ],
-        ["-m", "mypy.stubtest", "gripfast._gripfast"],
+        ["-m", "mypy.stubtest", "--ignore-disjoint-bases", "gripfast._gripfast"],
     ):
         done = subprocess.run(
             [sys.executable, *line], capture_output=True, text=True, check=False, cwd=ROOT / "python/tests"
