@@ -51,9 +51,7 @@ use crate::part::{MassProperties, Part};
 use crate::propose::{Explanation, ProposeOptions, Proposer};
 use crate::rank;
 use crate::request::{Polish, Request};
-use crate::results::{
-    self, GripSet, LoadCase, PartSummary, Provenance, RankedGrip, Resolved, Summary,
-};
+use crate::results::{GripSet, LoadCase, PartSummary, Provenance, RankedGrip, Resolved, Summary};
 use crate::units::{Force, Length};
 use noise::Noise;
 use search::{Found, Search};
@@ -63,7 +61,7 @@ pub use assess::{Assessor, Settings};
 pub use collect::{Collector, OUTRANKED};
 pub use limits::Limits;
 pub use output::{GLB_TOP, WHOLE, solve_every_load};
-pub use outside::{Assessed, Assessment, Standing};
+pub use outside::{Assessed, Assessment, Standing, explain};
 pub use prepare::PlanBuilder;
 
 /// The main job, ready to run.
@@ -316,24 +314,21 @@ impl Plan {
         let shown = self.shown(&grips, size);
         self.add_noise(proposer, assessor, &mut grips, &shown)?;
         self.solve_other_loads(assessor, &mut grips, &shown)?;
-        let set = GripSet {
-            format: results::FORMAT.into(),
-            version: results::VERSION,
-            provenance: self.provenance(found.backend, found.complete),
-            part: self.part_summary([low, high]),
-            gripper: output::gripper_json(&self.gripper)?,
-            loads: self.loads.clone(),
-            summary: Summary {
-                pairs: proposer.tally().pairs,
-                candidates: proposer.tally().candidates,
-                ranked: ranking.ranked,
-                holding: self.settings.pads.value.map(|_| ranking.holding),
-                rejections,
-                comparison,
-            },
-            negatives,
-            grips,
+        let mut set = GripSet::new(
+            self.provenance(found.backend, found.complete),
+            self.part_summary([low, high]),
+            output::gripper_json(&self.gripper)?,
+            self.loads.clone(),
+        );
+        set.summary = Summary {
+            pairs: proposer.tally().pairs,
+            candidates: proposer.tally().candidates,
+            ranked: ranking.ranked,
+            holding: self.settings.pads.value.map(|_| ranking.holding),
+            rejections,
+            comparison,
         };
+        (set.negatives, set.grips) = (negatives, grips);
         Ok((set, shown))
     }
 
@@ -341,21 +336,19 @@ impl Plan {
     fn finished(&self, observer: &mut dyn Observer) -> Result<Option<Outcome>> {
         let output = &self.request.output;
         let native = matches!(self.format, Some(Format::Json | Format::JsonLines));
-        let Some(path) = output.output.as_deref().filter(|path| output.resume && path.is_file())
-        else {
+        let is_there = |path: &&Path| native && output.resume && path.is_file();
+        let Some(path) = output.output.as_deref().filter(is_there) else { return Ok(None) };
+        if self.partial()?.is_some_and(|partial| partial.is_there()) {
             return Ok(None);
-        };
-        let unfinished = self.partial()?.is_some_and(|partial| partial.is_there());
-        let Some(set) = GripSet::read(path).ok().filter(|_| native && !unfinished) else {
-            return Ok(None);
-        };
+        }
+        let Ok(set) = GripSet::read(path) else { return Ok(None) };
         let mut request = set.provenance.request.clone();
         request.output.clone_from(output);
         request.scoring.threads = self.request.scoring.threads;
         let (low, high) = self.part.mesh.bounding_box();
         let same = set.provenance.complete
             && set.provenance.gripfast == env!("CARGO_PKG_VERSION")
-            && request == self.request
+            && request == self.asked()
             && set.part == self.part_summary([low, high])
             && set.gripper == output::gripper_json(&self.gripper)?
             && set.loads == self.loads;
@@ -452,13 +445,19 @@ impl Plan {
             seeds: self.seeds.len(),
             keep: self.request.kept(),
         };
-        let mut provenance = Provenance::new(self.request.clone(), resolved);
-        provenance.request.scoring.polish = self.asked_polish;
+        let mut provenance = Provenance::new(self.asked(), resolved);
         provenance.command.clone_from(&self.command);
         provenance.backend = backend;
         provenance.complete = complete;
         provenance.warnings.clone_from(&self.warnings);
         provenance
+    }
+
+    /// The request as it was made.
+    fn asked(&self) -> Request {
+        let mut request = self.request.clone();
+        request.scoring.polish = self.asked_polish;
+        request
     }
 
     fn part_summary(&self, [bbox_min, bbox_max]: [DVec3; 2]) -> PartSummary {

@@ -6,7 +6,7 @@ mod formats;
 use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::export::{Convention, Format, Origin};
+use crate::export::{Convention, Format, Origin, Stated};
 use crate::gripper::Gripper;
 use crate::model::Frame;
 
@@ -17,7 +17,7 @@ pub struct Pose {
     pub name: String,
     /// Tool frame in the part frame.
     pub part_from_tool: Frame,
-    /// Axes of the tool frame; `None`: it is the grip frame itself.
+    /// Axes of the tool frame.
     pub convention: Convention,
     /// Origin of the tool frame.
     pub origin: Origin,
@@ -98,11 +98,16 @@ pub fn read(path: &Path, options: &Options, gripper: &Gripper) -> Result<Vec<Pos
     Ok(raw.into_iter().map(pose).collect())
 }
 
+/// Every convention that an export can have.
+fn conventions() -> impl Iterator<Item = Convention> {
+    let stated = [Stated::Flange, Stated::Tool].map(Convention::Stated);
+    Convention::ALL.into_iter().map(|known| known.0).chain(stated)
+}
+
 /// The frame that an export states in words, if it is one of ours.
 fn stated_frame(text: &str) -> Option<(Convention, Origin)> {
     let (axes, origin) = text.split_once(", origin ")?;
-    let convention =
-        Convention::ALL.into_iter().map(|known| known.0).find(|known| known.axes() == axes)?;
+    let convention = conventions().find(|known| known.axes() == axes)?;
     let stated = ["pads", "flange", "tool"]
         .into_iter()
         .filter_map(|name| Origin::parse("origin", name).ok())
@@ -120,7 +125,7 @@ mod tests {
 
     #[test]
     fn the_words_of_an_export_are_understood() {
-        for (convention, _) in Convention::ALL {
+        for convention in conventions() {
             for origin in ["pads", "flange", "tool", "103.4mm"] {
                 let origin = Origin::parse("origin", origin).unwrap();
                 let text = format!("{}, origin {origin}", convention.axes());

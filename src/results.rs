@@ -5,6 +5,7 @@
 //! that are not finite are null.
 
 mod file;
+mod source;
 mod verdict;
 mod version1;
 

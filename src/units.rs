@@ -297,6 +297,11 @@ impl Unit {
     pub const ALL: [Self; 6] =
         [Self::Millimetre, Self::Metre, Self::Inch, Self::Centimetre, Self::Micrometre, Self::Foot];
 
+    /// The unit of this length \[m\].
+    pub fn of_metres(length: f64) -> Option<Self> {
+        Self::ALL.into_iter().find(|unit| (unit.metres() / length - 1.0).abs() < 1e-9)
+    }
+
     /// Length of the unit \[m\].
     pub fn metres(self) -> f64 {
         match self {

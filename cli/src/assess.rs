@@ -109,9 +109,9 @@ fn verdict(pose: &Assessed, set: &GripSet) -> String {
         (Err(Misfit::Beside), ..) => "no faces between the opened pads".into(),
         (Err(_), ..) => "no pair of faces within the stroke".into(),
         (_, Some(explanation), _) if explanation.rejection.is_some() => {
-            let reason = explanation.rejection.as_ref().map(|reason| reason.name());
-            format!("not free: {}", reason.unwrap_or_default().replace('_', " "))
+            format!("not free: {}", pose.rejection().unwrap_or_default().replace('_', " "))
         }
+        _ if pose.over.is_some() => pose.rejection().unwrap_or_default().replace('_', " "),
         (.., Some(ranked)) if ranked.worst.status.holds() => match set.verdict(ranked).holds() {
             Some(false) => "slips".into(),
             Some(true) => "holds".into(),

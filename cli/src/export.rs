@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args as ClapArgs;
 use gripfast::export::{self, Convention, Dialect, Format, Joint, Options, Origin};
-use gripfast::part::{Part, ReadOptions, Unit};
+use gripfast::part::Part;
 use gripfast::plan::GLB_TOP;
 use gripfast::results::{GripSet, PadFriction};
 use gripfast::units::Quantity;
@@ -195,21 +195,12 @@ pub(crate) fn read_part(
     result: &Path,
     given: Option<&Path>,
 ) -> anyhow::Result<Part> {
-    let named = Path::new(&set.part.file);
-    let beside = result.parent().map(|folder| folder.join(named));
-    let path = match given {
-        Some(path) => path.to_path_buf(),
-        None if named.exists() => named.to_path_buf(),
-        None => match beside.filter(|path| path.exists()) {
-            Some(path) => path,
-            None => anyhow::bail!(gripfast::error::Error::input(
-                result.display().to_string(),
-                format!("the part '{}' that it names is not there", set.part.file),
-                "give its place with --part FILE",
-            )),
-        },
-    };
-    let unit =
-        Unit::ALL.into_iter().find(|unit| (unit.metres() / set.part.unit_m - 1.0).abs() < 1e-9);
-    Ok(Part::read(&path, &ReadOptions::default().with_unit(unit))?)
+    let path = given.map(Path::to_path_buf).or_else(|| set.part_file(result)).ok_or_else(|| {
+        gripfast::error::Error::input(
+            result.display().to_string(),
+            format!("the part '{}' that it names is not there", set.part.file),
+            "give its place with --part FILE",
+        )
+    })?;
+    Ok(set.read_part(&path)?)
 }

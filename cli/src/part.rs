@@ -107,10 +107,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 fn to_text(part: &Part, pairs: &[FacePair], density: Option<f64>, rows: usize) -> String {
     let (low, high) = part.mesh.bounding_box();
     let size = (high - low) * 1e3;
-    let unit = Unit::ALL
-        .into_iter()
-        .find(|unit| unit.metres() == part.unit_m)
-        .map_or(String::new(), |unit| unit.to_string());
+    let unit = Unit::of_metres(part.unit_m).map_or(String::new(), |unit| unit.to_string());
     let mut text = format!("{}\n", part.file.display());
     let mut line = |name: &str, value: String| text += &format!("  {name:<15} {value}\n");
     line(

@@ -44,7 +44,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let mut watch = Watch::new(request.output.quiet);
-    let plan = Plan::builder(request).first_only().command(std::env::args().collect()).build()?;
+    let mut builder = Plan::builder(request).command(std::env::args().collect());
+    if why.is_none() {
+        builder = builder.first_only();
+    }
+    let plan = builder.build()?;
     if let Some(text) = &why {
         plan.warnings().iter().for_each(|text| watch.warning(text));
         return explain(&plan, text);

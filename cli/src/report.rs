@@ -6,15 +6,12 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::Args as ClapArgs;
 use gripfast::error::Error;
-use gripfast::part::{Part, ReadOptions, Unit};
+use gripfast::part::Part;
 use gripfast::plan::{WHOLE, solve_every_load};
 use gripfast::report;
-use gripfast::results::{GripSet, PartSummary};
+use gripfast::results::GripSet;
 
 use crate::choice::ChoiceArgs;
-
-/// Corners of the bounding box may differ by this share of its diagonal from the result's.
-const SAME_BOX: f64 = 1e-6;
 
 /// Writes a result file as one HTML page with the part in three dimensions, which needs no network.
 #[derive(Debug, ClapArgs)]
@@ -50,8 +47,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         .into());
     }
     let part = match args.part.as_deref() {
-        Some(path) => Some(read_part(path, &set.part)?),
-        None => recorded_part(&args.grips, &set.part),
+        Some(path) => Some(set.read_part(path)?),
+        None => recorded_part(&args.grips, &set),
     };
     if let Err(error) = solve_every_load(&mut set, WHOLE) {
         crate::terminal::say(&format!("warning: {error}\n  the page shows the worst loads only"));
@@ -70,45 +67,19 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 /// The part that the result names; says why when it cannot be had.
-fn recorded_part(grips: &Path, summary: &PartSummary) -> Option<Part> {
-    let recorded = Path::new(&summary.file);
-    let beside = recorded.file_name().map(|name| grips.with_file_name(name));
-    let Some(path) =
-        [Some(recorded.to_path_buf()), beside].into_iter().flatten().find(|path| path.is_file())
-    else {
+fn recorded_part(grips: &Path, set: &GripSet) -> Option<Part> {
+    let Some(path) = set.part_file(grips) else {
         crate::terminal::say(&format!(
             "warning: {}: not found; the part is drawn as its bounding box (--part FILE names it)",
-            summary.file
+            set.part.file
         ));
         return None;
     };
-    read_part(&path, summary)
+    set.read_part(&path)
         .inspect_err(|error| {
             crate::terminal::say(&format!(
                 "warning: {error}\n  the part is drawn as its bounding box"
             ))
         })
         .ok()
-}
-
-/// Reads the part and makes sure that it is the one of the result.
-fn read_part(path: &Path, summary: &PartSummary) -> gripfast::error::Result<Part> {
-    let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == summary.unit_m);
-    let part = Part::read(path, &ReadOptions::default().with_unit(unit))?;
-    let (low, high) = part.mesh.bounding_box();
-    let tolerance = SAME_BOX * (summary.bbox_max - summary.bbox_min).length();
-    let off = (low - summary.bbox_min).abs().max((high - summary.bbox_max).abs()).max_element();
-    if off.is_nan() || off > tolerance {
-        let size = (high - low) * 1e3;
-        let expected = (summary.bbox_max - summary.bbox_min) * 1e3;
-        let problem = format!(
-            "is not the part of this result: its size is {size:.2} mm, or it lies elsewhere; the result's is {expected:.2} mm"
-        );
-        return Err(Error::input(
-            path.display().to_string(),
-            problem,
-            "give the file that was planned on",
-        ));
-    }
-    Ok(part)
 }

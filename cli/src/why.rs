@@ -8,13 +8,12 @@ use clap::Args as ClapArgs;
 use glam::{DMat3, DVec3};
 use gripfast::error::{Error, Result};
 use gripfast::export::Convention;
-use gripfast::gripper::Gripper;
 use gripfast::model::{Frame, Slip};
-use gripfast::part::{Part, ReadOptions, Unit};
-use gripfast::plan::{Assessed, Standing};
-use gripfast::propose::{Explanation, Misfit, ProposeOptions, Proposer};
+use gripfast::part::Part;
+use gripfast::plan::{self, Assessed, Standing};
+use gripfast::propose::{Explanation, Misfit};
 use gripfast::request::Cone;
-use gripfast::results::{ForceRange, GripSet, Provenance, RankedGrip};
+use gripfast::results::{ForceRange, GripSet, RankedGrip};
 use gripfast::units::Quantity;
 
 /// Explains one grip of a result file: every test with body and place, and what its score is made
@@ -45,21 +44,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         )
         .into());
     };
-    let gripper: Gripper = serde_json::from_value(set.gripper.clone())
-        .map_err(|error| Error::input(&file, format!("gripper: {error}"), "make the file again"))?;
-    let path = args.part.unwrap_or_else(|| PathBuf::from(&set.part.file));
-    let unit = Unit::ALL.into_iter().find(|unit| unit.metres() == set.part.unit_m);
-    let mut part = Part::read(&path, &ReadOptions::default().with_unit(unit))?;
-    part.set_centre_of_mass(set.part.mass.centre_of_mass);
-    let Provenance { request, resolved, .. } = &set.provenance;
-    let mut options = ProposeOptions::read(&request.candidates)?;
-    options.force = Some(resolved.force.0).filter(|force| *force > 0.0);
-    let proposer = Proposer::new(&part, &gripper, &options)?;
-    let explanation = proposer.explain_pose(
-        ranked.grip.face_i,
-        ranked.grip.face_ii,
-        &ranked.grip.part_from_grip,
-    )?;
+    let part = crate::export::read_part(&set, &args.grips, args.part.as_deref())?;
+    let explanation = plan::explain(&set, ranked, &part)?;
     let mut out = crate::terminal::output();
     print(&mut out, &explanation)?;
     let worst = &ranked.worst;
@@ -347,6 +333,9 @@ pub(crate) fn print_standing(
     }
     if let Some(explanation) = &assessed.explanation {
         print(out, explanation)?;
+    }
+    if let Some(over) = &assessed.over {
+        writeln!(out, "rejected: {}", over.replace('_', " "))?;
     }
     let Some(ranked) = &assessed.ranked else { return Ok(()) };
     let friction = match ranked.worst.mu_s {

@@ -89,15 +89,20 @@ pub(crate) struct Store {
 }
 
 impl Store {
-    fn with<T>(
+    /// Works on the store without Python's lock: who waits for the one must not hold the other.
+    fn with<T: Send>(
         &self,
-        work: impl FnOnce(&mut batch::Store) -> gripfast::error::Result<T>,
+        py: Python<'_>,
+        work: impl FnOnce(&mut batch::Store) -> gripfast::error::Result<T> + Send,
     ) -> PyResult<T> {
-        let mut inner = self.inner.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let store = inner.as_mut().ok_or_else(|| {
-            Error::input("batch", "its folder is closed", "open it again to resume")
+        let done = py.detach(|| {
+            let mut inner = self.inner.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let store = inner.as_mut().ok_or_else(|| {
+                Error::input("batch", "its folder is closed", "open it again to resume")
+            })?;
+            work(store)
         });
-        work(store.or_raise()?).or_raise()
+        done.or_raise()
     }
 }
 
@@ -105,37 +110,35 @@ impl Store {
 impl Store {
     #[new]
     #[pyo3(signature = (texts, folder, resume=false))]
-    fn open(texts: Vec<String>, folder: PathBuf, resume: bool) -> PyResult<Self> {
-        let store = batch::Store::open(&jobs(&texts)?, &folder, resume).or_raise()?;
+    fn open(py: Python<'_>, texts: Vec<String>, folder: PathBuf, resume: bool) -> PyResult<Self> {
+        let jobs = jobs(&texts)?;
+        let store = py.detach(|| batch::Store::open(&jobs, &folder, resume)).or_raise()?;
         Ok(Self { inner: Mutex::new(Some(store)) })
     }
 
     /// Numbers of the jobs that are to be done.
-    fn pending(&self) -> PyResult<Vec<usize>> {
-        self.with(|store| Ok(store.pending()))
+    fn pending(&self, py: Python<'_>) -> PyResult<Vec<usize>> {
+        self.with(py, |store| Ok(store.pending()))
     }
 
     /// Jobs that have ended, and jobs in all.
-    fn counts(&self) -> PyResult<(usize, usize)> {
-        self.with(|store| {
-            let Counts { jobs, ended, .. } = store.counts();
-            Ok((ended, jobs))
-        })
+    fn counts(&self, py: Python<'_>) -> PyResult<(usize, usize)> {
+        let Counts { jobs, ended, .. } = self.with(py, |store| Ok(store.counts()))?;
+        Ok((ended, jobs))
     }
 
     /// Keeps what came of a job.
     fn record(&self, py: Python<'_>, entry: &str, content: &[u8]) -> PyResult<()> {
         let finished = Finished { entry: from_json("entry", entry)?, content: content.to_vec() };
-        py.detach(|| self.with(|store| store.record(&finished)))
+        self.with(py, |store| store.record(&finished))
     }
 
     /// Writes what is left to be written and closes the folder; what came of the batch, as JSON.
     fn finish(&self, py: Python<'_>) -> PyResult<String> {
-        let store = self.inner.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take();
-        let report: Report = match store {
-            Some(store) => py.detach(|| store.finish()).or_raise()?,
-            None => Report::default(),
-        };
-        json(&report)
+        let report = py.detach(|| {
+            let mut inner = self.inner.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            inner.take().map_or_else(|| Ok(Report::default()), batch::Store::finish)
+        });
+        json(&report.or_raise()?)
     }
 }

@@ -7,10 +7,8 @@ use gripfast::export::{self, Convention, Dialect, Format, Joint, Options, Origin
 use gripfast::geometry::patch_area;
 use gripfast::gripper;
 use gripfast::model::{Patch, Wrench};
-use gripfast::part::{Part as ReadPart, ReadOptions, Unit};
 use gripfast::pick::Picker;
 use gripfast::plan::Outcome;
-use gripfast::propose::{ProposeOptions, Proposer};
 use gripfast::rank;
 use gripfast::results::{GripSet, RankedGrip};
 use gripfast::scene::Scene;
@@ -264,26 +262,14 @@ impl Result {
     #[pyo3(signature = (path=None))]
     fn read_part(&self, py: Python<'_>, path: Option<PathBuf>) -> PyResult<Part> {
         let path = path.unwrap_or_else(|| PathBuf::from(&self.set.part.file));
-        let unit = self.set.part.unit_m;
-        let unit = Unit::ALL.into_iter().find(|known| (known.metres() / unit - 1.0).abs() < 1e-9);
-        let options = ReadOptions::default().with_unit(unit);
-        let part = py.detach(|| ReadPart::read(&path, &options)).or_raise()?;
+        let part = py.detach(|| self.set.read_part(&path)).or_raise()?;
         Ok(Part { inner: part.into() })
     }
 
     /// Every test of a grip, as JSON.
     fn why(&self, py: Python<'_>, index: usize, part: &Part) -> PyResult<String> {
         let ranked = self.grip(index)?;
-        let gripper: gripper::Gripper = from_json("gripper", &text(&self.set.gripper)?)?;
-        let options = ProposeOptions::from(&self.set.provenance.request.candidates);
-        let explained = py.detach(|| {
-            let grip = &ranked.grip;
-            Proposer::new(&part.inner, &gripper, &options)?.explain_pose(
-                grip.face_i,
-                grip.face_ii,
-                &grip.part_from_grip,
-            )
-        });
+        let explained = py.detach(|| gripfast::plan::explain(&self.set, ranked, &part.inner));
         let explained = explained.or_raise()?;
         let checks = explained.checks.iter().map(
             |check| json!({"name": check.name, "passed": check.passed, "detail": check.detail}),

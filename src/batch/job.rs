@@ -177,9 +177,19 @@ pub fn run_job(
     threads: Option<usize>,
     stop: &AtomicBool,
 ) -> Option<Finished> {
+    run_job_on(job, || part, threads, stop)
+}
+
+/// The same on the part that `part` brings: a fault while it is read is the job's as well.
+pub(super) fn run_job_on(
+    job: &Job,
+    part: impl FnOnce() -> Option<Part>,
+    threads: Option<usize>,
+    stop: &AtomicBool,
+) -> Option<Finished> {
     let (begin, clock) = (SystemTime::now(), Instant::now());
     let mut heard = Heard::default();
-    let ended = catch_unwind(AssertUnwindSafe(|| plan(job, part, threads, stop, &mut heard)));
+    let ended = catch_unwind(AssertUnwindSafe(|| plan(job, part(), threads, stop, &mut heard)));
     let mut entry = Entry::of(job, begin);
     let mut content = Vec::new();
     match ended {

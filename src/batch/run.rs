@@ -6,7 +6,7 @@ use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 use super::Job;
-use super::job::{Entry, Finished, run_job};
+use super::job::{Entry, Finished, run_job_on};
 use super::store::{Counts, Report, Store};
 use crate::error::Result;
 use crate::part::{Part, ReadOptions};
@@ -44,11 +44,7 @@ struct Shelf(Option<(PathBuf, ReadOptions, Part)>);
 impl Shelf {
     /// The part of a request; `None` where it cannot be read, which the job then says.
     fn part(&mut self, request: &Request) -> Option<Part> {
-        let options = ReadOptions {
-            unit: request.unit,
-            max_memory: request.max_memory.map(|memory| memory.0 as u64),
-            outside_buffers: request.outside_buffers,
-        };
+        let options = ReadOptions::from(request);
         match &self.0 {
             Some((path, with, part)) if *path == request.part && *with == options => {
                 Some(part.clone())
@@ -96,8 +92,8 @@ pub fn run(
                     };
                     let job = &jobs[job];
                     let shared = pending.len() > 1;
-                    let part = if shared { shelf.part(&job.request) } else { None };
-                    let Some(finished) = run_job(job, part, threads, stop) else { return };
+                    let part = || if shared { shelf.part(&job.request) } else { None };
+                    let Some(finished) = run_job_on(job, part, threads, stop) else { return };
                     if send.send(finished).is_err() {
                         return;
                     }

@@ -133,9 +133,18 @@ impl Store {
     /// Opens the folder of `jobs`: a new one, or with `resume` one in which some may be finished.
     ///
     /// # Errors
-    /// When another run works on it, it holds another batch or one that was not to be resumed, a
+    /// When the jobs are not all of a batch in their order, another run works on it, it holds another batch or one that was not to be resumed, a
     /// gripper cannot be read, or it cannot be written.
     pub fn open(jobs: &[Job], folder: &Path, resume: bool) -> Result<Self> {
+        if let Some((place, job)) =
+            jobs.iter().enumerate().find(|(place, job)| job.number != *place)
+        {
+            return Err(Error::input(
+                format!("job {place}"),
+                format!("has number {}", job.number),
+                "give all jobs of a batch, in the order in which the batch lists them",
+            ));
+        }
         let failed = |error| Error::io(folder, "make the folder", error);
         std::fs::create_dir_all(folder.join(WORK)).map_err(failed)?;
         let lock = Lock::take(&folder.join(MANIFEST))?;
@@ -460,4 +469,27 @@ fn groups(jobs: &[Job]) -> Vec<Group> {
         }
     }
     groups
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::request::Request;
+
+    #[test]
+    fn jobs_out_of_their_order_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let job = |number: usize| Job {
+            number,
+            part: "part".to_owned(),
+            gripper: "generic".to_owned(),
+            loads: "loads".to_owned(),
+            request: Request { gripper: "generic".into(), ..Request::default() },
+        };
+        let open = |jobs: &[Job]| Store::open(jobs, &folder.path().join("out"), false);
+        let error = open(&[job(0), job(2)]).unwrap_err().to_string();
+        assert!(error.contains("job 1: has number 2"), "{error}");
+        assert!(!folder.path().join("out").exists(), "nothing is made");
+        assert_eq!(open(&[job(0), job(1)]).unwrap().pending(), [0, 1]);
+    }
 }

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::model::{Frame, LARGEST_LENGTH, Polygon};
+use crate::request::Request;
 
 mod borders;
 mod boundary;
@@ -148,6 +149,16 @@ setters!(ReadOptions {
     with_max_memory: max_memory: Option<u64>,
     with_outside_buffers: outside_buffers: bool,
 });
+
+impl From<&Request> for ReadOptions {
+    fn from(request: &Request) -> Self {
+        Self {
+            unit: request.unit,
+            max_memory: request.max_memory.map(|memory| memory.0 as u64),
+            outside_buffers: request.outside_buffers,
+        }
+    }
+}
 
 /// A part, read and checked.
 #[derive(Debug, Clone, PartialEq)]

@@ -75,6 +75,12 @@ impl Settings {
         self
     }
 
+    /// What orders a grip with this `mu_s` and alpha, see [`rank::merit`].
+    fn merit(&self, mu: f64, alpha: f64) -> f64 {
+        let slips = self.pads.verdict(Some(mu)).holds() == Some(false);
+        rank::merit(self.weights.score(mu, alpha), slips)
+    }
+
     /// Those of a request with this gripper. Only the worst loads are solved: the others of grips
     /// that are kept come after the ranking.
     ///
@@ -144,15 +150,21 @@ impl Assessor<'_> {
     /// The grips without those under a load that the gripper may not carry, and how many fell to
     /// which limit.
     pub fn carried(&self, mut grips: Vec<Grip>) -> (Vec<Grip>, BTreeMap<String, u64>) {
-        let (limits, mut over) = (&self.settings.limits, BTreeMap::new());
-        if !limits.is_empty() {
+        let mut over = BTreeMap::new();
+        if !self.settings.limits.is_empty() {
             let reasons: Vec<Option<String>> =
-                grips.par_iter().map(|grip| limits.exceeded(&self.wrenches(grip))).collect();
+                grips.par_iter().map(|grip| self.over(grip)).collect();
             let mut of_grip = reasons.iter();
             grips.retain(|_| of_grip.next().is_some_and(Option::is_none));
             reasons.into_iter().flatten().for_each(|reason| *over.entry(reason).or_default() += 1);
         }
         (grips, over)
+    }
+
+    /// The limit of the gripper that a load exceeds in this grip, as rejections name it.
+    pub(super) fn over(&self, grip: &Grip) -> Option<String> {
+        let limits = &self.settings.limits;
+        if limits.is_empty() { None } else { limits.exceeded(&self.wrenches(grip)) }
     }
 
     /// Scores every grip under its worst load, in order. The answers depend neither on the number
@@ -178,36 +190,23 @@ impl Assessor<'_> {
         grips: Vec<Grip>,
         mut best: Option<&mut Best>,
     ) -> Result<Vec<RankedGrip>> {
-        let mut ranked = Vec::with_capacity(grips.len());
-        let mut grips = grips.into_iter().peekable();
-        while grips.peek().is_some() {
-            let block: Vec<Grip> =
-                grips.by_ref().take((LOADS_AT_ONCE / self.loads.len().max(1)).max(1)).collect();
-            ranked.extend(self.assess_block(block, best.as_deref_mut())?);
-        }
-        Ok(ranked)
-    }
-
-    fn assess_block(
-        &self,
-        grips: Vec<Grip>,
-        mut best: Option<&mut Best>,
-    ) -> Result<Vec<RankedGrip>> {
-        // Those on planes and the others by turns: mostly all of one kind.
+        let most = (LOADS_AT_ONCE / self.loads.len().max(1)).max(1);
         let mut ranked = Vec::with_capacity(grips.len());
         let mut grips = grips.into_iter().peekable();
         while let Some(first) = grips.peek() {
+            // Those on planes and the others by turns: mostly all of one kind.
             let curved = first.surfaces.is_some();
-            let same = |grip: &Grip| grip.surfaces.is_some() == curved;
-            let mut run = Vec::new();
-            while let Some(grip) = grips.next_if(same) {
-                run.push(grip);
+            let mut block = Vec::new();
+            while block.len() < most
+                && let Some(grip) = grips.next_if(|grip| grip.surfaces.is_some() == curved)
+            {
+                block.push(grip);
             }
             let best = best.as_deref_mut();
             ranked.extend(if curved {
-                self.assess_curved(run, best)
+                self.assess_curved(block, best)
             } else {
-                self.assess_plane(run, best)?
+                self.assess_plane(block, best)?
             });
         }
         Ok(ranked)
@@ -229,11 +228,7 @@ impl Assessor<'_> {
                     .par_iter()
                     .map(|grip| self.alpha(grip, least(&TwistOut::new(&grip.contact))))
                     .collect();
-                let Settings { weights, pads, .. } = self.settings;
-                let merit = |index: usize, mu: f64| {
-                    let slips = pads.verdict(Some(mu)).holds() == Some(false);
-                    rank::merit(weights.score(mu, alphas[index]), slips)
-                };
+                let merit = |index: usize, mu: f64| self.settings.merit(mu, alphas[index]);
                 self.backend.score_best(&batch, self.seeds, &self.settings.score, best, &merit)?
             }
         };
@@ -270,11 +265,9 @@ impl Assessor<'_> {
         };
         let ranked: Vec<RankedGrip> = jobs.map(measure).collect();
         if let Some(best) = best {
-            let Settings { weights, pads, .. } = self.settings;
             for ranked in ranked.iter().filter(|ranked| ranked.worst.status.holds()) {
                 let mu = ranked.worst.mu_s.unwrap_or(f64::INFINITY);
-                let slips = pads.verdict(Some(mu)).holds() == Some(false);
-                best.insert(rank::merit(weights.score(mu, ranked.alpha), slips));
+                best.insert(self.settings.merit(mu, ranked.alpha));
             }
         }
         ranked
@@ -337,40 +330,25 @@ impl Assessor<'_> {
         let share = |left: f64, patch: &Patch| (left / patch_area(patch)).min(1.0);
         let contact_share = share(score.contact_area_i, &grip.contact.face_i)
             .min(share(score.contact_area_ii, &grip.contact.face_ii));
+        let worst = LoadScore {
+            load: load as u32,
+            wrench,
+            status: score.status,
+            mu_s: score.mu_s,
+            slip: score.slip,
+            pressure: score.pressure,
+            bounds: score.bounds,
+            residual: score.residual,
+        };
+        let needed = self.settings.pads.value.zip(score.mu_s).filter(|(_, mu)| *mu > 0.0);
         RankedGrip {
-            rank: 0,
-            score: None,
-            holds: None,
             alpha: self.alpha(&grip, least),
             delta_d: twist_out::delta_d(grip.width, least),
             contact_share,
             twist_margin: margin(&wrench),
-            safety: self
-                .settings
-                .pads
-                .value
-                .zip(score.mu_s)
-                .filter(|(_, mu)| *mu > 0.0)
-                .map(|(friction, mu)| friction / mu),
-            force_needed: None,
-            load_multiple: None,
-            earlier: None,
-            pose_noise: None,
-            worst: LoadScore {
-                load: load as u32,
-                wrench,
-                status: score.status,
-                mu_s: score.mu_s,
-                slip: score.slip,
-                pressure: score.pressure,
-                bounds: score.bounds,
-                residual: score.residual,
-            },
-            faces: None,
-            notes: Vec::new(),
-            merged: Vec::new(),
+            safety: needed.map(|(friction, mu)| friction / mu),
             mu_by_load: scored.all.iter().map(|score| score.mu_s).collect(),
-            grip,
+            ..RankedGrip::new(grip, worst)
         }
     }
 

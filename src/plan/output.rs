@@ -4,16 +4,14 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::limits::Limits;
 use super::{Assessor, Plan, Settings};
 use crate::backend::{Backend, ScoreOptions, SeedSet};
 use crate::error::{Error, ErrorKind, Result};
 use crate::export::{self, Format};
 use crate::gripper::Gripper;
-use crate::rank::Weights;
 use crate::report;
 use crate::request::Polish;
-use crate::results::{GripSet, PadFriction, RankedGrip};
+use crate::results::{GripSet, RankedGrip};
 
 /// The best grips of a list, for which a page shows the friction over all loads.
 pub const WHOLE: usize = 20;
@@ -127,19 +125,11 @@ pub(super) fn gripper_json(gripper: &Gripper) -> Result<Value> {
 /// As [`Backend::score`].
 pub fn solve_every_load(set: &mut GripSet, count: usize) -> Result<()> {
     let scoring = &set.provenance.request.scoring;
-    let settings = Settings {
-        force: set.provenance.resolved.force.0,
-        weights: Weights::default(),
-        delta: 0.0,
-        mu_c: 0.0,
-        pads: PadFriction::default(),
-        limits: Limits::default(),
-        score: ScoreOptions {
-            polish: Polish::All,
-            separation: scoring.separation,
-            refiner: scoring.refiner,
-        },
-    };
+    let settings = Settings::of_force(set.provenance.resolved.force.0).with_score(ScoreOptions {
+        polish: Polish::All,
+        separation: scoring.separation,
+        refiner: scoring.refiner,
+    });
     let seeds = SeedSet::default();
     let assessor = Assessor {
         loads: &set.loads,

@@ -8,14 +8,15 @@ use rayon::prelude::*;
 use super::search::Search;
 use super::{Assessor, Plan, output};
 use crate::backend::select;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::export::tool_in_grip;
+use crate::gripper::Gripper;
 use crate::model::{Frame, Grip};
+use crate::part::Part;
 use crate::poses::Pose;
-use crate::propose::{Explanation, Fit, Misfit, Proposer};
+use crate::propose::{Explanation, Fit, Misfit, ProposeOptions, Proposer};
 use crate::rank;
-use crate::request::Polish;
-use crate::results::{self, GripSet, RankedGrip, Summary};
+use crate::results::{GripSet, PadFriction, Provenance, RankedGrip, Summary};
 
 /// Poses within this \[m\] and this \[rad\] are one pose: what files with six digits keep.
 const SAME_PLACE: f64 = 2e-6;
@@ -33,12 +34,20 @@ pub struct Assessed {
     pub explanation: Option<Explanation>,
     /// Its numbers, where it touches both faces, free or not.
     pub ranked: Option<RankedGrip>,
+    /// The limit of the gripper that a load exceeds there, as rejections name it.
+    pub over: Option<String>,
 }
 
 impl Assessed {
     /// Whether nothing stands in its way.
     pub fn is_free(&self) -> bool {
-        self.explanation.as_ref().is_some_and(|explanation| explanation.rejection.is_none())
+        self.rejection().is_none()
+    }
+
+    /// What stands in its way, by the name that a plan counts it under.
+    pub fn rejection(&self) -> Option<String> {
+        let Some(explanation) = &self.explanation else { return Some("no_faces".to_owned()) };
+        explanation.rejection.as_ref().map(|rejection| rejection.name()).or(self.over.clone())
     }
 
     /// Whether it is free and a limit state exists for its worst load.
@@ -120,19 +129,23 @@ impl Plan {
             if !assessed.is_grip() {
                 return Ok((assessed, None));
             }
+            // Every grip counts for a rank.
             let search = Search {
                 assessor: &assessor,
                 keep: self.request.kept(),
-                race: scoring.polish == Polish::Top,
+                race: false,
                 sample: 0,
                 partial: None,
                 resume: false,
                 ids: None,
             };
             let found = search.run(&mut proposer, &mut (), &AtomicBool::new(false))?;
-            let (set, _) = self.finish(&proposer, &assessor, found)?;
-            let standing = assessed.ranked.as_ref().map(|ranked| standing(ranked, &set));
-            Ok((assessed, standing.map(|standing| (standing, set.summary.ranked))))
+            let (low, high) = self.part.mesh.bounding_box();
+            let (centre, size) = (self.mass.centre_of_mass, (high - low).length());
+            let all = found.collector.finish(centre, size, &self.rank_options());
+            let pads = self.settings.pads;
+            let standing = assessed.ranked.as_ref().map(|ranked| standing(ranked, &all, pads));
+            Ok((assessed, standing.map(|standing| (standing, all.ranked))))
         })
     }
 
@@ -149,13 +162,15 @@ impl Plan {
             .map(|(index, pose)| self.try_pose(proposer, pose, index as u64, turn))
             .collect::<Result<_>>()?;
         let grips: Vec<Grip> = tried.iter().filter_map(|(_, grip)| grip.clone()).collect();
+        let over: Vec<Option<String>> = grips.par_iter().map(|grip| assessor.over(grip)).collect();
         let mut scored = assessor.assess(grips)?;
         assessor.finish(&mut scored);
-        let mut scored = scored.into_iter();
+        let mut scored = scored.into_iter().zip(over);
         Ok(tried
             .into_iter()
             .map(|(mut assessed, grip)| {
-                assessed.ranked = grip.and_then(|_| scored.next()).map(|mut ranked| {
+                assessed.ranked = grip.and_then(|_| scored.next()).map(|(mut ranked, over)| {
+                    assessed.over = over;
                     let mu_s = ranked.worst.mu_s.filter(|_| ranked.worst.status.holds());
                     ranked.score = mu_s
                         .map(|mu_s| self.settings.weights.score(mu_s, ranked.alpha))
@@ -191,7 +206,7 @@ impl Plan {
             fit = proposer.fit(&grip_frame(gap)?, turn);
         }
         let mut assessed =
-            Assessed { name: pose.name.clone(), fit, explanation: None, ranked: None };
+            Assessed { name: pose.name.clone(), fit, explanation: None, ranked: None, over: None };
         let Ok(fit) = fit else { return Ok((assessed, None)) };
         assessed.explanation = Some(proposer.explain_fit(&fit)?);
         let grip = proposer.grip_at(&fit, id);
@@ -212,44 +227,56 @@ impl Plan {
         let options = rank::Options { keep_flips: true, top: None, ..self.rank_options() };
         let ranking = rank::rank(grips, self.mass.centre_of_mass, (high - low).length(), &options);
         let mut rejections = ranking.rejections;
-        for pose in poses {
-            let reason = match (&pose.fit, &pose.explanation) {
-                (Err(_), _) => "no_faces".to_owned(),
-                (_, Some(explanation)) => match &explanation.rejection {
-                    Some(rejection) => rejection.name(),
-                    None => continue,
-                },
-                (Ok(_), None) => continue,
-            };
+        for reason in poses.iter().filter_map(Assessed::rejection) {
             *rejections.entry(reason).or_default() += 1;
         }
-        Ok(GripSet {
-            format: results::FORMAT.into(),
-            version: results::VERSION,
-            provenance: self.provenance(backend.to_owned(), true),
-            part: self.part_summary([low, high]),
-            gripper: output::gripper_json(&self.gripper)?,
-            loads: self.loads.clone(),
-            summary: Summary {
-                pairs: proposer.tally().pairs,
-                candidates: poses.len() as u64,
-                ranked: ranking.ranked,
-                holding: self.settings.pads.value.map(|_| ranking.holding),
-                rejections,
-                comparison: None,
-            },
-            negatives: Vec::new(),
-            grips: ranking.grips,
-        })
+        let mut set = GripSet::new(
+            self.provenance(backend.to_owned(), true),
+            self.part_summary([low, high]),
+            output::gripper_json(&self.gripper)?,
+            self.loads.clone(),
+        );
+        set.summary = Summary {
+            pairs: proposer.tally().pairs,
+            candidates: poses.len() as u64,
+            ranked: ranking.ranked,
+            holding: self.settings.pads.value.map(|_| ranking.holding),
+            rejections,
+            comparison: None,
+        };
+        set.grips = ranking.grips;
+        Ok(set)
     }
 }
 
-/// Where a grip stands in a set in order.
-fn standing(ranked: &RankedGrip, set: &GripSet) -> Standing {
+/// Every test of a grip of a result, with the options of its run.
+///
+/// # Errors
+/// When the gripper of the result or the scene of its request cannot be read; as
+/// [`Proposer::new`].
+pub fn explain(set: &GripSet, ranked: &RankedGrip, part: &Part) -> Result<Explanation> {
+    let gripper: Gripper = serde_json::from_value(set.gripper.clone()).map_err(|error| {
+        Error::format("gripper", format!("in the result: {error}"), "make the result again")
+    })?;
+    let Provenance { request, resolved, .. } = &set.provenance;
+    let mut options = ProposeOptions::read(&request.candidates)?;
+    options.force = Some(resolved.force.0).filter(|force| *force > 0.0);
+    let mut part = part.clone();
+    part.set_centre_of_mass(set.part.mass.centre_of_mass);
     let grip = &ranked.grip;
-    // Grips that slip come after all that do not.
+    Proposer::new(&part, &gripper, &options)?.explain_pose(
+        grip.face_i,
+        grip.face_ii,
+        &grip.part_from_grip,
+    )
+}
+
+/// Where a grip stands among others in order.
+fn standing(ranked: &RankedGrip, all: &rank::Ranking, pads: PadFriction) -> Standing {
+    let grip = &ranked.grip;
     let merit = |grip: &RankedGrip| {
-        (set.verdict(grip).holds() != Some(false), grip.score.unwrap_or(f64::INFINITY))
+        let slips = pads.verdict(grip.friction_needed()).holds() == Some(false);
+        rank::merit(grip.score.unwrap_or(f64::INFINITY), slips)
     };
     let apart = |other: &Grip| other.part_from_grip.origin.distance(grip.part_from_grip.origin);
     let turned = |other: &Grip| {
@@ -260,16 +287,16 @@ fn standing(ranked: &RankedGrip, set: &GripSet) -> Standing {
     };
     let same =
         |other: &&RankedGrip| apart(&other.grip) < SAME_PLACE && turned(&other.grip) < SAME_TURN;
-    if let Some(found) = set.grips.iter().find(same) {
+    if let Some(found) = all.grips.iter().find(same) {
         return Standing::Found { rank: found.rank, id: found.grip.id };
     }
-    let better = set.grips.iter().filter(|other| merit(other) > merit(ranked)).count() as u64;
+    let better = all.grips.iter().filter(|other| merit(other) > merit(ranked)).count() as u64;
     let faces = |grip: &Grip| (grip.face_i.min(grip.face_ii), grip.face_i.max(grip.face_ii));
-    let on_the_same = set.grips.iter().filter(|other| faces(&other.grip) == faces(grip));
+    let on_the_same = all.grips.iter().filter(|other| faces(&other.grip) == faces(grip));
     let nearest = on_the_same
         .map(|other| (other.rank, other.grip.id, apart(&other.grip), turned(&other.grip)))
         .min_by(|a, b| (a.2 + 0.05 * a.3).total_cmp(&(b.2 + 0.05 * b.3)))
         .map(|(rank, id, apart, _)| (rank, id, apart));
-    let beyond = better == set.grips.len() as u64 && set.summary.ranked > better;
+    let beyond = better == all.grips.len() as u64 && all.ranked > better;
     Standing::NotTried { rank: better + 1, beyond, nearest }
 }

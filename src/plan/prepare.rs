@@ -187,12 +187,7 @@ fn read_part(request: &Request, threads: &ThreadPool) -> Result<Part> {
     if request.part.as_os_str().is_empty() {
         return Err(Error::input("part", "none is named", "give a part file"));
     }
-    let options = ReadOptions {
-        unit: request.unit,
-        max_memory: request.max_memory.map(|memory| memory.0 as u64),
-        outside_buffers: request.outside_buffers,
-    };
-    threads.install(|| Part::read(Path::new(&request.part), &options))
+    threads.install(|| Part::read(Path::new(&request.part), &ReadOptions::from(request)))
 }
 
 fn load_set(request: &Request) -> Result<LoadSet> {

@@ -3,8 +3,7 @@
 
 use super::choose_diverse;
 use crate::error::{Error, Result};
-use crate::geometry::{patch_area, ring_area};
-use crate::model::Ring;
+use crate::gripper::Gripper;
 use crate::request::Cone;
 use crate::results::{GripSet, PadFriction, RankedGrip};
 
@@ -48,10 +47,7 @@ impl Filter {
                 .with_options(&["ids"]));
             }
         }
-        let pad = match self.min_pad_share {
-            None => 0.0,
-            Some(_) => pad_area(set)?,
-        };
+        let gripper = self.min_pad_share.map(|_| gripper(set)).transpose()?;
         let pads = self.pads.unwrap_or_else(|| set.pads());
         if self.holding && pads.value.is_none() {
             return Err(Error::input(
@@ -62,7 +58,7 @@ impl Filter {
             .with_options(&["holding", "pad_friction"]));
         }
         set.grips.retain(|ranked| {
-            self.passes(ranked, pad)
+            self.passes(ranked, gripper.as_ref())
                 && (!self.holding || pads.verdict(ranked.friction_needed()).holds() == Some(true))
         });
         let top = self.top.unwrap_or(usize::MAX).min(set.grips.len());
@@ -75,7 +71,7 @@ impl Filter {
         Ok(())
     }
 
-    fn passes(&self, ranked: &RankedGrip, pad: f64) -> bool {
+    fn passes(&self, ranked: &RankedGrip, gripper: Option<&Gripper>) -> bool {
         let grip = &ranked.grip;
         let among =
             |faces: &Vec<u32>| faces.contains(&grip.face_i) && faces.contains(&grip.face_ii);
@@ -83,26 +79,24 @@ impl Filter {
             let approach = grip.part_from_grip.rotation.x_axis;
             approach.angle_between(cone.axis) <= cone.half_angle + 1e-9
         };
-        let touches = |share: f64| {
-            let area = patch_area(&grip.contact.face_i).min(patch_area(&grip.contact.face_ii));
-            area >= share * pad * (1.0 - 1e-9)
+        let touches = |gripper: &Gripper| {
+            let least = self.min_pad_share.unwrap_or(0.0);
+            gripper.pad_share(&grip.contact) >= least * (1.0 - 1e-9)
         };
         self.ids.as_ref().is_none_or(|ids| ids.contains(&grip.id))
             && self.faces.as_ref().is_none_or(among)
             && self.approach.as_ref().is_none_or(within)
-            && self.min_pad_share.is_none_or(touches)
+            && gripper.is_none_or(touches)
     }
 }
 
-/// Area of the pad that a result states [m^2].
-fn pad_area(set: &GripSet) -> Result<f64> {
-    let pad = set.gripper.get("pad").cloned().unwrap_or_default();
-    let ring: Ring = serde_json::from_value(pad).map_err(|error| {
+/// The gripper that a result states.
+fn gripper(set: &GripSet) -> Result<Gripper> {
+    serde_json::from_value(set.gripper.clone()).map_err(|error| {
         Error::input(
             "gripper in the result file",
-            format!("states no pad: {error}"),
+            format!("is none: {error}"),
             "write the result again with `gripfast plan`",
         )
-    })?;
-    Ok(ring_area(&ring))
+    })
 }

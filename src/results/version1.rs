@@ -128,7 +128,7 @@ impl Old {
     fn provenance(self) -> Provenance {
         let OldProvenance { gripfast, command, backend, settings } = self.provenance;
         let mut request = Request::new(self.part.file, self.gripper.name);
-        request.unit = Unit::ALL.into_iter().find(|unit| unit.metres() == self.part.unit_m);
+        request.unit = Unit::of_metres(self.part.unit_m);
         request.mass = Some(Mass(self.part.mass.mass));
         request.force = Some(Force(settings.force_n));
         request.loads.clear();

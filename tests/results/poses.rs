@@ -123,6 +123,10 @@ fn a_pose_is_told_its_rank_or_why_it_has_none() {
     assert!(assessed.is_grip());
     let Some((Standing::Found { rank, id }, all)) = standing else { panic!("{standing:?}") };
     assert_eq!((rank, id, all), (some.rank, some.grip.id, set.summary.ranked));
+    let last = set.grips.last().unwrap();
+    let (_, standing) = plan.place(&last.grip.part_from_grip, TILT).unwrap();
+    let Some((Standing::Found { rank, .. }, _)) = standing else { panic!("{standing:?}") };
+    assert_eq!(rank, last.rank);
     // A little beside it nothing was tried.
     let mut beside = some.grip.part_from_grip;
     beside.origin += beside.rotation.y_axis * 0.0007;

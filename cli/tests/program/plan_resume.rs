@@ -178,6 +178,13 @@ fn an_interrupted_run_ranks_what_it_has_and_goes_on_later() {
             && all.summary.ranked >= some.summary.ranked
     );
     assert!(!partial(&file).exists());
+    // Finished, it is not computed again.
+    let (bytes, before) = (std::fs::read(&file).unwrap(), Instant::now());
+    let output = run(&file, &["--resume"]);
+    let err = text(&output.stderr);
+    assert!(err.contains("holds this run, finished"), "{:?}: {err}", before.elapsed());
+    assert_eq!(output.status.code(), Some(0), "{err}");
+    assert_eq!(std::fs::read(&file).unwrap(), bytes);
 }
 
 #[test]

@@ -193,6 +193,7 @@ fn loads_over_payload_and_moments_are_told_with_the_number() {
         format!("{part} -g {gripper} --mass 350g --spacing 10mm --angle-step 45deg")
     };
     let (all, ..) = plan(folder.path(), &line("robotiq-2f85"), 0);
+    std::fs::copy(folder.path().join("grips.json"), folder.path().join("all.json")).unwrap();
     let (same, ..) = plan(folder.path(), &line("payload.toml"), 0);
     assert_eq!(all.grips, same.grips, "350 g are no more than 500 g");
     let heavy = line("payload.toml") + " --accel 1g";
@@ -217,6 +218,22 @@ fn loads_over_payload_and_moments_are_told_with_the_number() {
     assert!(out.contains(&format!("{expected} over moment:x3 0.03 Nm")), "{expected}: {out}");
     let left: Vec<u64> = all.grips.iter().filter(|g| !over(g)).map(|g| g.grip.id).collect();
     assert_eq!(fewer.grips.iter().map(|g| g.grip.id).collect::<Vec<_>>(), left);
+
+    // The same of poses from outside, and of one that is asked about.
+    let line = format!("{} -g moment.toml --mass 350g", part("l_bracket.stl"));
+    let told = text(&gripfast(folder.path(), &format!("assess {line} --poses all.json")).stdout);
+    assert!(told.contains(&format!("{expected} over moment:x3 0.03 Nm")), "{expected}: {told}");
+    let pose = all.grips.iter().find(over).unwrap().grip.part_from_grip;
+    let list = |v: DVec3, unit: &str| v.to_array().map(|value| format!("{value}{unit}"));
+    let axes = [pose.rotation.x_axis, pose.rotation.z_axis];
+    let [x, z] = axes.map(|axis| list(axis, "").join("/"));
+    let output = gripfast(
+        folder.path(),
+        &format!("plan {line} --spacing 10mm --why={}:{x}:{z}", list(pose.origin, "m").join(",")),
+    );
+    let (told, err) = (text(&output.stdout), text(&output.stderr));
+    assert!(told.contains("rejected: over moment:x3 0.03 Nm"), "{told}{err}");
+    assert_eq!(output.status.code(), Some(1), "{told}{err}");
 
     let told = text(&gripfast(folder.path(), "gripper check moment.toml").stdout);
     assert!(told.contains("5, 5, 0.03 Nm") && told.contains("N per jaw"), "{told}");
