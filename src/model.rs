@@ -359,6 +359,29 @@ impl Negative {
     }
 }
 
+/// A candidate that is no grip, and what it lacks.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Miss {
+    /// The candidate and the reason. Two faces that lie outside the stroke make no candidate: of
+    /// them the id is 0 and names nothing.
+    pub pose: Negative,
+    /// What it lacks, where a number says it: how deep a body lies in what stops it, how far a
+    /// width or a place is beyond its limit, of one that does not hold how far it is from the
+    /// centre of mass \[m\]; how far an approach lies outside the cone \[rad\]; which share of the
+    /// contact area asked for is missing (0..1).
+    pub by: Option<f64>,
+    /// Where a body meets what stops it, part frame \[m\].
+    pub place: Option<DVec3>,
+}
+
+impl Miss {
+    /// From its parts.
+    pub fn new(pose: Negative, by: Option<f64>, place: Option<DVec3>) -> Self {
+        Self { pose, by, place }
+    }
+}
+
 /// JSON has no infinity and no nan: both are written as null, and null is read as infinity.
 pub(crate) mod null_is_infinite {
     use serde::{Deserialize, Deserializer, Serializer};

@@ -35,6 +35,7 @@ mod outside;
 mod prepare;
 mod search;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -47,6 +48,7 @@ use crate::export::Format;
 use crate::file::Lock;
 use crate::gripper::{Gripper, Jaws};
 use crate::lab::compare;
+use crate::model::Negative;
 use crate::part::{MassProperties, Part};
 use crate::propose::{Explanation, ProposeOptions, Proposer};
 use crate::rank;
@@ -60,6 +62,7 @@ pub use ahead::Ahead;
 pub use assess::{Assessor, Settings};
 pub use collect::{Collector, OUTRANKED};
 pub use limits::Limits;
+pub use negatives::near_misses;
 pub use output::{GLB_TOP, WHOLE, solve_every_load};
 pub use outside::{Assessed, Assessment, Standing, explain};
 pub use prepare::PlanBuilder;
@@ -254,11 +257,11 @@ impl Plan {
             keep: self.request.kept(),
             race: scoring.polish == Polish::Top,
             ids: self.request.selection.ids.as_deref(),
-            sample: self.request.selection.negatives,
+            sample: self.sample(),
             partial: partial.as_ref(),
             resume: self.request.output.resume,
         };
-        let found = search.run(&mut proposer, observer, stop)?;
+        let mut found = search.run(&mut proposer, observer, stop)?;
         for remark in proposer.tally().remarks(&self.gripper, &self.propose) {
             observer.note(&remark);
         }
@@ -270,8 +273,10 @@ impl Plan {
             ));
         }
         let (complete, checkpoint) = (found.complete, found.checkpoint.clone());
-        let (set, shown) = self.finish(&proposer, &assessor, found)?;
-        let written = self.write(&set, complete)?;
+        let lost = found.collector.take_lost();
+        let misses = self.misses(&proposer, &lost);
+        let (set, shown) = self.finish(&proposer, &assessor, found, lost)?;
+        let written = self.write(&set, complete, &misses)?;
         if let Some(partial) = partial.filter(|_| complete) {
             partial.remove()?;
         }
@@ -289,17 +294,17 @@ impl Plan {
     }
 
     /// Orders what was found and adds what only the grips of the list need; the ids of those to
-    /// show.
+    /// show. `lost`: grips that do not hold, by reason.
     fn finish(
         &self,
         proposer: &Proposer<'_>,
         assessor: &Assessor<'_>,
-        mut found: Found,
+        found: Found,
+        lost: BTreeMap<String, Vec<Negative>>,
     ) -> Result<(GripSet, Vec<u64>)> {
         let selection = &self.request.selection;
         let (low, high) = self.part.mesh.bounding_box();
         let (centre, size) = (self.mass.centre_of_mass, (high - low).length());
-        let lost = found.collector.take_lost();
         let negatives = if found.complete { self.negatives(proposer, lost) } else { Vec::new() };
         let ranking = found.collector.finish(centre, size, &self.rank_options());
         let mut rejections = proposer.tally().rejections.clone();
@@ -359,7 +364,8 @@ impl Plan {
         let shown = self.shown(&set.grips, (high - low).length());
         let mut written = Vec::new();
         if let Some(page) = &output.report {
-            crate::report::write(&set, Some(&self.part.mesh), page)?;
+            let misses = near_misses(&set, &self.part)?;
+            crate::report::write(&set, Some(&self.part.mesh), &misses, page)?;
             written.push(page.clone());
         }
         Ok(Some(Outcome { set, shown, checkpoint: None, written }))

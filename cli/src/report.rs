@@ -7,7 +7,7 @@ use anyhow::Context;
 use clap::Args as ClapArgs;
 use gripfast::error::Error;
 use gripfast::part::Part;
-use gripfast::plan::{WHOLE, solve_every_load};
+use gripfast::plan::{WHOLE, near_misses, solve_every_load};
 use gripfast::report;
 use gripfast::results::GripSet;
 
@@ -53,7 +53,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Err(error) = solve_every_load(&mut set, WHOLE) {
         crate::terminal::say(&format!("warning: {error}\n  the page shows the worst loads only"));
     }
-    report::write(&set, part.as_ref().map(|part| &part.mesh), &output)?;
+    let misses = part.as_ref().map_or(Ok(Vec::new()), |part| near_misses(&set, part));
+    let misses = misses.unwrap_or_else(|error| {
+        crate::terminal::say(&format!("warning: {error}\n  the page shows no rejected candidates"));
+        Vec::new()
+    });
+    report::write(&set, part.as_ref().map(|part| &part.mesh), &misses, &output)?;
     let size = std::fs::metadata(&output)
         .with_context(|| format!("cannot read back {}", output.display()))?
         .len();

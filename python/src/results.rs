@@ -253,7 +253,11 @@ impl Result {
             let mut set = self.set.clone();
             let whole = gripfast::plan::WHOLE.min(set.grips.len());
             gripfast::plan::solve_every_load(&mut set, whole)?;
-            gripfast::report::render(&set, part.map(|part| &part.inner.mesh))
+            let misses = match part {
+                Some(part) => gripfast::plan::near_misses(&set, &part.inner)?,
+                None => Vec::new(),
+            };
+            gripfast::report::render(&set, part.map(|part| &part.inner.mesh), &misses)
         })
         .or_raise()
     }

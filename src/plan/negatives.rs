@@ -3,10 +3,41 @@
 use std::collections::BTreeMap;
 
 use super::Plan;
-use crate::model::Negative;
-use crate::propose::Proposer;
+use crate::error::{Error, Result};
+use crate::gripper::Gripper;
+use crate::model::{Miss, Negative};
+use crate::part::Part;
+use crate::propose::{ProposeOptions, Proposer};
+use crate::results::GripSet;
+
+/// Rejected candidates of each reason that a page shows, at most.
+const SHOWN: usize = 60;
 
 impl Plan {
+    /// Grips that do not hold to keep of each reason, for the result file and for the page.
+    pub(super) fn sample(&self) -> usize {
+        let page = if self.request.output.report.is_some() { SHOWN } else { 0 };
+        self.request.selection.negatives.max(page)
+    }
+
+    /// The rejected candidates that the page shows, where the request asks for one. `lost`: grips
+    /// that do not hold, by reason.
+    pub(super) fn misses(
+        &self,
+        proposer: &Proposer<'_>,
+        lost: &BTreeMap<String, Vec<Negative>>,
+    ) -> Vec<Miss> {
+        if self.request.output.report.is_none() {
+            return Vec::new();
+        }
+        let mut misses = proposer.misses(SHOWN);
+        misses.extend(lost.values().flat_map(|list| list.iter().take(SHOWN)).map(|pose| {
+            let away = pose.part_from_grip.origin.distance(self.mass.centre_of_mass);
+            Miss::new(pose.clone(), Some(away), None)
+        }));
+        misses
+    }
+
     /// As many candidates that are no grips as the request asks for, in the order of their ids.
     /// `lost`: grips that do not hold, by reason.
     pub(super) fn negatives(
@@ -18,6 +49,8 @@ impl Plan {
         if count == 0 {
             return Vec::new();
         }
+        // The page may have asked for more of them.
+        lost.values_mut().for_each(|list| list.truncate(count));
         for pose in proposer.rejected(count) {
             lost.entry(pose.reason.clone()).or_default().push(pose);
         }
@@ -25,6 +58,28 @@ impl Plan {
         chosen.sort_by_key(|pose| pose.id);
         chosen
     }
+}
+
+/// Rejected candidates of the run that made a set, as a page shows them. `part` must be the part
+/// of the set. Of grips that do not hold only those that the set keeps are among them.
+///
+/// # Errors
+/// When the set's gripper is none, or the run's options do not fit the part, or name a scene that
+/// cannot be read.
+pub fn near_misses(set: &GripSet, part: &Part) -> Result<Vec<Miss>> {
+    let gripper: Gripper = serde_json::from_value(set.gripper.clone()).map_err(|error| {
+        Error::input("result file", format!("gripper: {error}"), "make the file again")
+    })?;
+    let mut options = ProposeOptions::read(&set.provenance.request.candidates)?;
+    options.force = Some(set.provenance.resolved.force.0).filter(|force| *force > 0.0);
+    let mut misses = Proposer::new(part, &gripper, &options)?.misses(SHOWN);
+    let proposed: Vec<String> = misses.iter().map(|miss| miss.pose.reason.clone()).collect();
+    let others = set.negatives.iter().filter(|pose| !proposed.contains(&pose.reason));
+    misses.extend(others.map(|pose| {
+        let away = pose.part_from_grip.origin.distance(set.part.mass.centre_of_mass);
+        Miss::new(pose.clone(), Some(away), None)
+    }));
+    Ok(misses)
 }
 
 /// The first ones of each list, `count` in all, as evenly as the lengths of the lists allow.

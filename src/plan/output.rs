@@ -9,6 +9,7 @@ use crate::backend::{Backend, ScoreOptions, SeedSet};
 use crate::error::{Error, ErrorKind, Result};
 use crate::export::{self, Format};
 use crate::gripper::Gripper;
+use crate::model::Miss;
 use crate::report;
 use crate::request::Polish;
 use crate::results::{GripSet, RankedGrip};
@@ -25,12 +26,19 @@ impl Plan {
     /// # Errors
     /// When a file cannot be written.
     pub fn save(&self, set: &GripSet) -> Result<Vec<PathBuf>> {
-        self.write(set, true)
+        let page = self.request.output.report.is_some();
+        let misses = if page { super::near_misses(set, &self.part)? } else { Vec::new() };
+        self.write(set, true, &misses)
     }
 
     /// Writes result file and page where the request names them, or beside these names when the
-    /// run is not complete; the names.
-    pub(super) fn write(&self, set: &GripSet, complete: bool) -> Result<Vec<PathBuf>> {
+    /// run is not complete; the names. `misses` are for the page.
+    pub(super) fn write(
+        &self,
+        set: &GripSet,
+        complete: bool,
+        misses: &[Miss],
+    ) -> Result<Vec<PathBuf>> {
         let name = |path: &PathBuf| if complete { path.clone() } else { interrupted(path) };
         let output = self.request.output.output.as_ref().map(name);
         let page = self.request.output.report.as_ref().map(name);
@@ -49,7 +57,7 @@ impl Plan {
             }
         }
         if let Some(path) = &page {
-            report::write(set, mesh, path)?;
+            report::write(set, mesh, misses, path)?;
         }
         Ok(output.into_iter().chain(page).collect())
     }

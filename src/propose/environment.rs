@@ -111,6 +111,23 @@ impl Environment {
         self.cone.is_none_or(|cone| cone.axis.angle_between(approach) <= cone.half_angle + 1e-9)
     }
 
+    /// How far an approach (part frame) lies outside the cone \[rad\].
+    pub(super) fn outside_cone(&self, approach: DVec3) -> Option<f64> {
+        self.cone.map(|cone| cone.axis.angle_between(approach) - cone.half_angle)
+    }
+
+    /// How deep sweeps lie below the ground \[m\], and the lowest point of the first that does
+    /// \[m\]; `None` where none does.
+    pub(super) fn below(&self, sweeps: &[Sweep], part_from_grip: &Frame) -> Option<(f64, DVec3)> {
+        let ground = self.ground?;
+        let depths = self.depths(sweeps, part_from_grip);
+        let first = self.grounded(&depths, part_from_grip.origin)?;
+        let height = ground.normal.dot(part_from_grip.origin) - ground.offset;
+        let lowest = depths.iter().copied().fold(f64::INFINITY, f64::min);
+        let down = part_from_grip.rotation.transpose() * -ground.normal;
+        Some((-(height + lowest), part_from_grip.point(sweeps[first].support_point(down))))
+    }
+
     /// Smallest angle between the cone's axis and the approaches of all sites \[rad\].
     pub(super) fn nearest_approach(&self, sites: &[Site]) -> Option<f64> {
         let cone = self.cone?;

@@ -408,6 +408,12 @@ fn title(sweep: &Sweep) -> String {
 
 /// A point of the triangle within the sweep's box: the middle of what the box cuts out of it.
 fn common_point(sweep: &Sweep, corners: [DVec3; 3]) -> DVec3 {
+    let ring = clipped(sweep, corners);
+    ring.iter().sum::<DVec3>() / ring.len() as f64
+}
+
+/// What the sweep's box cuts out of the triangle: corners of a polygon, at least one.
+pub(super) fn clipped(sweep: &Sweep, corners: [DVec3; 3]) -> Vec<DVec3> {
     let mut ring = corners.to_vec();
     for axis in 0..3 {
         for (sign, limit) in [(1.0, sweep.high[axis]), (-1.0, -sweep.low[axis])] {
@@ -417,5 +423,5 @@ fn common_point(sweep: &Sweep, corners: [DVec3; 3]) -> DVec3 {
             }
         }
     }
-    ring.iter().sum::<DVec3>() / ring.len() as f64
+    ring
 }

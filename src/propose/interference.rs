@@ -176,9 +176,25 @@ impl<'a> View<'a> {
     /// The first triangle, by mesh index, that the sweep meets at `position`, with its corners in
     /// the grip frame.
     pub(super) fn first_met(&self, sweep: &Sweep, position: DVec2) -> Option<(u32, [DVec3; 3])> {
+        let mut first: Option<(u32, [DVec3; 3])> = None;
+        self.each_met(sweep, position, &mut |index, corners| {
+            if first.is_none_or(|(best, _)| index < best) {
+                first = Some((index, corners));
+            }
+        });
+        first
+    }
+
+    /// Visits every triangle that the sweep meets at `position`: its mesh index, and its corners in
+    /// the grip frame.
+    pub(super) fn each_met(
+        &self,
+        sweep: &Sweep,
+        position: DVec2,
+        visit: &mut dyn FnMut(u32, [DVec3; 3]),
+    ) {
         let window = window(sweep, position, position);
         let mut stack = if self.tree.is_empty() { Vec::new() } else { vec![0] };
-        let mut first: Option<(u32, [DVec3; 3])> = None;
         while let Some(node) = stack.pop() {
             let (middle, half) = self.tree.bounds(node);
             if !self.overlaps(&window, middle, half) {
@@ -189,14 +205,13 @@ impl<'a> View<'a> {
                 None => {
                     for (index, corners) in self.tree.triangles(node) {
                         let corners = self.local(corners, position);
-                        if first.is_none_or(|(best, _)| index < best) && sweep.meets(corners) {
-                            first = Some((index, corners));
+                        if sweep.meets(corners) {
+                            visit(index, corners);
                         }
                     }
                 }
             }
         }
-        first
     }
 
     /// Separating axes of a node's box (tree axes) and the window's outer box (grip axes); both

@@ -12,6 +12,7 @@ mod environment;
 mod explain;
 mod fit;
 mod interference;
+mod miss;
 mod options;
 mod patch;
 mod proposer;

@@ -135,6 +135,8 @@ pub struct Proposer<'a> {
     pub(super) whole: Arc<Contact>,
     pub(super) symmetric: bool,
     tally: Tally,
+    /// The faces that come nearest to the stroke of those outside.
+    pub(super) outside: Option<FacePair>,
     next: Cursor,
     /// Corners per candidate in the last chunk.
     corners: f64,
@@ -199,7 +201,9 @@ impl<'a> Proposer<'a> {
         let mut tally = Tally::default();
         let mut pairs = Vec::new();
         let chosen = chosen_faces(part, options)?;
-        let mut choice = Choice { chosen: chosen.as_deref(), pairs: &mut pairs, tally: &mut tally };
+        let (chosen_faces, outside) = (chosen.as_deref(), &mut None);
+        let mut choice =
+            Choice { chosen: chosen_faces, pairs: &mut pairs, tally: &mut tally, outside };
         let [least, most] = gripper.stroke;
         if options.outside {
             let opened = [least, most - 2.0 * options.min_opening];
@@ -218,6 +222,7 @@ impl<'a> Proposer<'a> {
             let opened = [reach[0] + 2.0 * options.min_opening, reach[1]];
             choice.take(part.internal_pairs(0.0, f64::INFINITY), reach, opened);
         }
+        let outside = choice.outside.take();
         let environment = Environment::new(options);
         let Sites { sites, directions, plane, round } =
             site::sites(part, gripper, options, &environment, &pairs, chosen.as_deref())?;
@@ -244,6 +249,7 @@ impl<'a> Proposer<'a> {
             whole: Arc::new(Contact { face_i: pad.clone(), face_ii: pad }),
             symmetric: gripper.is_symmetric(),
             tally,
+            outside,
             plane,
             next: Cursor {
                 special_id: grid as u64 * stride,
@@ -498,6 +504,8 @@ struct Choice<'a> {
     chosen: Option<&'a [bool]>,
     pairs: &'a mut Vec<FacePair>,
     tally: &'a mut Tally,
+    /// The pair nearest to the stroke of those outside.
+    outside: &'a mut Option<FacePair>,
 }
 
 impl Choice<'_> {
@@ -509,6 +517,10 @@ impl Choice<'_> {
             let chosen = |face: u32| self.chosen.is_none_or(|chosen| chosen[face as usize]);
             let reason = if !within(stroke, pair.width) {
                 self.tally.note_width(pair.width, stroke);
+                let beyond = |pair: &FacePair| (stroke[0] - pair.width).max(pair.width - stroke[1]);
+                if self.outside.as_ref().is_none_or(|known| beyond(&pair) < beyond(known)) {
+                    *self.outside = Some(pair);
+                }
                 Rejection::Stroke
             } else if !within(opened, pair.width) {
                 Rejection::OpeningTooSmall

@@ -1,12 +1,14 @@
 //! Candidates that are rejected, sampled over all of them.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
 use super::proposer::{Item, Proposer};
 use super::site::Places;
 use super::work;
 use crate::gripper::Jaws;
-use crate::model::Negative;
+use crate::model::{Miss, Negative};
 use crate::part::PairKind;
 
 /// Candidates tried for each one asked for. A reason that is rarer among the candidates than one in
@@ -29,16 +31,26 @@ impl Proposer<'_> {
     /// choice among all candidates. It depends on the input and the options only; the stream of
     /// chunks is neither used nor changed.
     pub fn rejected(&self, most: usize) -> Vec<Negative> {
+        self.sampled(most, None).into_iter().map(|miss| miss.pose).collect()
+    }
+
+    /// As [`Proposer::rejected`]; with `measured`, which says how many closing directions may be
+    /// looked at, also what each candidate lacks.
+    pub(super) fn sampled(&self, most: usize, measured: Option<usize>) -> Vec<Miss> {
         let (stretches, total) = self.stretches();
         let tries = (TRIES * most as u64).max(LEAST_TRIES).min(total);
         let stretch_of =
             |pose: u64| &stretches[stretches.partition_point(|stretch| stretch.first <= pose) - 1];
         let mut poses: Vec<(u64, &Stretch)> =
             shuffled(total).take(tries as usize).map(|pose| (pose, stretch_of(pose))).collect();
-        // One tree at a time, and what a site shares once.
         let direction = |stretch: &Stretch| self.sites[stretch.site].direction;
+        if let Some(count) = measured {
+            let kept = commonest(poses.iter().map(|(_, stretch)| direction(stretch)), count);
+            poses.retain(|(_, stretch)| kept.contains(&direction(stretch)));
+        }
+        // One tree at a time, and what a site shares once.
         poses.sort_by_key(|(pose, stretch)| (direction(stretch), stretch.site, *pose));
-        let mut rejected: Vec<Negative> = Vec::new();
+        let mut rejected: Vec<Miss> = Vec::new();
         for group in poses.chunk_by(|a, b| direction(a.1) == direction(b.1)) {
             let tree = self.new_tree(direction(group[0].1));
             for group in group.chunk_by(|a, b| a.1.site == b.1.site) {
@@ -57,20 +69,22 @@ impl Proposer<'_> {
                         let mut outcome = work::Outcome::default();
                         self.survivors(&item, &prepared, &tree, jaws, buffers, &mut outcome);
                         let (reason, _) = outcome.rejections.pop()?;
-                        Some(self.negative(&item, jaws, reason.name()))
+                        let pose = self.negative(&item, jaws, reason.name());
+                        Some((Miss::new(pose, None, None), item.clone(), jaws, reason))
                     });
                     reasons.collect::<Vec<_>>()
                 });
-                rejected.extend(tried.flatten_iter().collect::<Vec<_>>());
+                let mut tried: Vec<_> = tried.flatten_iter().collect();
+                keep(&mut tried, most, |(miss, ..)| &miss.pose);
+                if measured.is_some() {
+                    tried.par_iter_mut().for_each(|(miss, item, jaws, reason)| {
+                        (miss.by, miss.place) = self.lack(item, &prepared, &tree, *jaws, reason);
+                    });
+                }
+                rejected.extend(tried.into_iter().map(|(miss, ..)| miss));
             }
         }
-        rejected.sort_by_key(|pose| scatter(pose.id));
-        let mut counts = std::collections::BTreeMap::<String, usize>::new();
-        rejected.retain(|pose| {
-            let count = counts.entry(pose.reason.clone()).or_default();
-            *count += 1;
-            *count <= most
-        });
+        keep(&mut rejected, most, |miss| &miss.pose);
         rejected
     }
 
@@ -112,6 +126,26 @@ impl Proposer<'_> {
             reason,
         }
     }
+}
+
+/// Leaves the first `most` of each reason, in the order of their scattered numbers.
+fn keep<T>(all: &mut Vec<T>, most: usize, pose: impl Fn(&T) -> &Negative) {
+    all.sort_by_key(|one| scatter(pose(one).id));
+    let mut counts = BTreeMap::<String, usize>::new();
+    all.retain(|one| {
+        let count = counts.entry(pose(one).reason.clone()).or_default();
+        *count += 1;
+        *count <= most
+    });
+}
+
+/// The `count` numbers that come most often; of those that come equally often the smaller ones.
+fn commonest(numbers: impl Iterator<Item = usize>, count: usize) -> Vec<usize> {
+    let mut times = BTreeMap::<usize, usize>::new();
+    numbers.for_each(|number| *times.entry(number).or_default() += 1);
+    let mut order: Vec<(usize, usize)> = times.into_iter().collect();
+    order.sort_by_key(|&(number, times)| (std::cmp::Reverse(times), number));
+    order.into_iter().take(count).map(|(number, _)| number).collect()
 }
 
 /// A number that looks random, another one for each `number` (the finaliser of SplitMix64).

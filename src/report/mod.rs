@@ -6,15 +6,18 @@
 
 pub mod contact_svg;
 
+mod areas;
 mod decimate;
 mod display;
 mod payload;
+mod states;
 
 use std::io::Write;
 use std::path::Path;
 
 use crate::error::{Error, Result};
 use crate::file;
+use crate::model::Miss;
 use crate::part::Mesh;
 use crate::results::GripSet;
 use payload::Payload;
@@ -27,11 +30,12 @@ const HEADER_MARK: &str = "@@gripfast-header@@";
 const DATA_MARK: &str = "@@gripfast-data@@";
 
 /// The page for `set`. Without a mesh the part is drawn as its bounding box, and the page says so.
+/// `misses` are rejected candidates to show ([`crate::plan::near_misses`]); there may be none.
 ///
 /// # Errors
 /// A mismatch when `set` contradicts itself (a grip under a load that is not listed).
-pub fn render(set: &GripSet, mesh: Option<&Mesh>) -> Result<String> {
-    let payload = Payload::new(set, mesh)?;
+pub fn render(set: &GripSet, mesh: Option<&Mesh>, misses: &[Miss]) -> Result<String> {
+    let payload = Payload::new(set, mesh, misses)?;
     let damaged = || {
         Error::input(
             "report",
@@ -44,11 +48,11 @@ pub fn render(set: &GripSet, mesh: Option<&Mesh>) -> Result<String> {
     Ok([before, &payload.header, between, &payload.data, after].concat())
 }
 
-/// Writes the page for `set` to `path`: whole or not at all.
+/// Writes the page of [`render`] to `path`: whole or not at all.
 ///
 /// # Errors
 /// As [`render`]; a file error when the file cannot be written.
-pub fn write(set: &GripSet, mesh: Option<&Mesh>, path: &Path) -> Result<()> {
-    let page = render(set, mesh)?;
+pub fn write(set: &GripSet, mesh: Option<&Mesh>, misses: &[Miss], path: &Path) -> Result<()> {
+    let page = render(set, mesh, misses)?;
     file::write(path, |writer| writer.write_all(page.as_bytes()))
 }

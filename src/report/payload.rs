@@ -12,14 +12,16 @@ use base64::Engine;
 use bytemuck::NoUninit;
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use rustc_hash::FxHashMap;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
+use super::areas;
 use super::display::{Display, TRIANGLE_BUDGET};
+use super::states::{self, Pressed};
 use crate::error::{Error, ErrorKind, Result};
+use crate::gripper::catalogue::{self, CATALOGUE};
 use crate::gripper::{Body, Gripper, Shape};
-use crate::model::{Contact, Frame, Slip};
+use crate::model::{Frame, Miss};
 use crate::part::Mesh;
 use crate::request::Side;
 use crate::results::{GripSet, Provenance, RankedGrip, Verdict};
@@ -39,37 +41,42 @@ pub(super) struct Payload {
 
 /// Named columns one after another.
 #[derive(Default)]
-struct Columns {
+pub(super) struct Columns {
     bytes: Vec<u8>,
     sections: BTreeMap<&'static str, (&'static str, usize, usize)>,
 }
 
 impl Columns {
-    fn add<T: NoUninit>(&mut self, name: &'static str, kind: &'static str, values: &[T]) {
+    pub(super) fn add<T: NoUninit>(
+        &mut self,
+        name: &'static str,
+        kind: &'static str,
+        values: &[T],
+    ) {
         self.bytes.resize(self.bytes.len().next_multiple_of(8), 0);
         self.sections.insert(name, (kind, self.bytes.len(), values.len()));
         self.bytes.extend_from_slice(bytemuck::cast_slice(values));
     }
 
-    fn f32(&mut self, name: &'static str, values: impl IntoIterator<Item = f64>) {
+    pub(super) fn f32(&mut self, name: &'static str, values: impl IntoIterator<Item = f64>) {
         self.add(name, "f32", &values.into_iter().map(|value| value as f32).collect::<Vec<_>>());
     }
 
-    fn f64(&mut self, name: &'static str, values: impl IntoIterator<Item = f64>) {
+    pub(super) fn f64(&mut self, name: &'static str, values: impl IntoIterator<Item = f64>) {
         self.add(name, "f64", &values.into_iter().collect::<Vec<_>>());
     }
 
-    fn u32(&mut self, name: &'static str, values: impl IntoIterator<Item = u32>) {
+    pub(super) fn u32(&mut self, name: &'static str, values: impl IntoIterator<Item = u32>) {
         self.add(name, "u32", &values.into_iter().collect::<Vec<_>>());
     }
 }
 
 impl Payload {
-    /// Encodes `set` and the part.
+    /// Encodes `set`, the part, and rejected candidates.
     ///
     /// # Errors
     /// A mismatch when a grip names a load that is not in the list.
-    pub(super) fn new(set: &GripSet, mesh: Option<&Mesh>) -> Result<Self> {
+    pub(super) fn new(set: &GripSet, mesh: Option<&Mesh>, misses: &[Miss]) -> Result<Self> {
         if cfg!(target_endian = "big") {
             return Err(Error::new(
                 ErrorKind::Unsupported,
@@ -94,15 +101,18 @@ impl Payload {
                 "use a file that gripfast wrote",
             ));
         }
-        let statuses = poses_and_scores(&mut columns, grips);
+        let pressed = states::worst(set, grips);
+        let statuses = poses_and_scores(&mut columns, grips, &pressed);
         let verdict = |grip| match set.verdict(grip) {
             Verdict::Unknown => 0,
             Verdict::Holds { .. } => 1,
             Verdict::Slips { .. } => 2,
         };
         columns.add("verdict", "u8", &grips.iter().map(verdict).collect::<Vec<u8>>());
-        contacts(&mut columns, grips);
+        areas::contacts(&mut columns, grips);
+        areas::surfaces(&mut columns, grips);
         let by_load = loads(&mut columns, set, grips);
+        let reasons = rejected(&mut columns, misses);
         let display = mesh
             .and_then(|mesh| Display::new(mesh, TRIANGLE_BUDGET))
             .map(|display| surface(&mut columns, display));
@@ -110,10 +120,15 @@ impl Payload {
             match serde_json::from_value::<Gripper>(set.gripper.clone()) {
                 Ok(gripper) => {
                     palm(&mut columns, &gripper, grips);
+                    let place =
+                        |miss: &Miss| gripper.palm_place(gripper.jaw_gap(&miss.pose.grip()));
+                    let places = misses.iter().map(|miss| place(miss).origin);
+                    columns.f32("miss_palm", places.flat_map(|origin| [origin.x, origin.z]));
                     (gripper_json(&gripper), Value::Null)
                 }
                 Err(error) => {
                     columns.f32("palm", grips.iter().flat_map(|_| [0.0; 2]));
+                    columns.f32("miss_palm", misses.iter().flat_map(|_| [0.0; 2]));
                     (Value::Null, Value::String(error.to_string()))
                 }
             };
@@ -121,7 +136,7 @@ impl Payload {
             "format": "gripfast-report", "version": 1, "provenance": provenance(set), "part": set.part, "display": display,
             "gripper": gripper, "gripper_problem": gripper_problem, "loads": set.loads, "summary": set.summary,
             "grips": { "total": set.grips.len(), "shown": grips.len() }, "statuses": statuses, "by_load": by_load,
-            "asked": asked(set), "sections": columns.sections,
+            "asked": asked(set), "reasons": reasons, "catalogue": known_grippers(), "sections": columns.sections,
         });
         Ok(Self { header: script_safe(&header)?, data: packed(&columns.bytes)? })
     }
@@ -163,7 +178,12 @@ fn packed(bytes: &[u8]) -> Result<String> {
 }
 
 /// One row per grip; answers with the names of the statuses in the order of their numbers.
-fn poses_and_scores(columns: &mut Columns, grips: &[RankedGrip]) -> Vec<Value> {
+/// `pressed`: the state of the pads under the worst load of each grip.
+fn poses_and_scores(
+    columns: &mut Columns,
+    grips: &[RankedGrip],
+    pressed: &[Pressed],
+) -> Vec<Value> {
     let nan = f64::NAN;
     columns.f64("id", grips.iter().map(|g| g.grip.id as f64));
     columns.f64("flip_of", grips.iter().map(|g| g.grip.flip_of.map_or(nan, |id| id as f64)));
@@ -193,27 +213,13 @@ fn poses_and_scores(columns: &mut Columns, grips: &[RankedGrip]) -> Vec<Value> {
             .flat_map(|g| [g.worst.wrench.force.to_array(), g.worst.wrench.moment.to_array()])
             .flatten(),
     );
-    columns.f32(
-        "pressure",
-        grips
-            .iter()
-            .flat_map(|g| g.worst.pressure.map_or([nan; 4], |p| [p.a_i0, p.a_ii0, p.a1, p.a2])),
-    );
+    columns.f32("pressure", pressed.iter().flat_map(|state| state.pressure));
+    columns.f32("slip", pressed.iter().flat_map(|state| state.slip));
     columns.f32(
         "bounds",
         grips.iter().flat_map(|g| g.worst.bounds.map_or([nan; 2], |b| [b.lower, b.upper])),
     );
     columns.f32("residual", grips.iter().map(|g| g.worst.residual));
-    // Slip: kind (0 unknown, 1 rotation, 2 translation, 3 none, 4 spin), then centre, direction or
-    // the spin about x1 and x2, then sense or the spin about x3.
-    let slip = |slip: Option<Slip>| match slip {
-        Option::None => [0.0, nan, nan, nan],
-        Some(Slip::Rotation { c, sense }) => [1.0, c[0], c[1], f64::from(sense)],
-        Some(Slip::Translation { direction }) => [2.0, direction[0], direction[1], nan],
-        Some(Slip::None) => [3.0, nan, nan, nan],
-        Some(Slip::Spin { omega, .. }) => [4.0, omega[0], omega[1], omega[2]],
-    };
-    columns.f32("slip", grips.iter().flat_map(|g| slip(g.worst.slip)));
     let mut statuses: Vec<Value> = Vec::new();
     let numbers = grips.iter().map(|g| {
         let name = serde_json::to_value(g.worst.status).unwrap_or(Value::Null);
@@ -233,57 +239,6 @@ fn poses_and_scores(columns: &mut Columns, grips: &[RankedGrip]) -> Vec<Value> {
 fn palm(columns: &mut Columns, gripper: &Gripper, grips: &[RankedGrip]) {
     let place = |grip: &RankedGrip| gripper.palm_place(gripper.jaw_gap(&grip.grip)).origin;
     columns.f32("palm", grips.iter().map(place).flat_map(|origin| [origin.x, origin.z]));
-}
-
-/// Contact areas, each written once: ring starts into the points, and per ring face (bit 0) and
-/// hole (bit 1).
-fn contacts(columns: &mut Columns, grips: &[RankedGrip]) {
-    let mut known: FxHashMap<Vec<u64>, u32> = FxHashMap::default();
-    let (mut ring_of_contact, mut point_of_ring, mut kinds, mut points) =
-        (vec![0u32], vec![0u32], Vec::<u8>::new(), Vec::<f32>::new());
-    let numbers: Vec<u32> = grips
-        .iter()
-        .map(|grip| {
-            let contact = &*grip.grip.contact;
-            let next = known.len() as u32;
-            *known.entry(key(contact)).or_insert_with(|| {
-                for (face, patch) in [(0, &contact.face_i), (1, &contact.face_ii)] {
-                    for polygon in patch {
-                        for (hole, ring) in std::iter::once((0, &polygon.outer))
-                            .chain(polygon.holes.iter().map(|ring| (2, ring)))
-                        {
-                            points.extend(ring.iter().flat_map(|p| [p.x as f32, p.y as f32]));
-                            point_of_ring.push((points.len() / 2) as u32);
-                            kinds.push(face | hole);
-                        }
-                    }
-                }
-                ring_of_contact.push(kinds.len() as u32);
-                next
-            })
-        })
-        .collect();
-    columns.u32("contact", numbers);
-    columns.add("contact_rings", "u32", &ring_of_contact);
-    columns.add("ring_points", "u32", &point_of_ring);
-    columns.add("ring_kind", "u8", &kinds);
-    columns.add("points", "f32", &points);
-}
-
-/// The exact content of a contact as something that hashes.
-fn key(contact: &Contact) -> Vec<u64> {
-    let mut key = Vec::new();
-    for (face, patch) in [(0, &contact.face_i), (1, &contact.face_ii)] {
-        for polygon in patch {
-            for (hole, ring) in std::iter::once((0, &polygon.outer))
-                .chain(polygon.holes.iter().map(|ring| (2, ring)))
-            {
-                key.push((ring.len() as u64) << 2 | hole | face);
-                key.extend(ring.iter().flat_map(|p| [p.x.to_bits(), p.y.to_bits()]));
-            }
-        }
-    }
-    key
 }
 
 /// A `mu_s` below this share of the largest one is shown as zero: a colour scale has no use for
@@ -333,7 +288,34 @@ fn loads(columns: &mut Columns, set: &GripSet, grips: &[RankedGrip]) -> Value {
             .flat_map(|&row| grips[row].mu_by_load.iter().map(|&mu| code(mu)))
             .collect::<Vec<_>>(),
     );
+    states::by_load(columns, set, grips, &rows);
     json!({ "rows": rows.len(), "low": low, "high": high })
+}
+
+/// Rejected candidates, a row each; answers with their reasons in the order of their numbers.
+fn rejected(columns: &mut Columns, misses: &[Miss]) -> Vec<String> {
+    let poses = || misses.iter().map(|miss| &miss.pose);
+    let frames = || poses().map(|pose| &pose.part_from_grip);
+    columns.f64("miss_id", poses().map(|pose| pose.id as f64));
+    columns.f32("miss_origin", frames().flat_map(|frame| frame.origin.to_array()));
+    columns.f32("miss_rotation", frames().flat_map(|frame| frame.rotation.to_cols_array()));
+    columns.f32("miss_width", poses().map(|pose| pose.width));
+    columns.u32("miss_faces", poses().flat_map(|pose| [pose.face_i, pose.face_ii]));
+    columns.add("miss_inside", "u8", &poses().map(|p| u8::from(p.inside)).collect::<Vec<_>>());
+    columns.f32("miss_by", misses.iter().map(|miss| miss.by.unwrap_or(f64::NAN)));
+    let place = |miss: &Miss| miss.place.unwrap_or(glam::DVec3::NAN).to_array();
+    columns.f32("miss_place", misses.iter().flat_map(place));
+    let mut reasons: Vec<String> = Vec::new();
+    let number = |pose: &crate::model::Negative| {
+        let known = reasons.iter().position(|known| *known == pose.reason);
+        known.unwrap_or_else(|| {
+            reasons.push(pose.reason.clone());
+            reasons.len() - 1
+        }) as u32
+    };
+    let numbers: Vec<u32> = poses().map(number).collect();
+    columns.u32("miss_reason", numbers);
+    reasons
 }
 
 /// The drawable part; answers with what the page needs to read and to say about it.
@@ -383,6 +365,14 @@ fn asked(set: &GripSet) -> Value {
             .collect::<Vec<_>>(),
         "complete": complete,
     })
+}
+
+/// Grippers of the catalogue with what advice needs.
+fn known_grippers() -> Vec<Value> {
+    let known = CATALOGUE.iter().filter_map(|(name, _)| Some((name, catalogue::find(name).ok()?)));
+    known
+        .map(|(name, found)| json!({ "name": name, "stroke": found.stroke, "force": found.force }))
+        .collect()
 }
 
 /// A frame as a column-major 4x4 matrix.

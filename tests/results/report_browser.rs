@@ -38,9 +38,9 @@ fn the_page_works_in_a_browser() {
     let fine = refined(&part.mesh, 6);
     let mut many = large(&set, 10_000);
     many.part.triangles = fine.triangles.len();
-    report::write(&many, Some(&fine), &page("large.html")).unwrap();
+    report::write(&many, Some(&fine), &[], &page("large.html")).unwrap();
     set.part.file = "</script><img src=x onerror=alert(1)>.stl".into();
-    report::write(&set, Some(&part.mesh), &page("small.html")).unwrap();
+    report::write(&set, Some(&part.mesh), &[], &page("small.html")).unwrap();
     // What the page writes is compared with what the program writes.
     let options = export::Options::default();
     export::write(&set, export::Format::Csv, &page("small.csv"), &options, None).unwrap();
@@ -52,14 +52,14 @@ fn the_page_works_in_a_browser() {
         ("contact_too_small".into(), 30),
         ("twisted_out".into(), 9),
     ]);
-    report::write(&none, Some(&part.mesh), &page("none.html")).unwrap();
+    report::write(&none, Some(&part.mesh), &[], &page("none.html")).unwrap();
     let mut slipping = set;
     slipping.provenance.resolved.pad_friction = Some(1e-4);
     for grip in &mut slipping.grips {
         grip.safety = grip.worst.mu_s.map(|mu| 1e-4 / mu);
     }
     slipping.grips.retain(|grip| grip.safety.is_some_and(|safety| safety < 1.0));
-    report::write(&slipping, Some(&part.mesh), &page("slipping.html")).unwrap();
+    report::write(&slipping, Some(&part.mesh), &[], &page("slipping.html")).unwrap();
     let mut command = Command::new("node");
     command
         .arg(viewer.join("test/browser.mjs"))

@@ -15,6 +15,15 @@ function ramp(stops, t) {
 
 export const friction = (t) => ramp(FRICTION, t);
 export const pressure = (t) => ramp(PRESSURE, t);
+/** Colours of reasons, told apart by the colour-blind too (Okabe and Ito 2008); what is left is grey. */
+const REASONS = ['#d55e00', '#0072b2', '#e69f00', '#009e73', '#cc79a7', '#56b4e9', '#b8a500'];
+
+/** The colour of a reason for which candidates were rejected. */
+export function reasonColour(report, name) {
+  const place = report.header.reasons.filter((reason) => !reason.startsWith('face_pair')).indexOf(name);
+  return REASONS[place] ?? '#8a8f98';
+}
+
 export const css = (rgb) => `rgb(${rgb.map(Math.round).join(' ')})`;
 export const gradient = (scale, steps = 12) =>
   `linear-gradient(to right, ${Array.from({ length: steps + 1 }, (_, i) => css(scale(i / steps))).join(', ')})`;

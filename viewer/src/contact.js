@@ -1,13 +1,17 @@
 // The two contact areas in the pad plane: pressure as a colour map, separation line, slip centre, friction directions.
-// The pressure is a plane, so an SVG gradient along its slope shows it exactly.
+// On plane faces the pressure is a plane, which an SVG gradient along its slope shows exactly; on others it is painted
+// point by point on the face unrolled into the pad plane.
 
 import { css, gradient, pressure as scale } from './colour.js';
 import { inMm, niceStep, number, pressureUnit } from './format.js';
+import { inside } from './pads.js';
 
 const SVG = 'http://www.w3.org/2000/svg';
 const STOPS = 24;
 /** Arrows across the larger side of the contact. */
 const ARROWS = 9;
+/** Points of a painted pressure along each side of a drawing. */
+const POINTS = 320;
 /** Share of the largest pressure below which a slope over the pad does not show. */
 const FLAT = 1e-4;
 
@@ -20,27 +24,6 @@ function element(name, attributes = {}, ...children) {
 
 const path = (rings) => rings.map((ring) => `M${ring.points.map(([x, y]) => `${x * 1e3},${-y * 1e3}`).join('L')}Z`).join('');
 const at = ([a0, a1, a2], x, y) => a0 + a1 * x + a2 * y;
-
-function inside(rings, x, y) {
-  let odd = false;
-  for (const { points } of rings) {
-    for (let i = 0, j = points.length - 1; i < points.length; j = i++) {
-      const [xi, yi] = points[i];
-      const [xj, yj] = points[j];
-      if (yi > y !== yj > y && x < ((xj - xi) * (y - yi)) / (yj - yi) + xi) odd = !odd;
-    }
-  }
-  return odd;
-}
-
-/** Unit friction direction on the body at a point, or null. */
-function frictionAt(slip, x, y) {
-  if (slip.type === 'translation') return slip.direction.map((v) => -v);
-  if (slip.type !== 'rotation') return null;
-  const [dx, dy] = [x - slip.c[0], y - slip.c[1]];
-  const r = Math.hypot(dx, dy);
-  return r > 0 ? [(slip.sense * dy) / r, (-slip.sense * dx) / r] : null;
-}
 
 /** The window [m] that both drawings share: pad, contacts, and the slip centre when it is near. */
 function frame(pad, rings, slip) {
@@ -62,30 +45,29 @@ function frame(pad, rings, slip) {
   return { x: (left + right) / 2, y: (bottom + top) / 2, side };
 }
 
-/** Fills the two figures in `root` for grip `i` of the report. */
-export function drawContact(root, report, i, prefix = '') {
+/** Fills the two figures in `root` for grip `i` of the report under load `load` (left out: the worst one). */
+export function drawContact(root, report, i, prefix = '', load = report.column.load[i]) {
   const pad = report.header.gripper?.pad;
-  const rings = report.contact(i);
-  const planes = report.pressure(i);
-  const slip = report.slip(i);
-  const view = frame(pad, rings, slip);
-  const corners = (face) => rings.filter((ring) => ring.face === face).flatMap((ring) => ring.points);
-  const largest = planes ? Math.max(0, ...[0, 1].flatMap((face) => corners(face).map(([x, y]) => at(planes[face], x, y)))) : 0;
+  const state = report.state(i, load) ?? report.state(i);
+  const { slip } = state;
+  const faces = [0, 1].map((face) => state.of(face).flatMap(({ rings }) => rings));
+  const view = frame(pad, faces.flat(), slip);
+  const tops = [0, 1].map((face) => (state.known ? state.largest(face) : 0));
+  const largest = Math.max(...tops);
   const [unit, unitName] = pressureUnit(largest);
   root.querySelectorAll('figure').forEach((figure, face) => {
     const svg = figure.querySelector('svg');
     svg.replaceChildren();
     if (!view) return;
-    const own = rings.filter((ring) => ring.face === face);
-    drawFace({ svg, face, prefix, own, pad, plane: planes?.[face], slip, view, largest });
-    const words = planes ? `pressure up to ${number(Math.max(0, ...own.flatMap((r) => r.points.map(([x, y]) => at(planes[face], x, y)))) / unit)} ${unitName}` : 'no pressure known';
+    drawFace({ svg, face, prefix, own: faces[face], pad, state, view, largest });
+    const words = state.known ? `pressure up to ${number(tops[face] / unit)} ${unitName}` : 'no pressure known';
     svg.setAttribute('aria-label', `Contact on face ${report.column[face ? 'face_ii' : 'face_i'][i]}: ${words}`);
     const output = figure.querySelector('.probe');
     output.textContent = '';
     svg.onpointermove = (event) => {
       const spot = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
       const [x, y] = [spot.x / 1e3, -spot.y / 1e3];
-      const p = planes && inside(own, x, y) ? Math.max(0, at(planes[face], x, y)) : NaN;
+      const p = state.at(face, x, y);
       output.textContent = Number.isFinite(p) ? `${number(p / unit)} ${unitName} at (${number(x * 1e3)}, ${number(y * 1e3)}) mm` : '';
     };
     svg.onpointerleave = () => (output.textContent = '');
@@ -93,18 +75,19 @@ export function drawContact(root, report, i, prefix = '') {
   root.querySelectorAll('.pad-face').forEach((place, face) => (place.textContent = `on face ${report.column[face ? 'face_ii' : 'face_i'][i]}`));
   const legend = root.querySelector('.pressure-legend');
   legend.querySelector('.bar').style.background = gradient(scale);
-  legend.querySelector('.max').textContent = planes ? `${number(largest / unit)}\u00a0${unitName}` : 'unknown';
+  legend.querySelector('.max').textContent = state.known ? `${number(largest / unit)}\u00a0${unitName}` : 'unknown';
   root.querySelector('.slip').textContent = slipWords(slip);
 }
 
 function slipWords(slip) {
   if (slip.type === 'rotation') return `Would slip by turning about the centre (${inMm(slip.c[0])}, ${inMm(slip.c[1])})\u00a0mm; arrows: friction on the part.`;
   if (slip.type === 'translation') return 'Would slip straight, without turning; arrows: friction on the part.';
+  if (slip.type === 'spin') return `Would turn about an axis in the pads\u2019 plane, along (${slip.omega.slice(0, 2).map((v) => number(v, 2)).join(', ')}): ${slip.rolls ? `it rolls on pad ${slip.rolls} and slips on the other` : 'it spins and slips on both pads'}; arrows: friction on the part.`;
   if (slip.type === 'none') return 'No load in the pad plane: nothing slips at any friction.';
   return 'No slip limit was found for this load.';
 }
 
-function drawFace({ svg, face, prefix, own, pad, plane, slip, view, largest }) {
+function drawFace({ svg, face, prefix, own, pad, state, view, largest }) {
   const side = view.side * 1e3;
   const [left, top] = [view.x * 1e3 - side / 2, -view.y * 1e3 - side / 2];
   svg.setAttribute('viewBox', `${left} ${top} ${side} ${side}`);
@@ -113,9 +96,11 @@ function drawFace({ svg, face, prefix, own, pad, plane, slip, view, largest }) {
   const defs = element('defs');
   svg.append(defs);
   if (pad) svg.append(element('path', { d: path([{ points: pad }]), class: 'pad-outline' }));
-  const area = element('path', { d: path(own), class: 'contact-area', 'fill-rule': 'evenodd', fill: 'none' });
-  svg.append(area);
+  const area = element('path', { d: path(own), class: state.pieces ? 'contact-area reach' : 'contact-area', 'fill-rule': 'evenodd', fill: 'none' });
+  const plane = state.plane(face);
+  let pressed = null;
   if (plane) {
+    svg.append(area);
     const [a0, a1, a2] = plane;
     const slope = Math.hypot(a1, a2);
     if (slope * view.side > FLAT * largest) {
@@ -127,10 +112,42 @@ function drawFace({ svg, face, prefix, own, pad, plane, slip, view, largest }) {
       area.setAttribute('fill', `url(#${id('pressure')})`);
       separation({ svg, defs, id, own, plane, slope, side, pixel });
     } else area.setAttribute('fill', css(scale(largest > 0 ? a0 / largest : 0)));
-  }
-  arrows({ svg, own, plane, slip, view, largest, pixel });
-  slipCentre({ svg, slip, left, top, side, pixel });
+  } else if (state.known && largest > 0) {
+    pressed = painted(state, face, view, largest);
+    svg.append(element('image', { href: pressed.image, x: left, y: top, width: side, height: side }), area);
+  } else svg.append(area);
+  arrows({ svg, own, state, face, pressed, view, largest, pixel });
+  slipCentre({ svg, slip: state.slip, left, top, side, pixel });
   scaleBar({ svg, left, top, side, pixel });
+}
+
+/** The pressure on a face that is not plane as a picture of the window, and the box of what is pressed. */
+function painted(state, face, view, largest) {
+  const canvas = document.createElement('canvas');
+  canvas.width = canvas.height = POINTS;
+  const context = canvas.getContext('2d');
+  const image = context.createImageData(POINTS, POINTS);
+  const step = view.side / POINTS;
+  const [left, top] = [view.x - view.side / 2, view.y + view.side / 2];
+  const box = [Infinity, -Infinity, Infinity, -Infinity];
+  for (const piece of state.of(face)) {
+    const corners = piece.rings[0].points;
+    const range = (values, from, sign) => [Math.min(...values), Math.max(...values)].map((v) => (sign * (v - from)) / step).sort((a, b) => a - b);
+    const [c0, c1] = range(corners.map((p) => p[0]), left, 1);
+    const [r0, r1] = range(corners.map((p) => p[1]), top, -1);
+    for (let row = Math.max(0, Math.floor(r0)); row < Math.min(POINTS, Math.ceil(r1)); row++) {
+      for (let column = Math.max(0, Math.floor(c0)); column < Math.min(POINTS, Math.ceil(c1)); column++) {
+        const [x, y] = [left + (column + 0.5) * step, top - (row + 0.5) * step];
+        const p = state.on(piece, x, y);
+        if (!(p > 0) || !inside(piece.rings, x, y)) continue;
+        const paint = scale(p / largest);
+        image.data.set([...paint, 255], 4 * (row * POINTS + column));
+        [box[0], box[1], box[2], box[3]] = [Math.min(box[0], x), Math.max(box[1], x), Math.min(box[2], y), Math.max(box[3], y)];
+      }
+    }
+  }
+  context.putImageData(image, 0, 0);
+  return { image: canvas.toDataURL(), box };
 }
 
 /** The line of zero pressure and the part of the contact beyond it. */
@@ -154,20 +171,25 @@ function separation({ svg, defs, id, own, plane, slope, side, pixel }) {
   );
 }
 
-function arrows({ svg, own, plane, slip, view, largest, pixel }) {
-  if (!plane || !(largest > 0)) return;
+function arrows({ svg, own, state, face, pressed, view, largest, pixel }) {
+  if (!state.known || !(largest > 0)) return;
   const points = own.flatMap((ring) => ring.points);
   if (points.length === 0) return;
   const xs = points.map((p) => p[0]);
   const ys = points.map((p) => p[1]);
-  const [left, right, bottom, top] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+  const [left, right, bottom, top] = pressed?.box ?? [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
   const step = Math.max((right - left) / ARROWS, (top - bottom) / ARROWS, view.side / 26);
+  // The arrows stand about the middle, so that a strip narrower than a step has a row of them.
+  const places = (from, to) => {
+    const count = Math.max(1, Math.round((to - from) / step));
+    return Array.from({ length: count }, (_, k) => (from + to) / 2 + (k - (count - 1) / 2) * step);
+  };
   let d = '';
-  for (let x = left + step / 2; x < right; x += step) {
-    for (let y = bottom + step / 2; y < top; y += step) {
-      const direction = inside(own, x, y) && frictionAt(slip, x, y);
-      const p = at(plane, x, y) / largest;
-      if (!direction || p <= 0.02) continue;
+  for (const x of places(left, right)) {
+    for (const y of places(bottom, top)) {
+      const p = state.at(face, x, y) / largest;
+      const direction = p > 0.02 ? state.friction(face, x, y) : null;
+      if (!direction) continue;
       // Length shows the size of the friction; short ones keep a visible head.
       const length = step * (0.3 + 0.55 * Math.min(p, 1)) * 1e3;
       const [ux, uy] = [direction[0], -direction[1]];

@@ -1,5 +1,7 @@
 // The embedded result: a JSON header and one compressed block of binary columns. Nothing is fetched.
 
+import { PadState } from './pads.js';
+
 const KINDS = { u8: Uint8Array, i8: Int8Array, u16: Uint16Array, u32: Uint32Array, f32: Float32Array, f64: Float64Array, delta: Int32Array };
 
 function fromBase64(text) {
@@ -46,6 +48,12 @@ export class Report {
     /** What is shown: as planned, until somebody asks what if. */
     this.now = { ...this.planned };
     this.known = new Map();
+    this.surfaces = new Map();
+    // Pieces of surface are counted over all surfaces.
+    this.pieceOf = new Uint32Array(column.surface_ring_kind.length);
+    let pieces = 0;
+    column.surface_ring_kind.forEach((kind, ring) => (this.pieceOf[ring] = kind & 4 ? pieces++ : pieces - 1));
+    this.misses = column.miss_id.length;
     this.rowOf = new Map(Array.from(column.by_load_grip, (grip, row) => [grip, row]));
     this.indexOfId = new Map(Array.from(column.id, (id, i) => [id, i]));
   }
@@ -134,14 +142,8 @@ export class Report {
 
   /** Largest pressure under the worst load of grip `i` [Pa]. */
   largestPressure(i) {
-    const planes = this.pressure(i);
-    if (!planes) return NaN;
-    let most = 0;
-    for (const { face, points } of this.contact(i)) {
-      const [a0, a1, a2] = planes[face];
-      for (const [x, y] of points) most = Math.max(most, a0 + a1 * x + a2 * y);
-    }
-    return most;
+    const state = this.state(i);
+    return state.known ? Math.max(state.largest(0), state.largest(1)) : NaN;
   }
 
   status(i) {
@@ -171,17 +173,72 @@ export class Report {
     return list;
   }
 
-  /** Pressure planes `[p_I, p_II]` as `[value at the origin, slope x1, slope x2]`, or null. */
-  pressure(i) {
-    const [aI0, aII0, a1, a2] = this.column.pressure.subarray(4 * i, 4 * i + 4);
-    return Number.isFinite(aI0) ? [[aI0, a1, a2], [aII0, -a1, -a2]] : null;
+  /** Pieces of surface under the pads of grip `i`, or null where all is plane: `{ face, gap, rings }`, see `PadState`. */
+  pieces(i) {
+    const { surface, surface_rings: first, surface_ring_points: starts, surface_ring_kind: kinds, surface_points: points, surface_gap: gaps } = this.column;
+    const own = surface[i];
+    if (own === 0xffffffff) return null;
+    if (!this.surfaces.has(own)) {
+      const list = [];
+      for (let ring = first[own]; ring < first[own + 1]; ring++) {
+        if (kinds[ring] & 4) list.push({ face: kinds[ring] & 1, gap: gaps.subarray(6 * this.pieceOf[ring], 6 * this.pieceOf[ring] + 6), rings: [] });
+        const ends = [];
+        for (let k = starts[ring]; k < starts[ring + 1]; k++) ends.push([points[2 * k], points[2 * k + 1]]);
+        list.at(-1).rings.push({ face: kinds[ring] & 1, hole: (kinds[ring] & 2) !== 0, points: ends });
+      }
+      this.surfaces.set(own, list);
+    }
+    return this.surfaces.get(own);
   }
 
+  /** What the pads of grip `i` do under load `load`; null where that was not stored. */
+  state(i, load = this.column.load[i]) {
+    const c = this.column;
+    if (load === c.load[i]) return new PadState(this, i, c.pressure.subarray(4 * i, 4 * i + 4), c.slip.subarray(7 * i, 7 * i + 7));
+    const row = this.rowOf.get(i);
+    if (row === undefined) return null;
+    const k = c.state_load.subarray(c.state_rows[row], c.state_rows[row + 1]).indexOf(load);
+    if (k < 0) return null;
+    const at = c.state_rows[row] + k;
+    return new PadState(this, i, c.state_pressure.subarray(4 * at, 4 * at + 4), c.state_slip.subarray(7 * at, 7 * at + 7));
+  }
+
+  /** Incipient motion of grip `i` under its worst load. */
   slip(i) {
-    const [kind, a, b, sense] = this.column.slip.subarray(4 * i, 4 * i + 4);
-    if (kind === 1) return { type: 'rotation', c: [a, b], sense };
+    return this.slipOf(this.column.slip.subarray(7 * i, 7 * i + 7));
+  }
+
+  /** A slip record of the data as an object. */
+  slipOf([kind, a, b, c, u1, u2, rolls]) {
+    if (kind === 1) return { type: 'rotation', c: [a, b], sense: c };
     if (kind === 2) return { type: 'translation', direction: [a, b] };
+    if (kind === 4) return { type: 'spin', omega: [a, b, c], velocity: [u1, u2], rolls: ['', 'I', 'II'][rolls] };
     return { type: kind === 3 ? 'none' : 'unknown' };
+  }
+
+  /** Rejected candidate `k`. */
+  miss(k) {
+    const c = this.column;
+    const r = c.miss_rotation.subarray(9 * k, 9 * k + 9);
+    const axis = (n) => [r[3 * n], r[3 * n + 1], r[3 * n + 2]];
+    const place = Array.from(c.miss_place.subarray(3 * k, 3 * k + 3));
+    return {
+      reason: this.header.reasons[c.miss_reason[k]], id: c.miss_id[k], x1: axis(0), x2: axis(1), x3: axis(2), origin: Array.from(c.miss_origin.subarray(3 * k, 3 * k + 3)),
+      width: c.miss_width[k], inside: c.miss_inside[k] === 1, faces: Array.from(c.miss_faces.subarray(2 * k, 2 * k + 2)), by: c.miss_by[k], place: place.every(Number.isFinite) ? place : null,
+      palm: [c.miss_palm[2 * k], c.miss_palm[2 * k + 1]],
+    };
+  }
+
+  /** Of every reason the rejected candidate that lacks least, by the reason's name. */
+  nearestMisses() {
+    const best = new Map();
+    for (let k = 0; k < this.misses; k++) {
+      const by = this.column.miss_by[k];
+      const name = this.header.reasons[this.column.miss_reason[k]];
+      const known = best.get(name);
+      if (known === undefined || by < this.column.miss_by[known]) best.set(name, k);
+    }
+    return best;
   }
 
   /** Loads of grip `i`, the one that needs most friction first; the worst one alone where no others are stored. */

@@ -80,7 +80,6 @@ export class Detail {
     this.find('.grip-sub').textContent = `${c.inside[i] ? 'From inside, faces' : 'Faces'} ${c.face_i[i]} and ${c.face_ii[i]}, id ${c.id[i]}${Number.isFinite(c.flip_of[i]) ? `, jaws exchanged of ${c.flip_of[i]}` : ''}`;
     this.find('.meaning').textContent = kind === 'good' ? '' : meaning;
     this.numbers(i);
-    drawContact(this.find('.contact'), report, i);
     this.loads(i);
     this.full(i);
   }
@@ -176,7 +175,12 @@ export class Detail {
       const safety = report.friction && mu > 0 ? `, safety ${number(report.friction / report.scaled(mu))}\u00d7` : '';
       this.find('.picked-mu').textContent = Number.isFinite(mu) ? `friction needed ${number(report.scaled(mu))}${safety}` : 'no slip limit';
     }
-    this.onLoad?.(this.load >= 0 ? this.load : worst);
+    const shown = this.load >= 0 ? this.load : worst;
+    const stored = report.state(this.grip, shown) !== null;
+    drawContact(this.find('.contact'), report, this.grip, '', shown);
+    this.find('.under').textContent = stored ? `Under ${this.load >= 0 ? 'the chosen load' : 'the worst load'}: ${report.header.loads[shown].name}`
+      : `Under the worst load: ${report.header.loads[worst].name}. Of the chosen load only the friction was stored.`;
+    this.onLoad?.(shown, stored ? report.state(this.grip, shown) : report.state(this.grip));
   }
 
   /** A load's name without the words that all loads begin with. */
@@ -193,7 +197,7 @@ export class Detail {
     const { column: c } = this.report;
     const pose = this.report.pose(i);
     const wrench = c.wrench.subarray(6 * i, 6 * i + 6);
-    const planes = this.report.pressure(i);
+    const planes = this.report.state(i).plane(0) && [0, 1].map((face) => this.report.state(i).plane(face));
     const [lower, upper] = c.bounds.subarray(2 * i, 2 * i + 2);
     this.find('.full').replaceChildren(
       facts([

@@ -1,13 +1,17 @@
 // The gripper as three.js objects, in metres, in the grip frame (x1 approach, x3 closing).
 
 import {
-  Box3, BoxGeometry, BufferGeometry, CylinderGeometry, EdgesGeometry, ExtrudeGeometry, Float32BufferAttribute, Group, LineSegments,
+  Box3, BoxGeometry, BufferGeometry, Color, CylinderGeometry, EdgesGeometry, ExtrudeGeometry, Float32BufferAttribute, Group, LineSegments,
   Matrix4, Mesh, Path, Shape, ShapeGeometry, Vector3,
 } from 'three';
+import { pressure as scale } from './colour.js';
+import { gapAt, inside } from './pads.js';
 import { ConvexGeometry } from 'three/examples/jsm/geometries/ConvexGeometry.js';
 
 /** Depth at which a pad of unknown thickness is drawn [m]. */
 const PAD_DEPTH = 0.002;
+/** Cells along each side of a piece of surface. */
+const CELLS = 96;
 
 function bodyGeometry(shape) {
   if (shape.type === 'box') return new BoxGeometry(...shape.half.map((h) => 2 * h));
@@ -23,6 +27,7 @@ function body(description, surface, materials) {
   const layers = [new Mesh(geometry, materials.jawDepth), new Mesh(geometry, surface), new LineSegments(new EdgesGeometry(geometry, 30), materials.jawEdge)];
   layers.forEach((layer, k) => (layer.renderOrder = 2 + k));
   group.add(...layers);
+  group.userData.body = description.name;
   group.applyMatrix4(new Matrix4().fromArray(description.matrix));
   return group;
 }
@@ -34,6 +39,34 @@ function pad(gripper, side, materials) {
   const group = new Group();
   group.add(new Mesh(geometry, materials.pad), new LineSegments(new EdgesGeometry(geometry, 30), materials.padEdge));
   return group;
+}
+
+/** The pressed part of a face that is not plane, coloured by the pressure, in the frame of its pad plane. */
+function pressed(state, face) {
+  const largest = Math.max(state.largest(0), state.largest(1));
+  const [places, colours] = [[], []];
+  const ink = new Color();
+  for (const piece of state.of(face)) {
+    const corners = piece.rings[0].points;
+    const [left, right, low, high] = [0, 1].flatMap((k) => [Math.min(...corners.map((p) => p[k])), Math.max(...corners.map((p) => p[k]))]);
+    const [dx, dy] = [(right - left) / CELLS, (high - low) / CELLS];
+    for (let column = 0; column < CELLS; column++) {
+      for (let row = 0; row < CELLS; row++) {
+        const [x, y] = [left + (column + 0.5) * dx, low + (row + 0.5) * dy];
+        const p = state.on(piece, x, y);
+        if (!(p > 0) || !inside(piece.rings, x, y)) continue;
+        const [r, g, b] = scale(p / largest);
+        ink.setRGB(r / 255, g / 255, b / 255, 'srgb');
+        const corner = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([a, c]) => [x + (a * dx) / 2, y + (c * dy) / 2]);
+        for (const k of [0, 1, 2, 0, 2, 3]) {
+          const [cx, cy] = corner[k];
+          places.push(cx, cy, (face ? 1 : -1) * gapAt(piece.gap, cx, cy));
+          colours.push(ink.r, ink.g, ink.b);
+        }
+      }
+    }
+  }
+  return new BufferGeometry().setAttribute('position', new Float32BufferAttribute(places, 3)).setAttribute('color', new Float32BufferAttribute(colours, 3));
 }
 
 /** Two fingers, a palm and the contact areas; `place` opens the jaws. */
@@ -92,12 +125,16 @@ export class Jaws {
     return [min.x, max.x].flatMap((x) => [min.y, max.y].flatMap((y) => [min.z, max.z].map((z) => new Vector3(x, y, z))));
   }
 
-  /** Shows the contact areas of a grip (rings of `Report.contact`). */
-  setContact(rings) {
+  /** Shows what the pads of a grip touch: `state` of `Report.state`, `rings` of `Report.contact`. */
+  setContact(rings, state) {
     for (const face of [0, 1]) {
       const group = this.contacts[face];
       group.children.forEach((child) => child.geometry.dispose());
       group.clear();
+      if (state.pieces && state.known) {
+        group.add(new Mesh(pressed(state, face), this.materials.pressed));
+        continue;
+      }
       let shape = null;
       const shapes = [];
       const outline = [];

@@ -1,8 +1,9 @@
 // What the colours and signs of the view mean.
 
-import { friction, gradient } from './colour.js';
+import { friction, gradient, pressure, reasonColour } from './colour.js';
 import { number } from './format.js';
 import { node } from './run.js';
+import { reason } from './why.js';
 
 /** Writes the entries into `list`; `colours` are those of the view now. */
 export function drawLegend(list, report, scale, colours) {
@@ -14,11 +15,13 @@ export function drawLegend(list, report, scale, colours) {
     gripper && ['box', colours.jaw, 'Gripper'],
     gripper && ['box', colours.pad, grips ? 'Pads, and where they touch' : 'Pads'],
     gripper && ['line', colours.approach, 'Approach'],
-    grips && ['line', colours.load, 'Load at the centre of mass'],
+    grips && report.column.surface_rings.length > 1 && ['bar', gradient(pressure), 'Round faces: pressure from none to the largest'],
+    grips && ['line', colours.load, 'Load at the centre of mass: force, and moment as a turning arrow'],
     gripper && grips && ['line', colours.ghost, 'Pinned gripper, in outline'],
     gripper?.flange && ['axes', '', 'Flange frame, axes x, y, z'],
     asked.ground && ['box', colours.fixture, 'Ground'],
     asked.keep_out?.length > 0 && ['box', colours.fixture, 'Boxes to keep out of'],
+    ...report.header.reasons.filter((name) => !name.startsWith('face_pair')).map((name) => ['box', reasonColour(report, name), `Rejected: ${reason(name, report).title.toLowerCase()}`]),
   ];
   list.replaceChildren(...entries.filter(Boolean).map(([kind, colour, text]) => {
     const item = node('li');

@@ -16,7 +16,7 @@ import { Take } from './take.js';
 import { theme } from './theme.js';
 import { triad } from './triad.js';
 import { whatIf } from './whatif.js';
-import { drawWhy } from './why.js';
+import { drawWhy, missWords, reason, tellingMiss } from './why.js';
 
 const $ = (selector) => document.querySelector(selector);
 
@@ -101,6 +101,7 @@ async function start() {
   function choose(i, { glide = true, scroll = true } = {}) {
     state.chosen = i;
     list.mark(state.order.indexOf(i), scroll);
+    if (view?.misses.shown >= 0) $('#note').textContent = note;
     view?.setGrip(i, glide);
     detail.show(i);
     showPinned();
@@ -135,7 +136,7 @@ async function start() {
     list.reset(state.order.length, state.order.indexOf(state.chosen));
   }
   $('#mark').addEventListener('click', mark);
-  detail.onLoad = (load) => view?.setLoad(load);
+  detail.onLoad = (load, state) => view?.setLoad(load, state);
 
   const histogram = new Histogram($('#histogram'), report, scale, (low, high) => {
     Object.assign(state.filter, { low, high });
@@ -219,16 +220,34 @@ async function start() {
     list.mark(state.order.indexOf(state.chosen));
   });
   drawRun($('#run-content'), report);
-  const why = drawWhy($('#panel-why'), report);
+  const why = drawWhy($('#panel-why'), report, view && showMiss);
   $('#tab-why').hidden = !why;
   document.body.classList.toggle('no-grips', report.n === 0);
-  $('#note').textContent = report.n === 0 && header.gripper ? `${header.gripper.name} beside the part, to scale, its jaws at their widest.` : (limits(report)[0] ?? '');
+  const note = report.n === 0 && header.gripper ? `${header.gripper.name} beside the part, to scale, its jaws at their widest.` : (limits(report)[0] ?? '');
+  $('#note').textContent = note;
   bindView();
   bindTabs();
+
+  /** Shows rejected candidate `k` in the view (-1: the chosen grip again). */
+  function showMiss(k) {
+    view.setMiss(k);
+    if (k < 0 && state.chosen >= 0) detail.pick(detail.load);
+    else view.fit();
+    for (const item of document.querySelectorAll('[data-miss]')) item.querySelector('button').setAttribute('aria-pressed', String(Number(item.dataset.miss) === k));
+    $('#note').textContent = k < 0 ? note : `Rejected, ${reason(report.miss(k).reason, report).title.toLowerCase()}: ${missWords(report, k)}.`;
+    $('#said').textContent = $('#note').textContent;
+  }
 
   function bindView() {
     if (!view) return;
     view.onPick = (i) => choose(i);
+    view.onMiss = showMiss;
+    const dots = $('[data-toggle="misses"]');
+    dots.hidden = view.misses.of.length === 0;
+    if (report.n === 0 && !dots.hidden) {
+      dots.setAttribute('aria-pressed', 'true');
+      view.show('misses', true);
+    }
     $('#toolbar').addEventListener('click', (event) => {
       const button = event.target.closest('button');
       if (!button) return;
@@ -304,7 +323,10 @@ async function start() {
 
   relist();
   if (report.n > 0) choose(asked.found ? asked.place : state.order[0], { glide: false });
-  else view?.setGrip(-1);
+  else if (view) {
+    view.setGrip(-1);
+    if (tellingMiss(report) >= 0) showMiss(tellingMiss(report));
+  }
   missing(asked);
   view?.fit();
   view?.draw();

@@ -29,13 +29,15 @@ export function bars(entries, total, label) {
   const table = node('table', undefined, { class: 'bars' });
   table.append(node('caption', label, { class: 'hidden' }));
   const largest = Math.max(1, ...entries.map((entry) => entry[1]));
-  for (const [name, value, kind] of entries) {
+  for (const [name, value, kind, colour] of entries) {
     const row = node('tr');
     const bar = node('span', undefined, { class: `bar ${kind ?? ''}` });
     bar.style.width = `${(100 * value) / largest}%`;
     const held = node('td', undefined, { class: 'track' });
     held.append(bar);
-    row.append(node('th', name, { scope: 'row' }), held, node('td', count(value), { class: 'number' }), node('td', total ? percent(value / total) : '', { class: 'number share' }));
+    const title = node('th', name, { scope: 'row' });
+    if (colour) title.prepend(node('span', undefined, { class: 'reason', style: `background:${colour}`, 'aria-hidden': 'true' }));
+    row.append(title, held, node('td', count(value), { class: 'number' }), node('td', total ? percent(value / total) : '', { class: 'number share' }));
     table.append(row);
   }
   return table;

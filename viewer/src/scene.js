@@ -1,14 +1,16 @@
 // The part with the chosen grip in three dimensions. Draws only when something changed. The world is in millimetres.
 
 import {
-  AmbientLight, Box3, BoxGeometry, Box3Helper, BufferAttribute, BufferGeometry, CanvasTexture, Color, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide,
-  FrontSide, GridHelper, Group, HemisphereLight, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, PlaneGeometry, Points,
-  PointsMaterial, Quaternion, Raycaster, Scene, SphereGeometry, Spherical, Sprite, SpriteMaterial, Vector2, Vector3, WebGLRenderer,
+  AmbientLight, Box3, Box3Helper, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, FrontSide, Group, HemisphereLight, LineBasicMaterial, LineSegments,
+  Matrix4, Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Points, PointsMaterial, Quaternion, Raycaster, Scene, Spherical, Vector2, Vector3,
+  WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { friction } from './colour.js';
 import { verdict } from './detail.js';
 import { Jaws } from './jaws.js';
+import { Misses } from './misses.js';
+import { approachSign, dotTexture, fixtures, frameSign, LoadSign } from './signs.js';
 import { gaps, palmPlace } from './take.js';
 
 const MM = 1000;
@@ -25,52 +27,6 @@ const PALETTE = {
 
 const vector = (list) => new Vector3(...list);
 
-function dotTexture(cross) {
-  const canvas = document.createElement('canvas');
-  canvas.width = canvas.height = 32;
-  const context = canvas.getContext('2d');
-  if (cross) {
-    context.lineCap = 'round';
-    for (const [colour, width] of [['#555', 13], ['#fff', 7]]) {
-      context.strokeStyle = colour;
-      context.lineWidth = width;
-      context.beginPath();
-      for (const [from, to] of [[8, 24], [24, 8]]) {
-        context.moveTo(from, 8);
-        context.lineTo(to, 24);
-      }
-      context.stroke();
-    }
-    return new CanvasTexture(canvas);
-  }
-  context.fillStyle = '#fff';
-  context.beginPath();
-  context.arc(16, 16, 14.5, 0, 2 * Math.PI);
-  context.fill();
-  // A rim in the dot's own darker shade sets it off from the part.
-  context.lineWidth = 4;
-  context.strokeStyle = '#777';
-  context.beginPath();
-  context.arc(16, 16, 12.5, 0, 2 * Math.PI);
-  context.stroke();
-  return new CanvasTexture(canvas);
-}
-
-function letterTexture(letter, colour) {
-  const canvas = document.createElement('canvas');
-  canvas.width = canvas.height = 64;
-  const context = canvas.getContext('2d');
-  context.font = '700 50px system-ui, sans-serif';
-  context.textAlign = 'center';
-  context.textBaseline = 'middle';
-  context.lineWidth = 8;
-  context.strokeStyle = '#fff';
-  context.strokeText(letter, 32, 34);
-  context.fillStyle = colour;
-  context.fillText(letter, 32, 34);
-  return new CanvasTexture(canvas);
-}
-
 export class View {
   /** Throws when the browser has no WebGL. */
   constructor(host, report, scale) {
@@ -78,6 +34,7 @@ export class View {
     this.report = report;
     this.listeners = [];
     this.onPick = () => {};
+    this.onMiss = () => {};
     this.grip = -1;
     this.open = false;
     this.renderer = new WebGLRenderer({ antialias: true, alpha: true });
@@ -97,11 +54,16 @@ export class View {
     this.buildMaterials();
     this.buildPart();
     this.buildDots(scale);
-    this.buildLoad();
+    this.load = new LoadSign(this.materials.load);
+    this.load.position.set(...report.header.part.mass.centre_of_mass);
+    this.world.add(this.load);
     this.jaws = new Jaws(report.header.gripper, this.materials);
     this.world.add(this.jaws.root);
     this.buildSigns();
-    this.buildFixtures();
+    this.gripperSize = 2 * MM * Math.max(0, ...this.jaws.corners().map((point) => point.length()));
+    this.world.add(fixtures(report.header.asked, this.middle.clone().divideScalar(MM), this.radius / MM, this.materials));
+    this.misses = new Misses(report, this.jaws);
+    this.world.add(this.misses.group);
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.enableDamping = false;
     this.controls.zoomToCursor = true;
@@ -140,6 +102,7 @@ export class View {
       padEdge: new LineBasicMaterial(),
       contact: new MeshBasicMaterial({ transparent: true, opacity: 0.85, depthWrite: false, side: DoubleSide }),
       contactEdge: new LineBasicMaterial(),
+      pressed: new MeshBasicMaterial({ vertexColors: true, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: -3, polygonOffsetUnits: -3 }),
       load: new MeshBasicMaterial({ depthTest: false, transparent: true }),
       ghost: new LineBasicMaterial({ transparent: true, opacity: 0.9 }),
       fixture: new MeshBasicMaterial({ opacity: 0.14, ...glass }),
@@ -206,7 +169,7 @@ export class View {
       own.setAttribute('position', geometry.attributes.position);
       own.setAttribute('color', geometry.attributes.color);
       own.setIndex(new BufferAttribute(new Uint32Array(2 * n), 1));
-      const material = new PointsMaterial({ size: cross ? size + 2 : size, sizeAttenuation: false, vertexColors: true, map: dotTexture(cross), alphaTest: 0.35, transparent: true });
+      const material = new PointsMaterial({ size: cross ? size + 2 : size, sizeAttenuation: false, vertexColors: true, map: dotTexture(cross ? 'cross' : 'disc'), alphaTest: 0.35, transparent: true });
       material.onBeforeCompile = raise;
       const points = new Points(own, material);
       points.frustumCulled = false;
@@ -229,17 +192,6 @@ export class View {
       for (let side = 0; side < 2; side++) colours.array.set([linear.r * 255, linear.g * 255, linear.b * 255], 6 * i + 3 * side);
     }
     colours.needsUpdate = true;
-  }
-
-  buildLoad() {
-    this.load = new Group();
-    const [shaft, head] = [0.62, 0.38];
-    const stem = new Mesh(new CylinderGeometry(0.028, 0.028, shaft, 16).translate(0, shaft / 2, 0), this.materials.load);
-    const tip = new Mesh(new ConeGeometry(0.1, head, 24).translate(0, shaft + head / 2, 0), this.materials.load);
-    this.load.add(stem, tip, new Mesh(new SphereGeometry(0.055, 20, 14), this.materials.load));
-    this.load.traverse((object) => (object.renderOrder = 10));
-    this.load.position.set(...this.report.header.part.mass.centre_of_mass);
-    this.world.add(this.load);
   }
 
   setTheme(dark) {
@@ -278,24 +230,31 @@ export class View {
     const known = this.grip >= 0;
     this.grip = i;
     this.load.visible = false;
+    this.misses.show(-1);
     if (i < 0) return this.standAside();
     const { x1, x2, x3, origin } = this.report.pose(i);
     const to = { q: new Quaternion().setFromRotationMatrix(new Matrix4().makeBasis(vector(x1), vector(x2), vector(x3))), p: vector(origin) };
-    this.jaws.setContact(this.report.contact(i));
+    this.jaws.setContact(this.report.contact(i), this.report.state(i));
     this.jaws.contacts.forEach((contact) => (contact.visible = true));
     this.width = this.report.column.width[i];
     this.inside = this.report.column.inside[i] === 1;
     this.glide(to, known && glide);
   }
 
-  /** Draws the force of load `load` at the centre of mass. */
-  setLoad(load) {
-    const force = vector(this.report.header.loads[load].wrench.force);
-    this.load.visible = force.length() > 0;
-    if (this.load.visible) {
-      this.load.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), force.normalize());
-      this.load.scale.setScalar((0.62 * this.radius) / MM);
-    }
+  /** Draws load `load` at the centre of mass, and on faces that are not plane the pressure of `state` under it. */
+  setLoad(load, state) {
+    this.load.show(this.report.header.loads[load].wrench, this.radius / MM);
+    if (state?.pieces && this.grip >= 0) this.jaws.setContact(this.report.contact(this.grip), state);
+    this.render();
+  }
+
+  /** Shows rejected candidate `k` in place of the grip (-1: the grip again). */
+  setMiss(k) {
+    cancelAnimationFrame(this.motion);
+    this.moving = false;
+    if (k < 0) return this.setGrip(this.grip, false);
+    this.load.visible = false;
+    this.misses.show(k);
     this.render();
   }
 
@@ -404,7 +363,11 @@ export class View {
   show(what, visible) {
     if (what === 'gripper') this.jaws.solid.visible = this.approach.visible = visible;
     if (what === 'dots') this.dots.visible = visible;
-    if (what === 'load') this.load.parent[visible ? 'add' : 'remove'](this.load);
+    if (what === 'misses') {
+      this.misses.points.visible = visible;
+      if (!visible && this.misses.shown >= 0 && this.grip >= 0) this.onMiss(-1);
+    }
+    if (what === 'load') this.world[visible ? 'add' : 'remove'](this.load);
     if (what === 'glass' && this.partMesh) {
       const material = this.materials.part;
       material.transparent = visible;
@@ -439,66 +402,19 @@ export class View {
   buildSigns() {
     const { gripper } = this.report.header;
     const pad = gripper ? Math.max(...gripper.pad.map((point) => point[0])) : 0;
-    const length = Math.max((0.5 * this.radius) / MM, 2 * pad);
-    this.approach = new Group().add(
-      new Mesh(new CylinderGeometry(0.018, 0.018, 0.7, 12).translate(0, 0.35, 0), this.materials.approach),
-      new Mesh(new ConeGeometry(0.06, 0.3, 20).translate(0, 0.85, 0), this.materials.approach),
-    );
-    this.approach.traverse((object) => (object.renderOrder = 9));
-    this.approach.scale.setScalar(length);
-    this.approach.rotation.z = -Math.PI / 2;
-    this.approach.position.x = -length - 1.2 * pad;
+    this.approach = approachSign(this.materials.approach, Math.max((0.5 * this.radius) / MM, 2 * pad), pad);
     this.jaws.root.add(this.approach);
     if (!gripper?.flange) return;
-    this.flange = new Group();
-    const reach = 0.03;
-    for (const [k, [name, colour]] of [['x', '#d0453b'], ['y', '#3f9b46'], ['z', '#3b7fd9']].entries()) {
-      const material = new MeshBasicMaterial({ color: colour, depthTest: false, transparent: true });
-      const axis = new Mesh(new CylinderGeometry(0.0007, 0.0007, reach, 8).translate(0, reach / 2, 0), material);
-      axis.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), new Vector3().setComponent(k, 1));
-      const letter = new Sprite(new SpriteMaterial({ map: letterTexture(name, colour), sizeAttenuation: false, depthTest: false }));
-      letter.scale.setScalar(0.022 / MM);
-      letter.position.setComponent(k, 1.2 * reach);
-      this.flange.add(axis, letter);
-    }
-    this.flange.traverse((object) => (object.renderOrder = 9));
-    this.flange.applyMatrix4(new Matrix4().fromArray(gripper.flange));
+    this.flange = frameSign(gripper.flange, 0.022 / MM);
     this.jaws.palm.add(this.flange);
-  }
-
-  /** The ground and the boxes to keep out of, where the run had some. */
-  buildFixtures() {
-    const { ground, keep_out: boxes } = this.report.header.asked;
-    this.gripperSize = 2 * MM * Math.max(0, ...this.jaws.corners().map((point) => point.length()));
-    this.fixtures = new Group();
-    if (ground) {
-      const normal = vector(ground.normal).normalize();
-      const centre = this.middle.clone().divideScalar(MM);
-      centre.addScaledVector(normal, ground.height_m - centre.dot(normal));
-      const size = (4 * this.radius) / MM;
-      const lines = new GridHelper(size, 16).rotateX(Math.PI / 2);
-      lines.material = this.materials.fixtureEdge;
-      const plane = new Group().add(new Mesh(new PlaneGeometry(size, size), this.materials.fixture), lines);
-      plane.quaternion.setFromUnitVectors(UP, normal);
-      plane.position.copy(centre);
-      this.fixtures.add(plane);
-    }
-    for (const [low, high] of boxes ?? []) {
-      const box = new Box3(vector(low), vector(high));
-      const helper = new Box3Helper(box);
-      helper.material = this.materials.fixtureEdge;
-      const solid = new Mesh(new BoxGeometry(...box.getSize(new Vector3()).toArray()), this.materials.fixture);
-      solid.position.copy(box.getCenter(new Vector3()));
-      this.fixtures.add(helper, solid);
-    }
-    this.world.add(this.fixtures);
   }
 
   /** The whole part from a side on which grip `i`'s jaws are seen: across the closing axis, a little from its palm. */
   fit(i = this.grip, withGripper = i < 0) {
     let towards = new Vector3(1, -1.35, 0.85);
-    if (i >= 0 && i < this.report.n) {
-      const { x1, x2, x3 } = this.report.pose(i);
+    const pose = this.misses.shown >= 0 ? this.report.miss(this.misses.shown) : i >= 0 && i < this.report.n ? this.report.pose(i) : null;
+    if (pose) {
+      const { x1, x2, x3 } = pose;
       const looks = [1, -1].flatMap((x) => [1, -1].flatMap((y) => [0.85, 0.5, -0.5].map((z) => new Vector3(x, 1.35 * y, z).normalize())));
       const worth = (look) => Math.abs(look.dot(vector(x2))) - 0.35 * look.dot(vector(x1)) + 0.25 * Math.abs(look.dot(vector(x3))) + (look.z > 0 ? 0.5 : 0) - (look.y > 0 ? 0.08 : 0);
       towards = looks.sort((a, b) => worth(b) - worth(a))[0];
@@ -511,12 +427,19 @@ export class View {
 
   /** The chosen grip from close by. */
   lookAtGrip() {
+    if (this.misses.shown >= 0) return this.frame(this.around(this.misses.extent()), this.camera.position.clone().sub(this.controls.target));
     if (this.grip < 0) return this.fit();
     const { x1, x2, x3, origin } = this.report.pose(this.grip);
     const place = new Matrix4().makeBasis(vector(x1), vector(x2), vector(x3)).setPosition(...origin);
     const outline = this.report.header.gripper?.pad ?? this.report.contact(this.grip).flatMap((ring) => ring.points);
     const points = outline.flatMap(([x, y]) => [0.5, -0.5].map((side) => new Vector3(x, y, side * this.width).applyMatrix4(place).multiplyScalar(MM)));
     this.frame(points, this.camera.position.clone().sub(this.controls.target));
+  }
+
+  /** Points [mm] with room of a pad's size about them. */
+  around(points) {
+    const room = 2 * MM * Math.max(...(this.report.header.gripper?.pad ?? [[0.005, 0]]).map(([x, y]) => Math.hypot(x, y)));
+    return points.flatMap((point) => [-room, room].flatMap((r) => [0, 1, 2].map((k) => point.clone().setComponent(k, point.getComponent(k) + r))));
   }
 
   /** Moves the camera to the side `towards` and so near that `points` [mm] just fill the part of the view that is free. */
@@ -605,23 +528,21 @@ export class View {
     });
   }
 
-  /** The listed grip whose dot is under the pointer and not hidden by the part. */
+  /** The listed grip, or the rejected candidate, whose dot is under the pointer and not hidden by the part. */
   pick(event) {
-    if (!this.dots.visible || !this.listed) return;
     const rect = this.canvas.getBoundingClientRect();
     const at = [event.clientX - rect.left, event.clientY - rect.top];
-    const place = this.places;
     const point = new Vector3();
     const hits = [];
-    for (const i of this.listed) {
-      for (let side = 0; side < 2; side++) {
-        point.fromBufferAttribute(place, 2 * i + side).multiplyScalar(MM);
-        const depth = point.distanceTo(this.camera.position);
-        point.project(this.camera);
-        const away = Math.hypot(((point.x + 1) / 2) * rect.width - at[0], ((1 - point.y) / 2) * rect.height - at[1]);
-        if (away < 9) hits.push({ i, depth, away });
-      }
-    }
+    const look = (places, index, found) => {
+      point.fromBufferAttribute(places, index).multiplyScalar(MM);
+      const depth = point.distanceTo(this.camera.position);
+      point.project(this.camera);
+      const away = Math.hypot(((point.x + 1) / 2) * rect.width - at[0], ((1 - point.y) / 2) * rect.height - at[1]);
+      if (away < 9) hits.push({ ...found, depth, away });
+    };
+    if (this.dots.visible) for (const i of this.listed ?? []) for (let side = 0; side < 2; side++) look(this.places, 2 * i + side, { i });
+    if (this.misses.points.visible) this.misses.of.forEach((miss, index) => look(this.misses.points.geometry.attributes.position, index, { i: Infinity, miss }));
     if (hits.length === 0) return;
     const caster = new Raycaster();
     caster.setFromCamera(new Vector2((at[0] / rect.width) * 2 - 1, 1 - (at[1] / rect.height) * 2), this.camera);
@@ -630,7 +551,7 @@ export class View {
     // Grips of many angles share one place: the best of the nearest dots is meant.
     const nearest = Math.min(...seen.map((hit) => hit.away));
     const best = seen.filter((hit) => hit.away < nearest + 1.5).sort((a, b) => a.i - b.i)[0];
-    if (best) this.onPick(best.i);
+    if (best) best.miss === undefined ? this.onPick(best.i) : this.onMiss(best.miss);
   }
 
   resize() {

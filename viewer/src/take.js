@@ -85,10 +85,13 @@ function short(value) {
 
 /** Distance of the pads in grip `i`, and before closing [m]. */
 export function gaps(report, i) {
+  return gapsOf(report, report.column.width[i], report.column.inside[i] === 1);
+}
+
+/** The same of a grip of faces `width` apart [m]. */
+export function gapsOf(report, width, inside) {
   const { gripper, asked } = report.header;
-  const c = report.column;
-  const inside = c.inside[i] === 1;
-  const gap = c.width[i] - (inside ? 2 * (gripper?.outer_pad ?? 0) : 0);
+  const gap = width - (inside ? 2 * (gripper?.outer_pad ?? 0) : 0);
   if (!gripper) return [gap, gap];
   const [least, most] = gripper.stroke;
   const way = 2 * (asked.opening ?? Infinity);
@@ -112,7 +115,7 @@ export function table(report, indices, frame, origin) {
     if (!Number.isFinite(needed) || most === undefined) return '';
     return needed > most * (1 + 1e-6) ? 'above' : needed < least * (1 - 1e-6) ? 'below' : 'within';
   };
-  const slips = { rotation: 'rotation', translation: 'translation', none: 'none', unknown: '' };
+  const slips = { rotation: 'rotation', translation: 'translation', spin: 'spin', none: 'none', unknown: '' };
   const say = (value) => plain(value, DIGITS);
   const ring = (points) => Math.abs(points.reduce((sum, [x, y], k) => sum + (x * points[(k + 1) % points.length][1] - y * points[(k + 1) % points.length][0]) / 2, 0));
   return indices.map((i) => {
@@ -296,7 +299,7 @@ export class Take {
       page.append(node('h2', caption(report, i)), node('p', `${file}, ${report.header.gripper?.name ?? ''}, id ${report.column.id[i]}, worst load ${report.load(i).name}`));
       if (view) {
         view.setGrip(i, false);
-        view.setLoad(report.column.load[i]);
+        view.setLoad(report.column.load[i], report.state(i));
         view.fit(i, true);
         const image = node('img', undefined, { alt: 'Part and gripper' });
         image.src = picture(report, view, i, 1200, 640).toDataURL();

@@ -1,5 +1,6 @@
 // Why no grip was found, or none holds: the reasons as bars, what each one means, and what would help.
 
+import { reasonColour } from './colour.js';
 import { verdict } from './detail.js';
 import { chosen, count, degrees, inMm, mm, newtons, number, percent, words } from './format.js';
 import { bars, node } from './run.js';
@@ -18,11 +19,27 @@ function told(name, text) {
   return made;
 }
 
+/** Names of grippers of the catalogue that pass `test`, the one with the shortest stroke first; nothing where there is none. */
+function others({ header }, test) {
+  const fit = header.catalogue.filter((known) => known.name !== header.gripper?.name && test(known)).sort((a, b) => a.stroke[1] - b.stroke[1]);
+  return fit.slice(0, 3).map(({ name, stroke, force }) => `${name} (${chosen(stroke[0] * 1e3)} to ${chosen(stroke[1] * 1e3)}\u00a0mm, up to ${newtons(force[1])})`).join(', ');
+}
+
+/** A gripper with another stroke, by name where the catalogue has one. */
+function otherStroke(report) {
+  const k = report.nearestMisses().get('face_pair_outside_stroke');
+  const width = k === undefined ? NaN : report.miss(k).width;
+  const known = others(report, ({ stroke }) => stroke[0] <= width && width <= stroke[1]);
+  return known ? `A gripper for ${mm(width)} (--gripper): ${known}.` : 'A gripper with another stroke: gripfast gripper list names those of the catalogue.';
+}
+
 /** What to do about a force that is too small. */
-function moreForce({ header }) {
-  const { asked, gripper } = header;
+function moreForce(report) {
+  const { asked, gripper } = report.header;
+  const known = others(report, ({ stroke, force }) => force[1] > (gripper?.force[1] ?? Infinity) && stroke[1] >= (gripper?.stroke[1] ?? 0));
+  const stronger = known ? ` Stronger ones of the catalogue: ${known}.` : '';
   if (gripper && asked.force < gripper.force[1]) return `More force: this gripper gives up to ${newtons(gripper.force[1])} (--force), and ${newtons(asked.force)} was asked for.`;
-  return `More force than this gripper has${gripper ? ` (${newtons(gripper.force[1])})` : ''}: a stronger gripper, or a lighter part and gentler motion (--mass, --accel).`;
+  return `More force than this gripper has${gripper ? ` (${newtons(gripper.force[1])})` : ''}: a stronger gripper, or a lighter part and gentler motion (--mass, --accel).${stronger}`;
 }
 
 /** A rejection in words: title, meaning, and advice. */
@@ -36,7 +53,7 @@ export function reason(name, report) {
       const odd = Math.max(...size) > HUGE || Math.max(...size) < TINY;
       return ['Width outside the stroke', gripper ? `The faces lie nearer together or farther apart than the jaws reach (${chosen(gripper.stroke[0] * 1e3)} to ${chosen(gripper.stroke[1] * 1e3)}\u00a0mm).` : '',
         odd ? `Check the unit of the part file: the part measures ${size.map((v) => (v >= 1 ? count(v * 1e3) : inMm(v))).join(' \u00d7 ')}\u00a0mm (--unit).`
-          : 'A gripper with another stroke: gripfast gripper list names those of the catalogue.'];
+          : otherStroke(report)];
     },
     face_pair_not_chosen: () => ['Faces not chosen', 'The choice of faces leaves these pairs out.', 'More faces: --faces and --faces-in, or neither.'],
     approach_outside_cone: () => ['Approach outside the cone', 'The approach is not among the directions asked for.',
@@ -71,7 +88,7 @@ export function reason(name, report) {
 }
 
 /** Reasons with their counts, most first. */
-export const reasons = (report) => Object.entries(report.header.summary.rejections).sort((a, b) => b[1] - a[1]).map(([name, n]) => ({ name, n, pairs: name.startsWith('face_pair'), ...reason(name, report) }));
+export const reasons = (report) => Object.entries(report.header.summary.rejections).sort((a, b) => b[1] - a[1]).map(([name, n]) => ({ name, n, pairs: name.startsWith('face_pair'), colour: report.header.reasons.includes(name) && !name.startsWith('face_pair') ? reasonColour(report, name) : null, ...reason(name, report) }));
 
 /** The reasons as bars: those that count candidates, and those that count pairs of faces, which no candidate came of. */
 export function reasonBars(list) {
@@ -79,10 +96,35 @@ export function reasonBars(list) {
     const own = list.filter((entry) => entry.pairs === pairs);
     const total = own.reduce((sum, entry) => sum + entry.n, 0);
     if (own.length === 0) return [];
-    const table = bars(own.map((entry) => [entry.title, entry.n, 'bad']), total, label);
+    const table = bars(own.map((entry) => [entry.title, entry.n, 'bad', entry.colour]), total, label);
     return pairs ? [node('p', 'Pairs of faces that were left out:', { class: 'quiet' }), table] : [table];
   });
   return tables.flat();
+}
+
+/** How far rejected candidate `k` is from a grip, in words. */
+export function missWords(report, k) {
+  const { reason: name, by, place, width, faces } = report.miss(k);
+  const { gripper, asked } = report.header;
+  const at = place ? ` at (${place.map((v) => inMm(v)).join(', ')})\u00a0mm` : '';
+  const [kind, of] = name.split(':');
+  const body = upper((of ?? '').replaceAll('_', ' '));
+  const free = by > 0 ? `; about ${mm(by, 2)} beside it would be free` : '';
+  const words = {
+    face_pair_outside_stroke: () => `faces ${faces[0]} and ${faces[1]} are ${mm(width)} apart, ${mm(by, 2)} ${width > (gripper?.stroke[0] ?? 0) ? 'more' : 'less'} than the jaws reach`,
+    contact_too_small: () => `${percent(by)} of the contact asked for is missing`,
+    pad_share_too_small: () => `${percent(by)} of the contact asked for is missing`,
+    approach_outside_cone: () => `its approach lies ${degrees(by)} outside the cone`,
+    too_far_from_centre_of_mass: () => `it lies ${mm(by, 2)} too far out`,
+    ground: () => `${body} would reach ${mm(by, 2)} below the ground${at}`,
+    part_interference: () => `${body} meets the part${at}${free}`,
+    approach_blocked: () => `${body} meets the part on its way${at}${free}`,
+    twisted_out: () => `the one nearest to the centre of mass, ${mm(by, 2)} away, twists out all the same${asked.force ? ` at ${newtons(asked.force)}` : ''}`,
+    no_normal_force: () => `a load pulls the part off a pad${asked.force ? ` at ${newtons(asked.force)}` : ''}`,
+    keep_out: () => `${body} would enter a box to keep out of`,
+    scene: () => `${body} stops it`,
+  }[kind];
+  return upper(words?.() ?? reason(name, report).title);
 }
 
 /** Whether there is something to explain: no grip at all, or none that holds. */
@@ -111,8 +153,32 @@ function allSlip(report) {
   return { mu, force: asked.force, help };
 }
 
-/** Writes the panel and answers with its headline, or null where grips hold. */
-export function drawWhy(root, report) {
+/** The nearest miss of each reason in `list` with a button that shows it; null where none was stored. */
+function nearestMisses(report, list, show) {
+  const nearest = report.nearestMisses();
+  const items = node('ul', undefined, { class: 'misses' });
+  for (const entry of list.filter(({ name }) => nearest.has(name))) {
+    const k = nearest.get(entry.name);
+    const item = node('li', undefined, { 'data-miss': k });
+    const button = node('button', 'Show', { type: 'button', 'aria-label': `Show the nearest miss: ${entry.title}`, 'aria-pressed': 'false' });
+    button.addEventListener('click', () => show(k));
+    const words = node('span');
+    words.append(node('b', `${entry.title}: `), missWords(report, k));
+    item.append(words, ...(show ? [button] : []));
+    items.append(item);
+  }
+  return items.children.length ? items : null;
+}
+
+/** The rejected candidate that tells most: of the reason with most candidates the one that lacks least; -1 where none was stored. */
+export function tellingMiss(report) {
+  const nearest = report.nearestMisses();
+  const first = reasons(report).find(({ name, pairs }) => nearest.has(name) && (!pairs || report.header.summary.candidates === 0));
+  return first ? nearest.get(first.name) : -1;
+}
+
+/** Writes the panel and answers with its headline, or null where grips hold. `show(k)` shows rejected candidate k; null without a view. */
+export function drawWhy(root, report, show) {
   if (!nothingHolds(report)) return null;
   const { summary, gripper } = report.header;
   const list = reasons(report);
@@ -138,6 +204,8 @@ export function drawWhy(root, report) {
     const meanings = node('dl', undefined, { class: 'meanings' });
     for (const entry of list.filter((entry) => entry.meaning)) meanings.append(node('dt', entry.title), told('dd', entry.meaning));
     if (meanings.children.length) root.append(meanings);
+    const misses = nearestMisses(report, list, show);
+    if (misses) root.append(node('h3', 'The nearest miss of each kind'), misses);
   }
   if (advice.size) {
     const items = node('ul');

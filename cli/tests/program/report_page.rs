@@ -104,7 +104,7 @@ fn a_rebuild_gives_the_same_template() {
 #[test]
 fn the_page_is_whole_and_loads_nothing() {
     let (set, mesh) = fixture();
-    let page = report::render(&set, Some(&mesh)).unwrap();
+    let page = report::render(&set, Some(&mesh), &[]).unwrap();
     assert!(page.starts_with("<!doctype html>") && page.trim_end().ends_with("</html>"));
     assert!(!page.contains("@@"), "a mark was left");
     assert_eq!(page.matches("<script").count(), page.matches("</script").count());
@@ -130,7 +130,7 @@ fn the_page_is_whole_and_loads_nothing() {
 #[test]
 fn the_page_carries_the_numbers() {
     let (set, mesh) = fixture();
-    let page = report::render(&set, Some(&mesh)).unwrap();
+    let page = report::render(&set, Some(&mesh), &[]).unwrap();
     let header = header(&page);
     assert_eq!(header["grips"]["total"], set.grips.len());
     assert_eq!(header["display"]["shown"], mesh.triangles.len());
@@ -156,7 +156,7 @@ fn names_from_files_stay_data() {
     let (mut set, _) = fixture();
     set.part.file = "</script><script>alert(1)</script>".into();
     set.loads[0].name = "<!--<script>".into();
-    let page = report::render(&set, None).unwrap();
+    let page = report::render(&set, None, &[]).unwrap();
     assert_eq!(page.matches("</script").count(), 3);
     assert_eq!(header(&page)["part"]["file"], set.part.file);
     assert_eq!(header(&page)["loads"][0]["name"], set.loads[0].name);
@@ -166,7 +166,7 @@ fn names_from_files_stay_data() {
 fn poor_results_still_make_a_page() {
     let (mut set, _) = fixture();
     set.gripper = Value::String("lost".into());
-    let page = report::render(&set, None).unwrap();
+    let page = report::render(&set, None, &[]).unwrap();
     assert!(
         header(&page)["gripper"].is_null()
             && header(&page)["gripper_problem"].is_string()
@@ -174,11 +174,11 @@ fn poor_results_still_make_a_page() {
     );
     set.grips.iter_mut().for_each(|grip| grip.mu_by_load.clear());
     assert_eq!(
-        header(&report::render(&set, Some(&Mesh::default())).unwrap())["by_load"]["rows"],
+        header(&report::render(&set, Some(&Mesh::default()), &[]).unwrap())["by_load"]["rows"],
         0
     );
     set.grips.clear();
-    assert_eq!(header(&report::render(&set, None).unwrap())["grips"]["total"], 0);
+    assert_eq!(header(&report::render(&set, None, &[]).unwrap())["grips"]["total"], 0);
 }
 
 /// A page of `plan`, or one made of its result file later, has all loads of the best grips and of
@@ -268,7 +268,7 @@ fn a_plan_without_grips_writes_its_page() {
 fn a_grip_under_an_unknown_load_is_refused() {
     let (mut set, _) = fixture();
     set.grips[3].worst.load = 99;
-    let error = report::render(&set, None).unwrap_err();
+    let error = report::render(&set, None, &[]).unwrap_err();
     assert!(
         error.kind() == ErrorKind::Mismatch && error.to_string().contains("load 99"),
         "{error}"
