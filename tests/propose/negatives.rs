@@ -2,10 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use glam::DVec3;
 use gripfast::gripper::{self, Gripper};
 use gripfast::model::{Grip, Negative};
 use gripfast::part::{Part, ReadOptions};
-use gripfast::propose::{ProposeOptions, Proposer};
+use gripfast::propose::{Cone, Ground, ProposeOptions, Proposer};
+
+use crate::options::cuboid;
 
 fn part(name: &str) -> Part {
     let path = crate::support::root().join("data/parts").join(name);
@@ -115,4 +118,109 @@ fn a_sample_is_a_part_of_all_and_the_same_on_any_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         assert_eq!(pool.install(|| proposer.rejected(5)), few);
     }
+}
+
+/// A tall box under a housing: how deep the housing would sit in it follows from the dimensions.
+#[test]
+fn a_miss_says_how_deep_a_body_sits_and_where() {
+    let gripper = gripper::find("generic").unwrap();
+    let (side, tall) = (0.02, 0.2);
+    let part = cuboid(side, side, tall);
+    let proposer = Proposer::new(&part, &gripper, &options()).unwrap();
+    let misses = proposer.misses(100);
+    let candidates: Vec<Negative> = misses.iter().map(|miss| miss.pose.clone()).collect();
+    let pair = candidates.iter().filter(|pose| pose.reason.starts_with("face_pair")).count();
+    assert_eq!(pair, 1, "the box is longer than the stroke");
+    assert_eq!(&candidates[pair..], proposer.rejected(100), "the same sample, measured");
+    let [housing] = &gripper.palm[..] else { panic!("one palm body") };
+    let bounds = housing.bounds();
+    let front = bounds.iter().fold(f64::NEG_INFINITY, |most, x| most.max(x.x));
+    let half = bounds.iter().fold(0.0_f64, |most, x| most.max(x.y));
+    let mut compared = 0;
+    for miss in misses.iter().filter(|miss| miss.pose.reason == "part_interference:housing") {
+        let frame = &miss.pose.part_from_grip;
+        let along = frame.rotation.x_axis;
+        if along.z.abs() < 0.999 {
+            continue;
+        }
+        // From the box's end that the gripper comes from to the housing's front.
+        let end = if along.z < 0.0 { tall - frame.origin.z } else { frame.origin.z };
+        let middle = DVec3::new(side / 2.0, side / 2.0, frame.origin.z);
+        let offset = (frame.origin - middle).dot(frame.rotation.y_axis).abs();
+        let expected = (end + front).min(half + side / 2.0 - offset);
+        let by = miss.by.unwrap();
+        assert!((by - expected).abs() < 2e-5, "{by} {expected}");
+        let place = miss.place.unwrap();
+        let deep = (place - frame.origin).dot(along);
+        assert!(deep < front && deep > -end - 1e-9, "{deep}: between the end and the front");
+        assert!(place.cmpge(DVec3::splat(-1e-9)).all() && place.z <= tall + 1e-9);
+        compared += 1;
+    }
+    assert!(compared > 20, "{compared}");
+}
+
+/// What other limits are missed by, against the limits.
+#[test]
+fn a_miss_says_what_it_lacks() {
+    let part = part("l_bracket.stl");
+    let franka = gripper::find("franka-hand").unwrap();
+    let ground = Ground { normal: DVec3::Z, offset: 0.03 };
+    let cone = Cone { axis: DVec3::NEG_Z, half_angle: 1.0 };
+    let limits = options()
+        .with_ground(Some(ground))
+        .with_approach_cone(Some(cone))
+        .with_max_offset(Some(0.02));
+    let proposer = Proposer::new(&part, &franka, &limits).unwrap();
+    let centre = part.mass_properties(1.0).centre_of_mass;
+    let mut seen = BTreeMap::<String, usize>::new();
+    for miss in proposer.misses(40) {
+        let Negative { part_from_grip: frame, reason, face_i, face_ii, .. } = &miss.pose;
+        let kind = reason.split(':').next().unwrap().to_owned();
+        *seen.entry(kind.clone()).or_default() += 1;
+        let by = miss.by.unwrap();
+        match kind.as_str() {
+            "approach_outside_cone" => {
+                let angle = (-frame.rotation.x_axis.z).acos();
+                assert!((by - (angle - 1.0)).abs() < 1e-9, "{by} {angle}");
+            }
+            "too_far_from_centre_of_mass" => {
+                assert!((by - (frame.origin.distance(centre) - 0.02)).abs() < 1e-12);
+            }
+            "ground" => {
+                let place = miss.place.unwrap();
+                assert!(place.z < 0.03 && by >= 0.03 - place.z - 1e-12, "{place} {by}");
+            }
+            "contact_too_small" => {
+                assert!(by > 0.0 && by <= 1.0);
+                // A floor lower by that share would let it pass.
+                let lower = limits.min_contact * (1.0 - by) * (1.0 - 1e-6);
+                let relaxed = limits.clone().with_min_contact(lower).with_min_pad_share(0.0);
+                let relaxed = Proposer::new(&part, &franka, &relaxed).unwrap();
+                let explained = relaxed.explain_pose(*face_i, *face_ii, frame).unwrap();
+                let contact = &explained.checks.iter().filter(|c| c.name.starts_with("contact"));
+                assert!(contact.clone().all(|check| check.passed) || by == 1.0, "{explained:?}");
+            }
+            _ => {}
+        }
+    }
+    for kind in
+        ["approach_outside_cone", "too_far_from_centre_of_mass", "ground", "contact_too_small"]
+    {
+        assert!(seen.get(kind).is_some_and(|count| *count > 3), "{kind} in {seen:?}");
+    }
+}
+
+/// The pair of faces that comes nearest to the stroke, gripped in the middle of what they share.
+#[test]
+fn the_faces_nearest_to_the_stroke_are_told() {
+    let gripper = gripper::find("generic").unwrap();
+    let part = cuboid(0.2, 0.3, 0.4);
+    let misses = Proposer::new(&part, &gripper, &options()).unwrap().misses(5);
+    let [miss] = &misses[..] else { panic!("{misses:?}") };
+    assert_eq!(miss.pose.reason, "face_pair_outside_stroke");
+    assert!((miss.pose.width - 0.2).abs() < 1e-9 && (miss.by.unwrap() - 0.1).abs() < 1e-9);
+    let frame = &miss.pose.part_from_grip;
+    assert!(frame.origin.abs_diff_eq(DVec3::new(0.1, 0.15, 0.2), 1e-9), "{frame:?}");
+    assert!((frame.rotation.z_axis.x.abs() - 1.0).abs() < 1e-12);
+    assert!((frame.rotation.determinant() - 1.0).abs() < 1e-12);
 }

@@ -33,7 +33,7 @@ fn prism(outline: &[(f64, f64)], faces: &[[u32; 4]], height: f64) -> Part {
     part
 }
 
-fn cuboid(x: f64, y: f64, z: f64) -> Part {
+pub(crate) fn cuboid(x: f64, y: f64, z: f64) -> Part {
     prism(&[(0.0, 0.0), (x, 0.0), (x, y), (0.0, y)], &[[0, 1, 2, 3]], z)
 }
 

@@ -8,9 +8,67 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 use std::process::Command;
+use std::sync::atomic::AtomicBool;
 
 use crate::support::report::{data, large, part, plan, refined};
+use glam::DVec3;
+use gripfast::model::{Miss, Negative};
+use gripfast::part::Part;
+use gripfast::plan::Plan;
+use gripfast::request::{Choice, Polish, Request};
+use gripfast::results::{GripSet, RankedGrip};
+use gripfast::units::{Angle, Length, Mass};
 use gripfast::{export, report};
+
+/// Poses of a set as if they had been rejected: two reasons with places, one without.
+fn misses(set: &GripSet) -> Vec<Miss> {
+    let reasons = ["part_interference:fingertip", "contact_too_small", "twisted_out"];
+    let miss = |(k, ranked): (usize, &RankedGrip)| {
+        let pose = Negative::new(&ranked.grip, reasons[k % 3].to_owned());
+        let place = (k % 3 == 0).then_some(ranked.grip.part_from_grip.origin);
+        Miss::new(pose, Some(0.002 + 0.001 * k as f64), place)
+    };
+    set.grips.iter().take(30).enumerate().map(miss).collect()
+}
+
+/// A shaft gripped on its barrel, with every load of its grips.
+fn curved() -> GripSet {
+    let (radius, length, facets) = (0.01, 0.06, 48_u32);
+    let ring = |z: f64| {
+        (0..facets).map(move |k| {
+            let angle = f64::from(k) / f64::from(facets) * std::f64::consts::TAU;
+            DVec3::new(radius * angle.cos(), radius * angle.sin(), z)
+        })
+    };
+    let mut vertices: Vec<DVec3> = ring(0.0).chain(ring(length)).collect();
+    vertices.extend([DVec3::ZERO, DVec3::new(0.0, 0.0, length)]);
+    let triangles: Vec<[u32; 3]> = (0..facets)
+        .flat_map(|k| {
+            let (next, up) = ((k + 1) % facets, facets);
+            let (bottom, top) = (2 * facets, 2 * facets + 1);
+            [
+                [k, next, k + up],
+                [next, next + up, k + up],
+                [bottom, next, k],
+                [top, k + up, next + up],
+            ]
+        })
+        .collect();
+    let part = Part::from_triangles("shaft", &vertices, &triangles).unwrap();
+    let mut request = Request::new("shaft.stl", "generic");
+    request.mass = Some(Mass(0.2));
+    request.loads = vec!["ball:12:20N".to_owned()];
+    request.candidates.curved = Some(true);
+    request.candidates.spacing = Some(Length(0.01));
+    request.candidates.angle_step = Angle(1.6);
+    request.scoring.backend = Choice::Cpu;
+    request.scoring.polish = Polish::All;
+    let plan = Plan::builder(request).part(part).build().unwrap();
+    let mut set = plan.run(&mut (), &AtomicBool::new(false)).unwrap().set;
+    set.grips.retain(|ranked| ranked.grip.surfaces.is_some());
+    assert!(set.grips.len() > 3);
+    set
+}
 
 #[test]
 fn the_page_works_in_a_browser() {
@@ -52,7 +110,8 @@ fn the_page_works_in_a_browser() {
         ("contact_too_small".into(), 30),
         ("twisted_out".into(), 9),
     ]);
-    report::write(&none, Some(&part.mesh), &[], &page("none.html")).unwrap();
+    report::write(&none, Some(&part.mesh), &misses(&set), &page("none.html")).unwrap();
+    report::write(&curved(), None, &[], &page("curved.html")).unwrap();
     let mut slipping = set;
     slipping.provenance.resolved.pad_friction = Some(1e-4);
     for grip in &mut slipping.grips {

@@ -79,10 +79,18 @@ export function drawContact(root, report, i, prefix = '', load = report.column.l
   root.querySelector('.slip').textContent = slipWords(slip);
 }
 
+/** Direction in the pads' plane of an axis along `(a, b)`. */
+function axisWords([a, b]) {
+  const length = Math.hypot(a, b);
+  if (Math.abs(b) < 1e-3 * length) return 'x\u2081';
+  if (Math.abs(a) < 1e-3 * length) return 'x\u2082';
+  return `(${number(a / length)}, ${number(b / length)})`;
+}
+
 function slipWords(slip) {
   if (slip.type === 'rotation') return `Would slip by turning about the centre (${inMm(slip.c[0])}, ${inMm(slip.c[1])})\u00a0mm; arrows: friction on the part.`;
   if (slip.type === 'translation') return 'Would slip straight, without turning; arrows: friction on the part.';
-  if (slip.type === 'spin') return `Would turn about an axis in the pads\u2019 plane, along (${slip.omega.slice(0, 2).map((v) => number(v, 2)).join(', ')}): ${slip.rolls ? `it rolls on pad ${slip.rolls} and slips on the other` : 'it spins and slips on both pads'}; arrows: friction on the part.`;
+  if (slip.type === 'spin') return `Would ${slip.rolls ? 'roll' : 'spin'} about an axis along ${axisWords(slip.omega)}: it ${slip.rolls ? `stays on pad ${slip.rolls} and slips on the other` : 'slips on both pads'}; arrows: friction on the part.`;
   if (slip.type === 'none') return 'No load in the pad plane: nothing slips at any friction.';
   return 'No slip limit was found for this load.';
 }

@@ -232,7 +232,7 @@ async function start() {
   function showMiss(k) {
     view.setMiss(k);
     if (k < 0 && state.chosen >= 0) detail.pick(detail.load);
-    else view.fit();
+    else view.fit(state.chosen, report.miss(k).reason.startsWith('face_pair'));
     for (const item of document.querySelectorAll('[data-miss]')) item.querySelector('button').setAttribute('aria-pressed', String(Number(item.dataset.miss) === k));
     $('#note').textContent = k < 0 ? note : `Rejected, ${reason(report.miss(k).reason, report).title.toLowerCase()}: ${missWords(report, k)}.`;
     $('#said').textContent = $('#note').textContent;
@@ -328,7 +328,7 @@ async function start() {
     if (tellingMiss(report) >= 0) showMiss(tellingMiss(report));
   }
   missing(asked);
-  view?.fit();
+  if (!(view?.misses.shown >= 0)) view?.fit();
   view?.draw();
   // A link opened in the same tab, or the address edited by hand.
   window.addEventListener('hashchange', () => {

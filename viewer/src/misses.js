@@ -19,7 +19,7 @@ export class Misses {
     this.hit = new MeshStandardMaterial({ color: HIT, roughness: 0.6, transparent: true, opacity: 0.8, depthWrite: false });
     this.line = new LineBasicMaterial({ color: HIT, depthTest: false, transparent: true });
     this.target = target(HIT);
-    this.target.scale.setScalar(0.05 / MM);
+    this.target.scale.setScalar(0.032 / MM);
     this.target.renderOrder = 12;
     this.marks.add(this.target);
     this.marks.visible = false;
@@ -62,9 +62,11 @@ export class Misses {
     const miss = report.miss(k);
     jaws.root.visible = Boolean(gripper);
     jaws.root.quaternion.setFromRotationMatrix(basis(miss));
-    jaws.root.position.set(...miss.origin);
-    jaws.contacts.forEach((contact) => (contact.visible = false));
     const pair = miss.reason.startsWith('face_pair');
+    // Jaws that cannot close on the part stand before it.
+    const aside = pair ? this.before(miss) : 0;
+    jaws.root.position.set(...miss.origin.map((v, n) => v - aside * miss.x1[n]));
+    jaws.contacts.forEach((contact) => (contact.visible = false));
     const [gap, opened] = gapsOf(report, miss.width, miss.inside);
     const most = gripper?.stroke[1] ?? miss.width;
     const opening = pair ? most : miss.reason.startsWith('approach_blocked') ? opened : gap;
@@ -74,7 +76,7 @@ export class Misses {
       this.target.position.set(...miss.place);
       this.paint(miss);
     }
-    this.measure(miss, pair, opening);
+    this.measure(miss, pair ? opening : null, aside);
   }
 
   /** Paints the body that the reason names; of several of that name the one nearest to the place. */
@@ -88,7 +90,9 @@ export class Misses {
       const [, surface] = body.children;
       surface.geometry.computeBoundingBox();
       const local = surface.worldToLocal(place.clone());
-      const away = surface.geometry.boundingBox.distanceToPoint(local);
+      const box = surface.geometry.boundingBox;
+      // Of bodies that both hold the place, the one whose middle is nearer.
+      const away = box.distanceToPoint(local) + 1e-3 * box.getCenter(new Vector3()).distanceTo(local);
       if (!best || away < best.away) best = { away, surface };
     });
     if (!best) return;
@@ -96,16 +100,23 @@ export class Misses {
     best.surface.material = this.hit;
   }
 
-  /** The width of a pair of faces as a line with ends, beside that of the jaws. */
-  measure(miss, pair, opening) {
+  /** How far before a pose the pads are clear of the part along the approach [m]. */
+  before({ origin, x1 }) {
+    const { part: { bbox_min: low, bbox_max: high }, gripper } = this.report.header;
+    const deep = x1.reduce((sum, v, n) => sum + v * (origin[n] - (v > 0 ? low[n] : high[n])), 0);
+    return deep + 1.2 * Math.max(...(gripper?.pad ?? [[0.01, 0]]).map(([x]) => x));
+  }
+
+  /** The width of a pair of faces as a line with ends, and that of the opened jaws `aside` before it; nothing without an opening. */
+  measure(miss, opening, aside) {
     this.rule?.geometry.dispose();
     this.rule?.removeFromParent();
-    if (!pair) return;
+    if (opening === null) return;
     const { origin, x1, x3, width } = miss;
-    const tick = 0.12 * width;
+    const tick = 0.08 * Math.min(width, opening);
     const point = (along, across) => origin.map((v, k) => v + along * x3[k] + across * x1[k]);
     const bar = (reach, aside) => [[-reach, aside], [reach, aside], [-reach, aside - tick], [-reach, aside + tick], [reach, aside - tick], [reach, aside + tick]].flatMap(([a, b]) => point(a, b));
-    const lines = new BufferGeometry().setAttribute('position', new Float32BufferAttribute([...bar(width / 2, 0), ...bar(opening / 2, -3 * tick)], 3));
+    const lines = new BufferGeometry().setAttribute('position', new Float32BufferAttribute([...bar(width / 2, 0), ...bar(opening / 2, -aside)], 3));
     this.rule = new LineSegments(lines, this.line);
     this.rule.renderOrder = 12;
     this.marks.add(this.rule);

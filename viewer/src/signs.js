@@ -118,8 +118,8 @@ export class LoadSign extends Group {
 /** An arrow along x1 that ends before the pads; `length` and `pad` [m]. */
 export function approachSign(material, length, pad) {
   const arrow = new Group().add(
-    new Mesh(new CylinderGeometry(0.018, 0.018, 0.7, 12).translate(0, 0.35, 0), material),
-    new Mesh(new ConeGeometry(0.06, 0.3, 20).translate(0, 0.85, 0), material),
+    new Mesh(new CylinderGeometry(0.013, 0.013, 0.7, 12).translate(0, 0.35, 0), material),
+    new Mesh(new ConeGeometry(0.045, 0.3, 20).translate(0, 0.85, 0), material),
   );
   arrow.traverse((object) => (object.renderOrder = 9));
   arrow.scale.setScalar(length);

@@ -30,7 +30,9 @@ function otherStroke(report) {
   const k = report.nearestMisses().get('face_pair_outside_stroke');
   const width = k === undefined ? NaN : report.miss(k).width;
   const known = others(report, ({ stroke }) => stroke[0] <= width && width <= stroke[1]);
-  return known ? `A gripper for ${mm(width)} (--gripper): ${known}.` : 'A gripper with another stroke: gripfast gripper list names those of the catalogue.';
+  if (known) return `A gripper for ${mm(width)} (--gripper): ${known}.`;
+  const size = report.header.part.bbox_max.map((high, n) => inMm(high - report.header.part.bbox_min[n])).join(' \u00d7 ');
+  return `A gripper with another stroke (gripfast gripper list names those of the catalogue), or another unit of the part file (--unit): the part measures ${size}\u00a0mm.`;
 }
 
 /** What to do about a force that is too small. */
@@ -110,10 +112,11 @@ export function missWords(report, k) {
   const [kind, of] = name.split(':');
   const body = upper((of ?? '').replaceAll('_', ' '));
   const free = by > 0 ? `; about ${mm(by, 2)} beside it would be free` : '';
+  const missing = by < 1e-3 ? 'less than 0.1\u00a0%' : percent(by);
   const words = {
     face_pair_outside_stroke: () => `faces ${faces[0]} and ${faces[1]} are ${mm(width)} apart, ${mm(by, 2)} ${width > (gripper?.stroke[0] ?? 0) ? 'more' : 'less'} than the jaws reach`,
-    contact_too_small: () => `${percent(by)} of the contact asked for is missing`,
-    pad_share_too_small: () => `${percent(by)} of the contact asked for is missing`,
+    contact_too_small: () => `${missing} of the contact asked for is missing`,
+    pad_share_too_small: () => `${missing} of the contact asked for is missing`,
     approach_outside_cone: () => `its approach lies ${degrees(by)} outside the cone`,
     too_far_from_centre_of_mass: () => `it lies ${mm(by, 2)} too far out`,
     ground: () => `${body} would reach ${mm(by, 2)} below the ground${at}`,
@@ -194,7 +197,9 @@ export function drawWhy(root, report, show) {
     if (fallen) lead += ` ${count(fallen)} other candidates fell before that:`;
   } else if (summary.candidates === 0) {
     title = 'No two faces fit between the jaws';
-    lead = `${gripper?.name ?? 'The gripper'} found no pair of opposite flat faces to close on, so nothing could be tried.`;
+    const pairs = list.reduce((sum, entry) => sum + (entry.pairs ? entry.n : 0), 0);
+    lead = pairs ? `The part has ${pairs === 1 ? 'one pair' : `${count(pairs)} pairs`} of opposite faces; ${gripper?.name ?? 'the gripper'} can close on none of them, so nothing could be tried.`
+      : `The part has no two flat faces opposite each other that ${gripper?.name ?? 'the gripper'} could close on, so nothing could be tried.`;
   } else {
     lead = `${count(summary.pairs)} pair${summary.pairs === 1 ? '' : 's'} of opposite faces, ${count(summary.candidates)} candidates, and each of them fell:`;
   }

@@ -1,6 +1,6 @@
 // Drives pages in a real browser: node test/browser.mjs FOLDER [FOLDER FOR SCREENSHOTS]
 // In the folder: small.html, some dozens of grips with a hostile part name; large.html, 10,000 grips on a part that was
-// simplified; none.html, no grip; slipping.html, grips that all slip.
+// simplified; none.html, no grip but rejected candidates; slipping.html, grips that all slip; curved.html, a shaft gripped on its barrel.
 // Exits with 1 and says what failed. CHROMIUM names the browser (default /usr/bin/chromium).
 
 import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
@@ -11,7 +11,7 @@ import { chromium } from 'playwright-core';
 import { friction, pressure } from '../src/colour.js';
 
 const [folder, shots] = process.argv.slice(2).map((path) => resolve(path));
-const [small, large, none, slipping] = ['small', 'large', 'none', 'slipping'].map((name) => join(folder, `${name}.html`));
+const [small, large, none, slipping, curved] = ['small', 'large', 'none', 'slipping', 'curved'].map((name) => join(folder, `${name}.html`));
 const FLAGS = ['--headless', '--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update',
   '--disable-sync', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
 const failures = [];
@@ -415,13 +415,32 @@ async function loads(page) {
   await page.mouse.click(spot.x, spot.y);
   const shown = await page.evaluate(() => {
     const { view, report, detail } = window.gripfast;
-    const arrow = view.load.up.clone().set(0, 1, 0).applyQuaternion(view.load.quaternion).toArray();
+    const arrow = view.load.up.clone().set(0, 1, 0).applyQuaternion(view.load.force.quaternion).toArray();
     const force = report.header.loads[detail.load].wrench.force;
     const length = Math.hypot(...force);
     return { load: detail.load, off: Math.hypot(...arrow.map((v, k) => v - force[k] / length)), name: report.header.loads[detail.load].name, mu: report.byLoad(detail.grip)[detail.load] };
   });
   check('a click on the ball chooses a load and draws it', shown.load === spot.load && shown.off < 1e-5, JSON.stringify(shown));
   const words = await page.innerText('.picked');
+  // The pressure shown is that of the chosen load: its plane carries the load's force along the closing axis.
+  const pads = await page.evaluate(() => {
+    const { report, detail } = window.gripfast;
+    const [own, worst] = [report.state(detail.grip, detail.load), report.state(detail.grip)];
+    const ring = (points) => points.reduce((sum, [x, y], k) => {
+      const [u, v] = points[(k + 1) % points.length];
+      const cross = (x * v - u * y) / 2;
+      return [sum[0] + cross, sum[1] + (cross * (x + u)) / 3, sum[2] + (cross * (y + v)) / 3];
+    }, [0, 0, 0]);
+    const carried = [0, 1].map((face) => report.contact(detail.grip).filter((r) => r.face === face).reduce((sum, { points }) => {
+      const [area, sx, sy] = ring(points);
+      const [a0, a1, a2] = own.plane(face);
+      return sum + a0 * area + a1 * sx + a2 * sy;
+    }, 0));
+    const force = report.header.loads[detail.load].wrench.force;
+    const along = report.pose(detail.grip).x3.reduce((sum, v, k) => sum + v * force[k], 0);
+    return { carried, expected: [report.planned.force + along / 2, report.planned.force - along / 2], differs: Math.abs(own.record[0] - worst.record[0]) > 1, under: document.querySelector('.under').textContent };
+  });
+  check('the pads show the pressure of the chosen load', pads.differs && pads.carried.every((v, k) => Math.abs(v / pads.expected[k] - 1) < 1e-3) && pads.under.includes(shown.name), JSON.stringify(pads));
   check('its friction is told', words.includes(shown.name) && /friction needed [\d.]+, safety/.test(words), words);
   await page.focus('.ball');
   await page.keyboard.press('ArrowUp');
@@ -676,6 +695,7 @@ async function nothing() {
     check(`no trouble without grips ${where}`, page.trouble.length === 0, page.trouble.join('; '));
     await page.close();
   }
+  await rejected();
   const page = await open(none, { hash: '#grip=7' });
   check('a link into a page without grips says so', /7.*not on this page.*no grips/.test(await page.textContent('#missing')));
   await page.close();
@@ -686,6 +706,110 @@ async function nothing() {
   await legible(slips, 'where all slip');
   await shot(slips, 'slipping');
   await slips.close();
+}
+
+/** The nearest misses in the view: the gripper at the pose, the body that stops it, the place; and the dots. */
+async function rejected() {
+  const page = await open(none);
+  await rest(page);
+  const state = () => page.evaluate(() => {
+    const { view, report } = window.gripfast;
+    const { misses } = view;
+    const miss = report.miss(misses.shown);
+    return {
+      shown: misses.shown, reason: miss.reason, jaws: view.jaws.root.position.toArray(), origin: miss.origin, place: miss.place, target: misses.target.position.toArray(), marked: misses.marks.visible && misses.target.visible,
+      painted: misses.painted.length, dots: misses.points.visible, note: document.querySelector('#note').textContent,
+    };
+  });
+  const near = (a, b) => a.every((v, k) => Math.abs(v - b[k]) < 1e-6);
+  const first = await state();
+  check('without grips the nearest miss of the commonest reason is shown', first.reason === 'part_interference:fingertip' && near(first.jaws, first.origin), JSON.stringify(first));
+  check('with the body that stops it and the place', first.marked && first.painted === 1 && near(first.target, first.place) && /runs into the part/.test(first.note));
+  const least = await page.evaluate(() => {
+    const { column, header } = window.gripfast.report;
+    return Math.min(...column.miss_by.filter((_, k) => header.reasons[column.miss_reason[k]] === 'part_interference:fingertip'));
+  });
+  check('it lacks least of its kind', await page.evaluate((least) => window.gripfast.report.miss(window.gripfast.view.misses.shown).by === least, least));
+  check('rejected candidates are dots', first.dots);
+  check('every kind has its nearest miss', (await page.locator('[data-miss]').count()) === 3, await page.innerText('.misses'));
+  await page.click('[data-miss]:nth-child(2) button');
+  await rest(page);
+  const second = await state();
+  check('a button shows another one', second.reason !== first.reason && near(second.jaws, second.origin) && second.painted === 0 && (await page.getAttribute('[data-miss]:nth-child(2) button', 'aria-pressed')) === 'true', JSON.stringify(second));
+  await page.click('[data-act="grip"]');
+  await rest(page);
+  const picked = await page.evaluate((now) => {
+    const { view } = window.gripfast;
+    const at = view.misses.points.geometry.attributes.position;
+    const rect = view.canvas.getBoundingClientRect();
+    const point = view.camera.position.clone();
+    for (let k = 0; k < at.count; k++) {
+      point.fromBufferAttribute(at, k).multiplyScalar(1000).project(view.camera);
+      view.pick({ clientX: rect.left + ((point.x + 1) / 2) * rect.width, clientY: rect.top + ((1 - point.y) / 2) * rect.height });
+      if (view.misses.shown !== now) return view.misses.shown;
+    }
+    return -1;
+  }, second.shown);
+  check('a click on a dot shows its candidate', picked >= 0 && picked !== second.shown);
+  await page.click('[data-toggle="misses"]');
+  check('the dots can be hidden', !(await state()).dots);
+  await page.click('#key summary');
+  check('the legend names the reasons', /Rejected: fingertip runs into the part/.test(await page.innerText('#key')), await page.innerText('#key'));
+  await legible(page, 'with a nearest miss');
+  await shot(page, 'rejected');
+  check('no trouble with rejected candidates', page.trouble.length === 0, page.trouble.join('; '));
+  await page.close();
+}
+
+/** Faces that are not plane: pressure on the unrolled face and in the view, the spin in words. */
+async function barrel() {
+  const page = await open(curved);
+  const found = await page.evaluate(() => {
+    const { report, state, view, detail } = window.gripfast;
+    const grip = state.chosen;
+    const pad = report.state(grip);
+    // The pressure over the pressed area, summed on a grid, is the force of the jaw and half of the load along x3.
+    const force = report.header.loads[report.column.load[grip]].wrench.force;
+    const along = report.pose(grip).x3.reduce((sum, v, k) => sum + v * force[k], 0);
+    const carried = [0, 1].map((face) => pad.of(face).reduce((sum, piece) => {
+      const xs = piece.rings[0].points.map((p) => p[0]);
+      const ys = piece.rings[0].points.map((p) => p[1]);
+      const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+      let total = 0;
+      for (let i = 0; i < 400; i++) for (let j = 0; j < 400; j++) total += Math.max(0, pad.on(piece, left + ((i + 0.5) * (right - left)) / 400, low + ((j + 0.5) * (high - low)) / 400));
+      return sum + (total * (right - left) * (high - low)) / 160000;
+    }, 0));
+    const mesh = view.jaws.contacts.map((group) => group.children[0]?.geometry.attributes.position.count ?? 0);
+    return { carried, expected: [report.planned.force + along / 2, report.planned.force - along / 2], mesh, pieces: pad.pieces?.length, grip, largest: pad.largest(0), detail: detail.grip };
+  });
+  check('the pressure on a barrel carries the squeeze', found.pieces > 0 && found.carried.every((v, k) => Math.abs(v / found.expected[k] - 1) < 5e-3), JSON.stringify(found));
+  check('the strip is drawn in the view', found.mesh.every((count) => count > 500), found.mesh.join());
+  const map = await colours(page, '.contact figure:nth-child(1) svg');
+  check('and on the unrolled face', (await page.locator('.contact figure image').count()) === 2 && map.different > 25, JSON.stringify(map));
+  const spins = await page.evaluate(() => {
+    const { report, state } = window.gripfast;
+    return state.order.findIndex((i) => report.slip(i).type === 'spin');
+  });
+  await page.click(`.row[data-position="${spins}"]`);
+  await rest(page);
+  check('a spin is told', /Would (spin|roll) about an axis/.test(await page.textContent('.contact .slip')), await page.textContent('.contact .slip'));
+  const friction = await page.evaluate(() => {
+    const { report, state } = window.gripfast;
+    const pad = report.state(state.chosen);
+    const middle = pad.of(0)[0].rings[0].points.reduce((sum, p, _, all) => [sum[0] + p[0] / all.length, sum[1] + p[1] / all.length], [0, 0]);
+    return [0, 1].map((face) => pad.friction(face, ...middle));
+  });
+  check('friction has a direction on each pad that slips', friction.some((f) => f && Math.abs(Math.hypot(...f) - 1) < 1e-9), JSON.stringify(friction));
+  await page.locator('.ball').scrollIntoViewIfNeeded();
+  await page.click('.loads tbody tr:nth-child(3) button');
+  check('another load has its own pressure', await page.evaluate(() => {
+    const { report, detail } = window.gripfast;
+    return detail.load >= 0 && report.state(detail.grip, detail.load)?.pieces !== null && document.querySelector('.under').textContent.startsWith('Under the chosen load');
+  }));
+  await legible(page, 'on a barrel');
+  await shot(page, 'barrel');
+  check('no trouble on a barrel', page.trouble.length === 0, page.trouble.join('; '));
+  await page.close();
 }
 
 async function tenThousand() {
@@ -718,6 +842,7 @@ try {
   await linkAndTheme();
   await phone();
   await nothing();
+  await barrel();
   if (existsSync(large)) await tenThousand();
 } finally {
   await browser.close();

@@ -6,12 +6,15 @@ use std::io::{Read, Write};
 use std::path::PathBuf;
 use std::process::Command;
 
-use crate::support::report::{data, part, plan};
+use crate::support;
+use crate::support::report::{data, part};
 use assert_cmd::cargo::cargo_bin_cmd;
 use base64::Engine;
 use flate2::read::GzDecoder;
 use glam::DVec3;
 use gripfast::error::ErrorKind;
+use gripfast::load::wrench_in_grip;
+use gripfast::model::Polygon;
 use gripfast::part::Mesh;
 use gripfast::report::{self, TEMPLATE};
 use gripfast::results::GripSet;
@@ -19,7 +22,7 @@ use serde_json::Value;
 
 fn fixture() -> (GripSet, Mesh) {
     let part = part(&data("parts/l_bracket.stl"));
-    (plan(&part, "robotiq-2f85", "ball:12:5N", 0.35, (2, 3), 40), part.mesh)
+    (support::report::plan(&part, "robotiq-2f85", "ball:12:5N", 0.35, (2, 3), 40), part.mesh)
 }
 
 fn viewer() -> PathBuf {
@@ -60,17 +63,27 @@ fn header(page: &str) -> Value {
 
 /// A column of single-precision numbers.
 fn column(page: &str, name: &str) -> Vec<f32> {
+    cells(page, name, "f32").into_iter().map(f32::from_le_bytes).collect()
+}
+
+/// A column of whole numbers.
+fn numbers(page: &str, name: &str) -> Vec<u32> {
+    cells(page, name, "u32").into_iter().map(u32::from_le_bytes).collect()
+}
+
+/// The cells of a column of this kind, four bytes each.
+fn cells(page: &str, name: &str, kind: &str) -> Vec<[u8; 4]> {
     let packed = base64::engine::general_purpose::STANDARD
         .decode(between(page, r#"id="report-data">"#, "</script>"))
         .unwrap();
     let mut bytes = Vec::new();
     GzDecoder::new(&packed[..]).read_to_end(&mut bytes).unwrap();
     let section = &header(page)["sections"][name];
-    assert_eq!(section[0], "f32");
+    assert_eq!(section[0], kind);
     let [offset, count] = [1, 2].map(|k| section[k].as_u64().unwrap() as usize);
     bytes[offset..offset + 4 * count]
         .chunks_exact(4)
-        .map(|b| f32::from_le_bytes(b.try_into().unwrap()))
+        .map(|bytes| bytes.try_into().unwrap())
         .collect()
 }
 
@@ -239,6 +252,71 @@ fn the_best_grips_have_every_load() {
     assert_eq!(paged.grips, bare.grips);
 }
 
+/// The pressure that the page has for a load carries that load: its integral over a pad is the
+/// normal force, and its moments differ by the load's moment and the friction's, which acts in the
+/// pad planes.
+#[test]
+fn every_state_of_the_page_carries_its_load() {
+    let (set, mesh) = fixture();
+    let page = report::render(&set, Some(&mesh), &[]).unwrap();
+    let [rows, loads] = ["state_rows", "state_load"].map(|name| numbers(&page, name));
+    let (pressure, slip) = (column(&page, "state_pressure"), column(&page, "state_slip"));
+    let ends: Vec<u32> = (0..=set.grips.len() as u32).map(|row| row * 12).collect();
+    assert_eq!(rows, ends, "the fixture has all twelve loads of all grips");
+    let force = set.provenance.resolved.force.0;
+    let mut whole = 0;
+    for (row, ranked) in set.grips.iter().enumerate() {
+        let range = rows[row] as usize..rows[row + 1] as usize;
+        let own = &loads[range.clone()];
+        let mu = |load: u32| ranked.mu_by_load[load as usize].unwrap_or(f64::INFINITY);
+        assert!(own.windows(2).all(|pair| mu(pair[0]) >= mu(pair[1])), "hardest first");
+        for (state, &load) in range.zip(own) {
+            let [a_i, a_ii, a1, a2] = [0, 1, 2, 3].map(|k| f64::from(pressure[4 * state + k]));
+            assert!((1.0..=3.0).contains(&slip[7 * state]), "planes do not spin");
+            let wrench = wrench_in_grip(
+                &set.loads[load as usize].wrench,
+                set.part.mass.centre_of_mass,
+                &ranked.grip.part_from_grip,
+            );
+            let contact = &ranked.grip.contact;
+            let faces = [(&contact.face_i, a_i, 1.0), (&contact.face_ii, a_ii, -1.0)];
+            for (patch, at_origin, sign) in faces {
+                let corners = || patch.iter().flat_map(|polygon| &polygon.outer);
+                let value = |x: f64, y: f64| at_origin + sign * (a1 * x + a2 * y);
+                if corners().any(|point| value(point.x, point.y) < 0.0) {
+                    continue;
+                }
+                // A plane integrates to its value at the centroid times the area.
+                let [area, sx, sy] = patch
+                    .iter()
+                    .map(area_moments)
+                    .fold([0.0; 3], |sum, one| [sum[0] + one[0], sum[1] + one[1], sum[2] + one[2]]);
+                let carried = area * value(sx / area, sy / area);
+                let normal = force + sign * wrench.force.z / 2.0;
+                assert!((carried / normal - 1.0).abs() < 1e-5, "{carried} {normal}");
+                whole += 1;
+            }
+        }
+    }
+    assert!(whole > 20, "{whole}");
+}
+
+/// Area and first moments of a polygon with holes.
+fn area_moments(polygon: &Polygon) -> [f64; 3] {
+    let ring = |ring: &[glam::DVec2]| {
+        ring.iter().zip(ring.iter().cycle().skip(1)).fold([0.0; 3], |[a, x, y], (p, q)| {
+            let cross = p.perp_dot(*q) / 2.0;
+            [a + cross, x + cross * (p.x + q.x) / 3.0, y + cross * (p.y + q.y) / 3.0]
+        })
+    };
+    let positive = |[a, x, y]: [f64; 3]| [a.abs(), x * a.signum(), y * a.signum()];
+    let outer = positive(ring(&polygon.outer));
+    polygon.holes.iter().fold(outer, |sum, hole| {
+        let hole = positive(ring(hole));
+        [sum[0] - hole[0], sum[1] - hole[1], sum[2] - hole[2]]
+    })
+}
+
 /// Nothing found is an answer to look at: exit code 1, and a page that says why.
 #[test]
 fn a_plan_without_grips_writes_its_page() {
@@ -262,6 +340,16 @@ fn a_plan_without_grips_writes_its_page() {
         header["asked"]
     );
     assert_eq!(header["gripper"]["flange"].as_array().map(Vec::len), Some(16));
+    // What fell is there to look at, each with what it lacks.
+    let reasons: Vec<&str> =
+        header["reasons"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    assert!(
+        reasons.contains(&"ground:fingertip") && reasons.contains(&"contact_too_small"),
+        "{reasons:?}"
+    );
+    let (by, reason) = (column(&page, "miss_by"), numbers(&page, "miss_reason"));
+    assert!(by.len() > 60 && by.len() == reason.len() && by.iter().all(|by| *by > 0.0));
+    assert_eq!(column(&page, "miss_place").len(), 3 * by.len());
 }
 
 #[test]
