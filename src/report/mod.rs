@@ -9,6 +9,7 @@ pub mod contact_svg;
 mod areas;
 mod decimate;
 mod display;
+mod obstacles;
 mod payload;
 mod states;
 

@@ -17,6 +17,7 @@ use serde_json::{Map, Value, json};
 
 use super::areas;
 use super::display::{Display, TRIANGLE_BUDGET};
+use super::obstacles;
 use super::states::{self, Pressed};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gripper::catalogue::{self, CATALOGUE};
@@ -113,6 +114,7 @@ impl Payload {
         areas::surfaces(&mut columns, grips);
         let by_load = loads(&mut columns, set, grips);
         let reasons = rejected(&mut columns, misses);
+        let obstacles = obstacles::obstacles(&mut columns, set);
         let display = mesh
             .and_then(|mesh| Display::new(mesh, TRIANGLE_BUDGET))
             .map(|display| surface(&mut columns, display));
@@ -136,7 +138,7 @@ impl Payload {
             "format": "gripfast-report", "version": 1, "provenance": provenance(set), "part": set.part, "display": display,
             "gripper": gripper, "gripper_problem": gripper_problem, "loads": set.loads, "summary": set.summary,
             "grips": { "total": set.grips.len(), "shown": grips.len() }, "statuses": statuses, "by_load": by_load,
-            "asked": asked(set), "reasons": reasons, "catalogue": known_grippers(), "sections": columns.sections,
+            "asked": asked(set), "reasons": reasons, "obstacles": obstacles, "catalogue": known_grippers(), "sections": columns.sections,
         });
         Ok(Self { header: script_safe(&header)?, data: packed(&columns.bytes)? })
     }
@@ -376,7 +378,7 @@ fn known_grippers() -> Vec<Value> {
 }
 
 /// A frame as a column-major 4x4 matrix.
-fn matrix(frame: &Frame) -> Vec<f64> {
+pub(super) fn matrix(frame: &Frame) -> Vec<f64> {
     let (r, o) = (frame.rotation, frame.origin);
     let column = |axis: glam::DVec3, w: f64| [axis.x, axis.y, axis.z, w];
     [column(r.x_axis, 0.0), column(r.y_axis, 0.0), column(r.z_axis, 0.0), column(o, 1.0)].concat()

@@ -20,9 +20,26 @@ use gripfast::results::{GripSet, RankedGrip};
 use gripfast::units::{Angle, Length, Mass};
 use gripfast::{export, report};
 
+/// A table, and a vise jaw beside the part.
+const SCENE: &str = r#"
+[part]
+position = ["0mm", "0mm", "100mm"]
+
+[[obstacle]]
+name = "table"
+plane = [0, 0, 1]
+position = ["0mm", "0mm", "90mm"]
+
+[[obstacle]]
+name = "vise jaw"
+frame = "part"
+box = ["60mm", "10mm", "20mm"]
+position = ["30mm", "-5mm", "10mm"]
+"#;
+
 /// Poses of a set as if they had been rejected: two reasons with places, one without.
 fn misses(set: &GripSet) -> Vec<Miss> {
-    let reasons = ["part_interference:fingertip", "contact_too_small", "twisted_out"];
+    let reasons = ["part_interference:fingertip", "contact_too_small", "scene:vise_jaw"];
     let miss = |(k, ranked): (usize, &RankedGrip)| {
         let pose = Negative::new(&ranked.grip, reasons[k % 3].to_owned());
         let place = (k % 3 == 0).then_some(ranked.grip.part_from_grip.origin);
@@ -108,8 +125,11 @@ fn the_page_works_in_a_browser() {
     none.summary.rejections = BTreeMap::from([
         ("part_interference:fingertip".into(), 120),
         ("contact_too_small".into(), 30),
-        ("twisted_out".into(), 9),
+        ("scene:vise_jaw".into(), 9),
     ]);
+    // With something around the part: a plane and a box that the part's own frame carries.
+    std::fs::write(page("scene.toml"), SCENE).unwrap();
+    none.provenance.request.candidates.scene = Some(page("scene.toml"));
     report::write(&none, Some(&part.mesh), &misses(&set), &page("none.html")).unwrap();
     report::write(&curved(), None, &[], &page("curved.html")).unwrap();
     let mut slipping = set;

@@ -21,6 +21,7 @@ export function drawLegend(list, report, scale, colours) {
     gripper?.flange && ['axes', '', 'Flange frame, axes x, y, z'],
     asked.ground && ['box', colours.fixture, 'Ground'],
     asked.keep_out?.length > 0 && ['box', colours.fixture, 'Boxes to keep out of'],
+    report.header.obstacles.list.length > 0 && ['box', colours.fixture, `Obstacles of the scene: ${report.header.obstacles.list.map(({ name }) => name).join('; ')}`],
     ...report.header.reasons.filter((name) => !name.startsWith('face_pair')).map((name) => ['box', reasonColour(report, name), `Rejected: ${reason(name, report).title.toLowerCase()}`]),
   ];
   list.replaceChildren(...entries.filter(Boolean).map(([kind, colour, text]) => {

@@ -12,8 +12,8 @@ const vector = (list) => new Vector3(...list);
 const basis = ({ x1, x2, x3 }) => new Matrix4().makeBasis(vector(x1), vector(x2), vector(x3));
 
 export class Misses {
-  constructor(report, jaws) {
-    Object.assign(this, { report, jaws, shown: -1 });
+  constructor(report, jaws, fixtures) {
+    Object.assign(this, { report, jaws, fixtures, shown: -1 });
     this.group = new Group();
     this.marks = new Group();
     this.hit = new MeshStandardMaterial({ color: HIT, roughness: 0.6, transparent: true, opacity: 0.8, depthWrite: false });
@@ -75,7 +75,7 @@ export class Misses {
     if (miss.place) {
       this.target.position.set(...miss.place);
       this.paint(miss);
-    }
+    } else if (miss.reason.startsWith('scene:')) this.paintObstacle(miss.reason.slice('scene:'.length));
     this.measure(miss, pair ? opening : null, aside);
   }
 
@@ -105,6 +105,15 @@ export class Misses {
     const { part: { bbox_min: low, bbox_max: high }, gripper } = this.report.header;
     const deep = x1.reduce((sum, v, n) => sum + v * (origin[n] - (v > 0 ? low[n] : high[n])), 0);
     return deep + 1.2 * Math.max(...(gripper?.pad ?? [[0.01, 0]]).map(([x]) => x));
+  }
+
+  /** Paints the obstacle of the scene that stops a candidate. */
+  paintObstacle(name) {
+    const found = this.fixtures.children.find(({ userData }) => userData.obstacle?.replace(/\s/g, '_') === name);
+    if (!found) return;
+    const [surface] = found.children;
+    this.painted.push([surface, surface.material]);
+    surface.material = this.hit;
   }
 
   /** The width of a pair of faces as a line with ends, and that of the opened jaws `aside` before it; nothing without an opening. */

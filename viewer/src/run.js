@@ -54,13 +54,14 @@ const size = (low, high) => high.map((v, k) => number((v - low[k]) * 1e3)).join(
 
 /** Sentences about what the page does not show in full. */
 export function limits(report) {
-  const { display, grips, gripper, gripper_problem: problem, by_load: byLoad, loads, provenance } = report.header;
+  const { display, grips, gripper, gripper_problem: problem, by_load: byLoad, loads, obstacles, provenance } = report.header;
   const notes = (provenance.warnings ?? []).map((text) => `Warning: ${text}`);
   if (!display) notes.push('The part\u2019s mesh was not given: its bounding box is drawn.');
   else if (display.shown < display.triangles) {
     notes.push(`Part simplified for display: ${count(display.shown)} of ${count(display.triangles)} triangles, ${display.deviation < 1e-6 ? 'less than 0.001\u00a0mm' : `at most about ${mm(display.deviation, 2)}`} off. Scores come from the full part.`);
   }
   if (grips.shown < grips.total) notes.push(`The best ${count(grips.shown)} of ${count(grips.total)} grips are listed.`);
+  if (obstacles.problem) notes.push(`The scene could not be drawn: ${obstacles.problem}.`);
   if (!gripper) notes.push(`The gripper could not be drawn: ${problem}.`);
   if (byLoad.rows > 0 && byLoad.rows < grips.shown && loads.length > 1) notes.push(`The friction over all loads was solved for ${count(byLoad.rows)} of the grips, the best ones first; for the others only the worst load.`);
   return notes;

@@ -61,8 +61,9 @@ export class View {
     this.world.add(this.jaws.root);
     this.buildSigns();
     this.gripperSize = 2 * MM * Math.max(0, ...this.jaws.corners().map((point) => point.length()));
-    this.world.add(fixtures(report.header.asked, this.middle.clone().divideScalar(MM), this.radius / MM, this.materials));
-    this.misses = new Misses(report, this.jaws);
+    this.fixtures = fixtures(report, this.middle.clone().divideScalar(MM), this.radius / MM, this.materials);
+    this.world.add(this.fixtures);
+    this.misses = new Misses(report, this.jaws, this.fixtures);
     this.world.add(this.misses.group);
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.enableDamping = false;

@@ -1,7 +1,7 @@
 // Signs in the view: dots, letters, the load, the approach, the flange frame, fixtures.
 
 import {
-  Box3, Box3Helper, BoxGeometry, CanvasTexture, ConeGeometry, CylinderGeometry, GridHelper, Group, Matrix4, Mesh, MeshBasicMaterial, PlaneGeometry, SphereGeometry,
+  Box3, Box3Helper, BoxGeometry, BufferAttribute, BufferGeometry, CanvasTexture, ConeGeometry, CylinderGeometry, EdgesGeometry, GridHelper, Group, LineSegments, Matrix4, Mesh, MeshBasicMaterial, PlaneGeometry, SphereGeometry,
   Sprite, SpriteMaterial, TorusGeometry, Vector3,
 } from 'three';
 
@@ -146,20 +146,47 @@ export function frameSign(matrix, size) {
   return frame;
 }
 
-/** The ground and the boxes to keep out of; `middle` and `radius` of the part [m]. */
-export function fixtures({ ground, keep_out: boxes }, middle, radius, materials) {
+/** A shape of an obstacle of the scene; a plane is drawn `size` wide. */
+function obstacleShape(shape, column, size) {
+  if (shape.type === 'box') return new BoxGeometry(...shape.half.map((half) => 2 * half));
+  if (shape.type === 'plane') return new PlaneGeometry(size, size);
+  const cut = (name, [first, length]) => column[name].subarray(first, first + length);
+  const surface = new BufferGeometry().setAttribute('position', new BufferAttribute(cut('obstacle_points', shape.points), 3));
+  surface.setIndex(new BufferAttribute(cut('obstacle_triangles', shape.triangles), 1));
+  return surface;
+}
+
+/** The ground, the boxes to keep out of, and the obstacles of the scene; `middle` and `radius` of the part [m]. */
+export function fixtures({ header, column }, middle, radius, materials) {
+  const { ground, keep_out: boxes } = header.asked;
   const group = new Group();
+  const size = 4 * radius;
+  const grid = () => {
+    const lines = new GridHelper(size, 16).rotateX(Math.PI / 2);
+    lines.material = materials.fixtureEdge;
+    return lines;
+  };
   if (ground) {
     const normal = vector(ground.normal).normalize();
     const centre = middle.clone();
     centre.addScaledVector(normal, ground.height_m - centre.dot(normal));
-    const size = 4 * radius;
-    const lines = new GridHelper(size, 16).rotateX(Math.PI / 2);
-    lines.material = materials.fixtureEdge;
-    const plane = new Group().add(new Mesh(new PlaneGeometry(size, size), materials.fixture), lines);
+    const plane = new Group().add(new Mesh(new PlaneGeometry(size, size), materials.fixture), grid());
     plane.quaternion.setFromUnitVectors(UP, normal);
     plane.position.copy(centre);
     group.add(plane);
+  }
+  for (const { name, matrix, shape } of header.obstacles.list) {
+    const obstacle = new Group();
+    const geometry = obstacleShape(shape, column, size);
+    obstacle.add(new Mesh(geometry, materials.fixture), shape.type === 'plane' ? grid() : new LineSegments(new EdgesGeometry(geometry, 30), materials.fixtureEdge));
+    obstacle.userData.obstacle = name;
+    obstacle.applyMatrix4(new Matrix4().fromArray(matrix));
+    // A plane has no middle of its own: it is drawn under the part's.
+    if (shape.type === 'plane') {
+      const normal = new Vector3(0, 0, 1).applyQuaternion(obstacle.quaternion);
+      obstacle.position.copy(middle).addScaledVector(normal, normal.dot(obstacle.position.clone().sub(middle)));
+    }
+    group.add(obstacle);
   }
   for (const [low, high] of boxes ?? []) {
     const box = new Box3(vector(low), vector(high));

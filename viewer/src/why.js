@@ -68,7 +68,7 @@ export function reason(name, report) {
     ground: () => [`${body} below the ground`, 'Drawn in the view: the ground that the gripper must stay above.',
       `A lower --ground${asked.ground ? ` than ${mm(asked.ground.height_m)}` : ''}, a part that stands higher, or an approach from above (--approach).`],
     keep_out: () => [`${body} in a box to keep out of`, 'The boxes are drawn in the view.', 'Smaller boxes (--keep-out), or another approach.'],
-    scene: () => [`Stopped by the scene: ${(of ?? '').replaceAll('_', ' ')}`, 'The gripper meets this obstacle of the scene file, or the robot does not get there.', 'Another place of the part in the cell, less clearance in the scene file, or another approach.'],
+    scene: () => [`Stopped by the scene: ${(of ?? '').replaceAll('_', ' ')}`, 'The gripper meets this obstacle of the scene file (drawn in the view), or the robot does not get there.', 'Another place of the part in the cell, less clearance in the scene file, or another approach.'],
     part_interference: () => [`${body} runs into the part`, '', `Places between the obstacles, with a finer grid (--spacing, --angle-step)${asked.clearance ? ` or less clearance (--clearance, now ${mm(asked.clearance)})` : ''}; else a gripper with slimmer fingers.`],
     approach_blocked: () => [`${body} hits the part on its way in`, 'The pose itself is free; the opened jaws do not get there.', `A smaller --opening${asked.opening ? ` than ${mm(asked.opening)} per jaw` : ''}.`],
     no_normal_force: () => ['Pulled off a pad', `A load pulls along the closing axis so hard that one pad no longer presses. The largest of the ${count(loads.length)} loads is ${newtons(largestForce(report))}, the gripping force ${newtons(asked.force)}.`, moreForce(report)],
@@ -218,7 +218,7 @@ export function drawWhy(root, report, show) {
     root.append(node('h3', 'What would help'), items);
   }
   if (summary.candidates > 0) {
-    const hint = told('p', 'gripfast plan with --why X,Y,ANGLE,SITE explains a single pose, test by test.');
+    const hint = told('p', 'gripfast plan with --why X,Y,ANGLE,PAIR explains a single pose, test by test.');
     hint.className = 'quiet';
     root.append(hint);
   }

@@ -757,6 +757,12 @@ async function rejected() {
   check('the legend names the reasons', /Rejected: fingertip runs into the part/.test(await page.innerText('#key')), await page.innerText('#key'));
   await legible(page, 'with a nearest miss');
   await shot(page, 'rejected');
+  const around = await page.evaluate(() => window.gripfast.view.fixtures.children.map((obstacle) => ({ name: obstacle.userData.obstacle, at: obstacle.position.toArray() })));
+  check('the scene is drawn in the frame of the part', around.length === 2 && Math.abs(around[0].at[2] + 0.01) < 1e-9 && near(around[1].at, [0.03, -0.005, 0.01]), JSON.stringify(around));
+  await page.click('[data-miss]:nth-child(3) button');
+  await rest(page);
+  check('the obstacle that stops a candidate is marked', await page.evaluate(() => window.gripfast.view.fixtures.children[1].children[0].material === window.gripfast.view.misses.hit));
+  await shot(page, 'scene');
   check('no trouble with rejected candidates', page.trouble.length === 0, page.trouble.join('; '));
   await page.close();
 }

@@ -12,14 +12,23 @@ use std::fs::File;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-const PAGES: [&str; 6] = [
-    "README.md",
-    "docs/tutorial.md",
-    "docs/gripper-file.md",
-    "docs/mechanics.md",
-    "docs/sizing.md",
-    "docs/batches.md",
-];
+/// The pages that show commands.
+fn pages() -> Vec<String> {
+    let root = crate::support::root();
+    let mut pages: Vec<String> = std::fs::read_dir(root.join("docs"))
+        .unwrap()
+        .map(|entry| format!("docs/{}", entry.unwrap().file_name().to_string_lossy()))
+        .filter(|page| page.ends_with(".md"))
+        .collect();
+    pages.push("README.md".to_owned());
+    pages.sort();
+    pages.retain(|page| {
+        let text = std::fs::read_to_string(root.join(page)).unwrap();
+        text.lines().any(|line| line.starts_with("$ gripfast "))
+    });
+    assert!(pages.len() >= 9, "{pages:?}");
+    pages
+}
 
 /// A command of a page and the output shown under it.
 struct Step {
@@ -218,8 +227,8 @@ fn pages_show_what_the_program_prints() {
     let root = crate::support::root();
     let write = std::env::var("GRIPFAST_DOCS").as_deref() == Ok("write");
     let mut wrong = Vec::new();
-    for page in PAGES {
-        let text = std::fs::read_to_string(root.join(page)).unwrap();
+    for page in pages() {
+        let text = std::fs::read_to_string(root.join(&page)).unwrap();
         let lines: Vec<&str> = text.lines().collect();
         let folder = tempfile::tempdir().unwrap();
         copy(&root.join("data"), &folder.path().join("data"));
@@ -271,7 +280,7 @@ fn pages_show_what_the_program_prints() {
         }
         out.extend(lines[copied..].iter().map(|&line| line.to_owned()));
         if write {
-            std::fs::write(root.join(page), out.join("\n") + "\n").unwrap();
+            std::fs::write(root.join(&page), out.join("\n") + "\n").unwrap();
         }
     }
     assert!(
