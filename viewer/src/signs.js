@@ -184,7 +184,8 @@ export function fixtures({ header, column }, middle, radius, materials) {
     // A plane has no middle of its own: it is drawn under the part's.
     if (shape.type === 'plane') {
       const normal = new Vector3(0, 0, 1).applyQuaternion(obstacle.quaternion);
-      obstacle.position.copy(middle).addScaledVector(normal, normal.dot(obstacle.position.clone().sub(middle)));
+      const height = normal.dot(obstacle.position) - normal.dot(middle);
+      obstacle.position.copy(middle).addScaledVector(normal, height);
     }
     group.add(obstacle);
   }
