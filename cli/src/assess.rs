@@ -63,13 +63,7 @@ pub(crate) fn run(args: AssessArgs) -> anyhow::Result<ExitCode> {
         origin: args.origin.as_deref().map(|text| Origin::parse("--origin", text)).transpose()?,
     };
     let turn = Quantity::Angle.parse("--tilt", &args.tilt)?;
-    if args.plan.grippers().len() > 1 {
-        anyhow::bail!(gripfast::error::Error::input(
-            "--gripper",
-            "several are given",
-            "assess poses for one gripper at a time"
-        ));
-    }
+    args.plan.single()?;
     let request = args.plan.request()?;
     let (as_json, quiet) = (request.output.json, request.output.quiet);
     let output = request.output.output.clone();

@@ -82,6 +82,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(path) = &request {
         batch.request = Request::read(path)?;
     }
+    job.single()?;
     job.give(&mut batch.request)?;
     batch.top = top_k.or(batch.top);
     if !gripper.is_empty() {

@@ -25,20 +25,16 @@ pub(crate) use watch::Interrupt;
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (why, print) = (args.why(), args.print_request);
-    let grippers = args.grippers().to_vec();
-    let request = args.request()?;
-    if grippers.len() > 1 {
+    let variants = args.variants()?;
+    if variants.len() > 1 {
         if why.is_some() || print {
             let flag = if print { "--print-request" } else { "--why" };
-            return Err(Error::input(
-                flag,
-                "is about one gripper, and several are given",
-                "give one",
-            )
-            .into());
+            let problem = "is about one gripper, force and friction, and several are given";
+            return Err(Error::input(flag, problem, "give one of each").into());
         }
-        return several::run(&request, &grippers);
+        return several::run(&args.request()?, &variants);
     }
+    let request = args.request()?;
     if print {
         write!(terminal::output(), "{}", request.to_toml())?;
         return Ok(ExitCode::SUCCESS);

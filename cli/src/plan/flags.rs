@@ -11,6 +11,8 @@ use gripfast::request::{
 use gripfast::units::{Acceleration, Angle, Density, Force, Length, Mass, Memory, Time, Unit};
 use serde_json::{Map, Value};
 
+use super::several::{self, Variant};
+
 /// Finds and ranks the grips (grasps) on a part.
 #[derive(Debug, ClapArgs)]
 #[command(
@@ -19,6 +21,7 @@ gripfast plan bracket.stl --gripper my-gripper.toml --density 2700kg/m3 --force 
 gripfast plan bracket.stl --gripper franka-hand --mass 350g --loads ball:500 --top 20 --diverse --report bracket.html\n  \
 gripfast plan bracket.stl --gripper franka-hand --mass 350g --pose-noise 1mm,2deg --compare\n  \
 gripfast plan bracket.stl -g robotiq-2f85 -g onrobot-rg2 --mass 350g --safety 2 -o grips.json\n  \
+gripfast plan bracket.stl -g robotiq-2f85 --force 40N --force 80N --pad-friction 0.3 --pad-friction 0.5 --mass 350g\n  \
 gripfast plan housing.stl --gripper wsg50-110 --mass 2kg --spacing 0.5mm --loads ball:500 -o housing.parquet --resume\n  \
 gripfast plan bracket.stl --gripper generic --mass 350g --print-request > bracket.toml; gripfast plan --request bracket.toml --force 40N\n  \
 for part in *.stl; do gripfast plan \"$part\" --gripper generic --density 2700kg/m3 -q -o \"${part%.stl}.json\" >\"${part%.stl}.txt\"; done\n\n\
@@ -71,8 +74,9 @@ pub(crate) struct JobArgs {
     #[arg(long, value_name = "INERTIA", allow_hyphen_values = true)]
     inertia: Option<InertiaMatrix>,
     /// Gripping force of one jaw, not the sum of both, e.g. 80N [default: the gripper's largest].
+    /// `plan` compares several, each given with its own --force.
     #[arg(long)]
-    force: Option<Force>,
+    force: Vec<Force>,
     /// Unit of the part file's numbers [default: the file's own, else mm].
     #[arg(long)]
     unit: Option<Unit>,
@@ -185,9 +189,10 @@ struct ScoringArgs {
     k2: Option<f64>,
     /// Friction coefficient of the pads [default: the gripper's], for what holds, the force needed
     /// and the multiple of the worst load, all of it with its moments, that is held. Another load
-    /// may end at a smaller multiple, where it twists the contact out.
+    /// may end at a smaller multiple, where it twists the contact out. `plan` compares several, each
+    /// given with its own --pad-friction.
     #[arg(long, value_name = "MU")]
-    pad_friction: Option<f64>,
+    pad_friction: Vec<f64>,
     /// Safety factor: a grip holds where mu_s times this is at most the pads' friction.
     #[arg(long, value_name = "FACTOR")]
     safety: Option<f64>,
@@ -319,12 +324,21 @@ impl Args {
         self.output.why.clone()
     }
 
-    /// The grippers given.
-    pub(crate) fn grippers(&self) -> &[String] {
-        &self.gripper
+    /// What is compared: every gripper given, with every force and every friction of the pads.
+    pub(super) fn variants(&self) -> gripfast::error::Result<Vec<Variant>> {
+        several::variants(&self.gripper, &self.job.force, &self.job.scoring.pad_friction)
     }
 
-    /// The request that the flags make, but for the gripper where several are given, over the stored one where there is one.
+    /// Makes sure that nothing is given several times, which only `plan` compares.
+    pub(crate) fn single(&self) -> gripfast::error::Result<()> {
+        if self.gripper.len() > 1 {
+            return Err(given_several_times("--gripper"));
+        }
+        self.job.single()
+    }
+
+    /// The request that the flags make, but for what is given several times, over the stored one
+    /// where there is one.
     pub(crate) fn request(self) -> gripfast::error::Result<Request> {
         let mut request = match &self.request {
             Some(path) => Request::read(path)?,
@@ -353,15 +367,31 @@ impl Args {
     }
 }
 
+fn given_several_times(flag: &str) -> Error {
+    Error::input(flag, "is given several times", "give it once; `gripfast plan` compares several")
+}
+
 impl JobArgs {
-    /// Sets the fields of a request for which a flag was given.
+    /// Makes sure that nothing is given several times, which only `plan` compares.
+    pub(crate) fn single(&self) -> gripfast::error::Result<()> {
+        match (self.force.len(), self.scoring.pad_friction.len()) {
+            (2.., _) => Err(given_several_times("--force")),
+            (_, 2..) => Err(given_several_times("--pad-friction")),
+            _ => Ok(()),
+        }
+    }
+
+    /// Sets the fields of a request for which a flag was given once.
     pub(crate) fn give(self, request: &mut Request) -> gripfast::error::Result<()> {
         // One takes the place of the other.
         if self.mass.is_some() || self.density.is_some() {
             (request.mass, request.density) = (None, None);
         }
         give!(self => request;
-            mass, density, com, inertia, force, unit, max_memory, outside_buffers, accel);
+            mass, density, com, inertia, unit, max_memory, outside_buffers, accel);
+        if let [force] = self.force[..] {
+            request.force = Some(force);
+        }
         let (flags, group) = (self.candidates, &mut request.candidates);
         give!(flags => group;
             spacing, angle_step, edge_angles, curved, min_contact, min_pad_share, max_offset, approach,
@@ -375,8 +405,11 @@ impl JobArgs {
         }
         let (flags, group) = (self.scoring, &mut request.scoring);
         give!(flags => group;
-            backend, adapter, seeds, k1, k2, pad_friction, safety, position_error, closing_friction,
+            backend, adapter, seeds, k1, k2, safety, position_error, closing_friction,
             separation, polish, refiner, threads);
+        if let [friction] = flags.pad_friction[..] {
+            group.pad_friction = Some(friction);
+        }
         let (choice, more, group) = (self.choice, self.more, &mut request.selection);
         give!(choice => group; diverse, merge_symmetric, ids);
         give!(more => group; pose_noise, noise_samples, compare, negatives);
@@ -423,7 +456,9 @@ pub(crate) fn with_defaults(command: Command) -> Command {
             }
         })
     };
-    command.mut_subcommand("plan", with).mut_subcommand("assess", with)
+    ["plan", "assess", "batch"]
+        .into_iter()
+        .fold(command, |command, name| command.mut_subcommand(name, with))
 }
 
 #[cfg(test)]

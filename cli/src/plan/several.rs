@@ -1,4 +1,4 @@
-//! Several grippers side by side: the same request planned with each.
+//! Several grippers, forces or pads side by side: the same request planned with each.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -8,31 +8,88 @@ use gripfast::error::Error;
 use gripfast::plan::{Outcome, Plan};
 use gripfast::request::Request;
 use gripfast::results::RankedGrip;
+use gripfast::units::Force;
 
 use super::layout::{self, Column, number, width, words, wrapped};
 use super::watch::{Interrupt, Watch};
 use super::{agreed, notes, table};
 use crate::terminal;
 
-/// Plans with each gripper, prints their best grips in one table, and writes the files of each under
-/// a name of its own: `grips.robotiq-2f85.json` for `grips.json`.
-pub(super) fn run(request: &Request, grippers: &[String]) -> anyhow::Result<ExitCode> {
-    let tags = tags(grippers)?;
+/// One of the plans that are compared.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Variant {
+    gripper: Option<String>,
+    force: Option<Force>,
+    pad_friction: Option<f64>,
+    /// What tells it from the others, for the names of files.
+    tag: String,
+}
+
+/// Every gripper with every force and every friction of the pads.
+///
+/// # Errors
+/// When one is given twice.
+pub(super) fn variants(
+    grippers: &[String],
+    forces: &[Force],
+    frictions: &[f64],
+) -> gripfast::error::Result<Vec<Variant>> {
+    let mut variants: Vec<Variant> = Vec::new();
+    let all = |count: usize| 0..count.max(1);
+    for (gripper, force, friction) in all(grippers.len()).flat_map(|gripper| {
+        all(forces.len()).flat_map(move |force| {
+            all(frictions.len()).map(move |friction| (gripper, force, friction))
+        })
+    }) {
+        let (gripper, force) = (grippers.get(gripper), forces.get(force).copied());
+        let pad_friction = frictions.get(friction).copied();
+        let mut words = Vec::new();
+        if let Some(gripper) = gripper.filter(|_| grippers.len() > 1) {
+            let name = Path::new(gripper).file_name().unwrap_or_default().to_string_lossy();
+            words.push(name.strip_suffix(".toml").unwrap_or(&name).to_owned());
+        }
+        words.extend(force.filter(|_| forces.len() > 1).map(|force| format!("{}N", force.0)));
+        let friction = pad_friction.filter(|_| frictions.len() > 1);
+        words.extend(friction.map(|friction| format!("mu{friction}")));
+        let tag = words.join("-");
+        if variants.iter().any(|variant| variant.tag == tag) {
+            let flag = match (grippers.len(), forces.len()) {
+                (2.., _) => "--gripper",
+                (_, 2..) => "--force",
+                _ => "--pad-friction",
+            };
+            let remedy =
+                "give each gripper, force and friction once, files under names of their own";
+            return Err(Error::input(flag, format!("'{tag}' is given twice"), remedy));
+        }
+        variants.push(Variant { gripper: gripper.cloned(), force, pad_friction, tag });
+    }
+    Ok(variants)
+}
+
+/// Plans each variant, prints their best grips in one table, and writes the files of each under a
+/// name of its own: `grips.robotiq-2f85.json` for `grips.json`.
+pub(super) fn run(request: &Request, variants: &[Variant]) -> anyhow::Result<ExitCode> {
     if request.output.json {
         return Err(Error::input(
             "--json",
-            "prints one result, and several grippers are given",
-            "give one gripper, or -o FILE for a file of each",
+            "prints one result, and several plans are asked for",
+            "give one gripper, force and friction, or -o FILE for a file of each",
         )
         .into());
     }
     let interrupt = Interrupt::watched()?;
-    let mut outcomes: Vec<(Plan, Outcome)> = Vec::new();
-    for (gripper, tag) in grippers.iter().zip(&tags) {
+    let mut outcomes: Vec<Compared> = Vec::new();
+    for variant in variants {
         let mut request = request.clone();
-        request.gripper.clone_from(gripper);
+        if let Some(gripper) = &variant.gripper {
+            request.gripper.clone_from(gripper);
+        }
+        request.force = variant.force.or(request.force);
+        let scoring = &mut request.scoring;
+        scoring.pad_friction = variant.pad_friction.or(scoring.pad_friction);
         for path in [&mut request.output.output, &mut request.output.report].into_iter().flatten() {
-            *path = tagged(path, tag);
+            *path = tagged(path, &variant.tag);
         }
         let mut watch = Watch::new(request.output.quiet);
         let plan = Plan::builder(request.clone()).command(std::env::args().collect()).build()?;
@@ -41,30 +98,48 @@ pub(super) fn run(request: &Request, grippers: &[String]) -> anyhow::Result<Exit
         }
         let outcome = plan.run(&mut watch, &interrupt.stop);
         watch.end();
-        outcomes.push((plan, outcome?));
+        let several =
+            |one: fn(&Variant) -> String| variants.iter().any(|other| one(other) != one(variant));
+        let mut name = plan.gripper().name.clone();
+        if several(|variant| format!("{:?}", variant.force)) {
+            name += &format!(", {} N", variant.force.unwrap_or_default().0);
+        }
+        if several(|variant| format!("{:?}", variant.pad_friction)) {
+            name += &format!(", pads {}", variant.pad_friction.unwrap_or_default());
+        }
+        outcomes.push(Compared { name, plan, outcome: outcome? });
         if interrupt.code().is_some() {
             break;
         }
     }
     print(&outcomes)?;
-    outcomes.iter().for_each(|(plan, outcome)| notes(plan, outcome));
+    outcomes.iter().for_each(|compared| notes(&compared.plan, &compared.outcome));
     Ok(match interrupt.code() {
         Some(code) => ExitCode::from(code),
-        None if outcomes.iter().any(|(_, outcome)| outcome.set.any_holds()) => ExitCode::SUCCESS,
+        None if outcomes.iter().any(|compared| compared.outcome.set.any_holds()) => {
+            ExitCode::SUCCESS
+        }
         None => ExitCode::from(1),
     })
 }
 
-fn print(outcomes: &[(Plan, Outcome)]) -> anyhow::Result<()> {
+/// A plan that was run.
+struct Compared {
+    name: String,
+    plan: Plan,
+    outcome: Outcome,
+}
+
+fn print(outcomes: &[Compared]) -> anyhow::Result<()> {
     let (mut out, width) = (terminal::output(), width());
-    for (plan, outcome) in outcomes {
-        writeln!(out, "{}: {}", plan.gripper().name, table::verdict(&outcome.set))?;
+    for Compared { name, outcome, .. } in outcomes {
+        writeln!(out, "{name}: {}", table::verdict(&outcome.set))?;
     }
-    let found = |(_, outcome): &&(Plan, Outcome)| !outcome.set.grips.is_empty();
+    let found = |compared: &&Compared| !compared.outcome.set.grips.is_empty();
     let (mut columns, mut rows) = (Vec::new(), Vec::new());
-    for (plan, outcome) in outcomes.iter().filter(found) {
-        columns = columns_of(plan, outcome);
-        rows.push(layout::row(&columns, &outcome.set.grips[0]));
+    for compared in outcomes.iter().filter(found) {
+        columns = columns_of(compared);
+        rows.push(layout::row(&columns, &compared.outcome.set.grips[0]));
     }
     if rows.is_empty() {
         return Ok(());
@@ -81,10 +156,11 @@ fn print(outcomes: &[(Plan, Outcome)]) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn columns_of<'a>(plan: &'a Plan, outcome: &'a Outcome) -> Vec<Column<'a>> {
+fn columns_of(compared: &Compared) -> Vec<Column<'_>> {
+    let Compared { name, plan, outcome } = compared;
     let (set, gripper) = (&outcome.set, plan.gripper());
     let mut columns = vec![
-        words("gripper", 0, |_: &RankedGrip| gripper.name.clone()),
+        words("gripper", 0, |_: &RankedGrip| name.clone()),
         words("verdict", 0, |grip| set.verdict(grip).name().to_owned()),
         number("id", 0, |grip| grip.grip.id.to_string()),
     ];
@@ -93,26 +169,7 @@ fn columns_of<'a>(plan: &'a Plan, outcome: &'a Outcome) -> Vec<Column<'a>> {
     columns
 }
 
-/// A short name of each gripper, for files.
-fn tags(grippers: &[String]) -> anyhow::Result<Vec<String>> {
-    let mut tags: Vec<String> = Vec::with_capacity(grippers.len());
-    for gripper in grippers {
-        let name = Path::new(gripper).file_name().unwrap_or_default().to_string_lossy();
-        let tag = name.strip_suffix(".toml").unwrap_or(&name).to_owned();
-        if tags.contains(&tag) {
-            return Err(Error::input(
-                "--gripper",
-                format!("'{tag}' is given twice"),
-                "give each gripper once, files under names of their own",
-            )
-            .into());
-        }
-        tags.push(tag);
-    }
-    Ok(tags)
-}
-
-/// A file's name with the gripper's before its ending.
+/// A file's name with this before its ending.
 fn tagged(path: &Path, tag: &str) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     path.with_file_name(match name.split_once('.') {

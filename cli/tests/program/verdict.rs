@@ -311,8 +311,24 @@ fn grippers_are_compared_and_flags_given_twice_are_refused() {
         };
         assert_eq!(scores(&alone), scores(&set));
     }
+    // Forces and pads: the force needed is the same, what holds is not.
+    let pads = "-g robotiq-2f85 --force 30N --force 60N --pad-friction 0.3 --pad-friction 0.6";
+    let output = gripfast(at, &format!("{base} {pads} -o pads.json"));
+    let out = text(&output.stdout);
+    let four = ["30 N, pads 0.3", "30 N, pads 0.6", "60 N, pads 0.3", "60 N, pads 0.6"];
+    let rows =
+        out.lines().filter(|line| line.starts_with("Robotiq 2F-85,") && !line.contains(": "));
+    assert!(rows.zip(four).all(|(row, name)| row.contains(name)), "{out}");
+    for (force, friction) in [(30, 0.3), (30, 0.6), (60, 0.3), (60, 0.6)] {
+        let set = at.join(format!("pads.{force}N-mu{friction}.json"));
+        let set = GripSet::read(&set).unwrap();
+        let one = format!("-g robotiq-2f85 --force {force}N --pad-friction {friction}");
+        gripfast(at, &format!("{base} {one} -o alone.json"));
+        assert_eq!(set.grips, GripSet::read(&at.join("alone.json")).unwrap().grips);
+    }
     for (line, word) in [
-        (format!("{base} {two} --force 40N --force 30N"), "multiple times"),
+        (format!("{base} {two} --force 40N --force 40N"), "given twice"),
+        (format!("{base} {two} --poses x.csv").replacen("plan", "assess", 1), "several times"),
         (format!("{base} {two} --mass 1kg"), "multiple times"),
         (format!("{base} -g generic -g generic"), "given twice"),
         (format!("{base} {two} --json"), "--json"),
