@@ -9,7 +9,6 @@ use comfy_table::{CellAlignment, Table, presets};
 use gripfast::export::{Convention, Format, Origin};
 use gripfast::plan::{Assessed, Plan};
 use gripfast::poses;
-use gripfast::propose::Misfit;
 use gripfast::results::GripSet;
 use gripfast::units::Quantity;
 use serde_json::json;
@@ -76,7 +75,7 @@ pub(crate) fn run(args: AssessArgs) -> anyhow::Result<ExitCode> {
     if as_json {
         let mut out = std::io::stdout().lock();
         let rows: Vec<_> =
-            assessment.poses.iter().map(|pose| row_json(pose, &assessment.set)).collect();
+            assessment.poses.iter().map(|pose| pose.to_json(&assessment.set)).collect();
         serde_json::to_writer(
             &mut out,
             &json!({"poses": rows, "grips": assessment.set.grips.len()}),
@@ -92,42 +91,6 @@ pub(crate) fn run(args: AssessArgs) -> anyhow::Result<ExitCode> {
         }
     }
     Ok(if assessment.set.any_holds() { ExitCode::SUCCESS } else { ExitCode::from(1) })
-}
-
-/// What a pose is, in a few words.
-fn verdict(pose: &Assessed, set: &GripSet) -> String {
-    match (&pose.fit, &pose.explanation, &pose.ranked) {
-        (Err(Misfit::Tilted(Some(angle))), ..) => {
-            format!("no faces: the nearest pair is {:.1} deg off", angle.to_degrees())
-        }
-        (Err(Misfit::Beside), ..) => "no faces between the opened pads".into(),
-        (Err(_), ..) => "no pair of faces within the stroke".into(),
-        (_, Some(explanation), _) if explanation.rejection.is_some() => {
-            format!("not free: {}", pose.rejection().unwrap_or_default().replace('_', " "))
-        }
-        _ if pose.over.is_some() => pose.rejection().unwrap_or_default().replace('_', " "),
-        (.., Some(ranked)) if ranked.worst.status.holds() => match set.verdict(ranked).holds() {
-            Some(false) => "slips".into(),
-            Some(true) => "holds".into(),
-            None => "free".into(),
-        },
-        (.., Some(ranked)) => format!("{:?}", ranked.worst.status).to_lowercase(),
-        _ => "no contact".into(),
-    }
-}
-
-fn row_json(pose: &Assessed, set: &GripSet) -> serde_json::Value {
-    let checks = pose.explanation.as_ref().map(|explanation| {
-        let failed = explanation.checks.iter().filter(|check| !check.passed);
-        failed.map(|check| format!("{}: {}", check.name, check.detail)).collect::<Vec<_>>()
-    });
-    let (turned, shifted) =
-        pose.fit.map_or((None, None), |fit| (Some(fit.turned), Some(fit.shifted)));
-    json!({
-        "name": pose.name, "verdict": verdict(pose, set), "free": pose.is_free(),
-        "faces": pose.explanation.as_ref().map(|explanation| [explanation.face_i, explanation.face_ii]),
-        "failed": checks, "turned_rad": turned, "shifted_m": shifted, "grip": pose.ranked,
-    })
 }
 
 fn print(out: &mut impl Write, poses: &[Assessed], set: &GripSet) -> anyhow::Result<()> {
@@ -160,7 +123,7 @@ fn print(out: &mut impl Write, poses: &[Assessed], set: &GripSet) -> anyhow::Res
         let explanation = pose.explanation.as_ref();
         table.add_row([
             pose.name.clone(),
-            verdict(pose, set),
+            pose.verdict(set),
             number(mu_s, 5),
             number(ranked.and_then(|ranked| ranked.safety), 2),
             explanation.map_or("-".to_owned(), |one| format!("{} | {}", one.face_i, one.face_ii)),
@@ -183,7 +146,7 @@ fn print(out: &mut impl Write, poses: &[Assessed], set: &GripSet) -> anyhow::Res
     let mut counts: std::collections::BTreeMap<String, usize> = Default::default();
     for pose in poses {
         // Without the numbers.
-        let word = verdict(pose, set);
+        let word = pose.verdict(set);
         let word = word.split(": the nearest").next().unwrap_or_default().to_owned();
         *counts.entry(word).or_default() += 1;
     }

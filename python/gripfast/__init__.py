@@ -22,7 +22,19 @@ if _sys.platform == "linux" and "XDG_RUNTIME_DIR" not in _os.environ:
     _os.environ.setdefault("NODEVICE_SELECT", "1")
 
 from ._batch import Batch, Job, Report, Store, run_job
-from ._core import Gripper, Loads, Page, Part, Request, Result, plan, read, score
+from ._core import (
+    Assessment,
+    Gripper,
+    Loads,
+    Page,
+    Part,
+    Request,
+    Result,
+    assess,
+    plan,
+    read,
+    score,
+)
 from ._errors import (
     BusyError,
     CancelledError,
@@ -41,6 +53,7 @@ from ._errors import (
 from ._gripfast import __version__
 
 __all__ = [
+    "Assessment",
     "Batch",
     "BusyError",
     "CancelledError",
@@ -65,6 +78,7 @@ __all__ = [
     "Store",
     "UnsupportedError",
     "__version__",
+    "assess",
     "plan",
     "read",
     "run_job",

@@ -566,6 +566,17 @@ class Result:
         found["worst"] = self[index]["worst"]
         return found
 
+    def assess(self, poses: npt.ArrayLike | Path, **axes: Any) -> Assessment:
+        """Poses from outside on the same part, with the gripper, loads and options of this result;
+        see :func:`assess`."""
+        wrenches = [case["wrench"] for case in self.loads]
+        loads = Loads(
+            forces=np.array([wrench["force"] for wrench in wrenches]),
+            moments=np.array([wrench["moment"] for wrench in wrenches]),
+            names=[case["name"] for case in self.loads],
+        )
+        return assess(self.part, self.gripper, poses, loads, request=self.request, **axes)
+
     def pick(
         self, scene: Path | str, world_from_part: npt.ArrayLike | None = None
     ) -> tuple[int | None, list[str]]:
@@ -681,39 +692,124 @@ def plan(
     >>> len(found.shown)
     3
     """
-    wanted = Request._of(request._json) if request is not None else Request()
-    the_part = the_gripper = None
-    if isinstance(part, Part):
-        the_part = part
-        wanted.update(part=part.file)
-    elif isinstance(part, (str, os.PathLike)):
-        wanted.update(part=part)
-    elif part is not None:
-        the_part = Part(part)
-    if isinstance(gripper, Gripper):
-        the_gripper = gripper
-        wanted.update(gripper=gripper.source)
-    elif gripper is not None:
-        wanted.update(gripper=gripper)
-    wrenches = None
-    if loads is not None and not isinstance(loads, Loads):
-        loads = Loads(loads)
-    if loads is not None and loads.sources is not None:
-        wanted.update(loads=loads.sources)
-        if loads.accel is not None:
-            wanted.update(accel=loads.accel)
-    elif loads is not None and loads.wrenches is not None:
-        wrenches = (loads.names, loads.wrenches)
-    wanted.update(**options)
+    job = _Job(part, gripper, loads, request, options)
     with _Listener(progress, notes) as listener:
-        native, planned = _gripfast.plan(
-            wanted._json,
-            None if the_part is None else the_part._native,
-            None if the_gripper is None else the_gripper._native,
-            wrenches,
-            listener,
+        native, planned = _gripfast.plan(job.request._json, *job.natives(), listener)
+    return Result(native, job.part or Part._of(planned))
+
+
+class Assessment(Sequence[dict[str, Any]]):
+    """What became of poses, in their order: for each ``name``, ``verdict`` in words, ``free``,
+    ``faces``, ``failed`` (the tests that it fails), ``turned_rad`` and ``shifted_m`` (what closing
+    jaws right), ``grip`` (its numbers, None where the pads touch nothing). ``result`` holds those
+    that are grips, ranked; their ids are the places in the list."""
+
+    def __init__(self, rows: list[dict[str, Any]], result: Result) -> None:
+        self.rows, self.result = rows, result
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self.rows[index]
+
+    @property
+    def verdicts(self) -> list[str]:
+        """Of each pose."""
+        return [row["verdict"] for row in self.rows]
+
+    @property
+    def mu_s(self) -> Floats:
+        """Of each pose; nan where it is no grip or no friction holds it."""
+        grips = [row["grip"] if row["free"] else None for row in self.rows]
+        found = [grip and grip["worst"]["mu_s"] for grip in grips]
+        return np.array([np.nan if mu is None else mu for mu in found], dtype=np.float64)
+
+    def __repr__(self) -> str:
+        return f"Assessment({len(self)} poses, {len(self.result)} are grips)"
+
+
+def assess(
+    part: Part | Path | Any,
+    gripper: Gripper | Path | None,
+    poses: npt.ArrayLike | Path,
+    loads: Loads | str | Sequence[str] | None = None,
+    *,
+    format: str | None = None,
+    convention: str | None = None,
+    origin: str | None = None,
+    tilt: str = "3deg",
+    request: Request | None = None,
+    notes: Callable[[str, str], None] | None = None,
+    **options: Any,
+) -> Assessment:
+    """Tests and scores poses from outside as the grips of a plan are.
+
+    ``poses`` are (n, 4, 4) in the part frame, as :attr:`Result.poses` has them, or tool frames where
+    ``convention`` and ``origin`` are named as in :meth:`Result.tool_poses`; or a file that
+    ``gripfast assess`` reads, of this ``format`` or that of its ending. They may be off the faces'
+    normal by ``tilt``. Everything else is as in :func:`plan`.
+
+    >>> import gripfast
+    >>> nut = gripfast.Part("data/parts/hex_nut.stl")
+    >>> job = dict(density="7850kg/m3", spacing="6mm")
+    >>> found = gripfast.plan(nut, "generic", **job)
+    >>> again = gripfast.assess(nut, "generic", found.poses, **job)
+    >>> len(again) == len(found) and all(row["free"] for row in again)
+    True
+    """
+    if not isinstance(poses, (str, os.PathLike)):
+        poses = np.ascontiguousarray(poses, dtype=np.float64)
+    job = _Job(part, gripper, loads, request, options)
+    with _Listener(None, notes) as listener:
+        rows, native, planned = _gripfast.assess(
+            job.request._json, poses, (format, convention, origin), tilt, *job.natives(), listener
         )
-    return Result(native, the_part or Part._of(planned))
+    return Assessment([_object(row) for row in rows], Result(native, job.part or Part._of(planned)))
+
+
+class _Job:
+    """What a run is about, as the extension module takes it."""
+
+    def __init__(
+        self,
+        part: Part | Path | Any,
+        gripper: Gripper | Path | None,
+        loads: Loads | str | Sequence[str] | None,
+        request: Request | None,
+        options: Mapping[str, Any],
+    ) -> None:
+        wanted = Request._of(request._json) if request is not None else Request()
+        self.request = wanted
+        self.part: Part | None = None
+        self.gripper: Gripper | None = None
+        self.wrenches: tuple[list[str], Floats] | None = None
+        if isinstance(part, Part):
+            self.part = part
+            wanted.update(part=part.file)
+        elif isinstance(part, (str, os.PathLike)):
+            wanted.update(part=part)
+        elif part is not None:
+            self.part = Part(part)
+        if isinstance(gripper, Gripper):
+            self.gripper = gripper
+            wanted.update(gripper=gripper.source)
+        elif gripper is not None:
+            wanted.update(gripper=gripper)
+        if loads is not None and not isinstance(loads, Loads):
+            loads = Loads(loads)
+        if loads is not None and loads.sources is not None:
+            wanted.update(loads=loads.sources)
+            if loads.accel is not None:
+                wanted.update(accel=loads.accel)
+        elif loads is not None and loads.wrenches is not None:
+            self.wrenches = (loads.names, loads.wrenches)
+        wanted.update(**options)
+
+    def natives(self) -> tuple[Any, Any, Any]:
+        part = None if self.part is None else self.part._native
+        gripper = None if self.gripper is None else self.gripper._native
+        return part, gripper, self.wrenches
 
 
 def read(path: Path, part: Part | Path | None = None) -> Result:

@@ -136,6 +136,16 @@ def plan(
     loads: tuple[list[str], npt.NDArray[np.float64]] | None = None,
     listener: _Listener = None,
 ) -> tuple[Result, Part]: ...
+def assess(
+    request: str,
+    poses: npt.NDArray[np.float64] | _Path,
+    axes: tuple[str | None, str | None, str | None],
+    tilt: str,
+    part: Part | None = None,
+    gripper: Gripper | None = None,
+    loads: tuple[list[str], npt.NDArray[np.float64]] | None = None,
+    listener: _Listener = None,
+) -> tuple[list[str], Result, Part]: ...
 def request_default() -> str: ...
 def request_check(text: str) -> str: ...
 def request_set(text: str, field: str, value: str) -> str: ...

@@ -24,6 +24,7 @@ fn _gripfast(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<batch::Store>()?;
     for function in [
         wrap_pyfunction!(plans::plan, module)?,
+        wrap_pyfunction!(plans::assess, module)?,
         wrap_pyfunction!(requests::request_default, module)?,
         wrap_pyfunction!(requests::request_check, module)?,
         wrap_pyfunction!(requests::request_set, module)?,

@@ -12,6 +12,7 @@ use gripfast::plan::Outcome;
 use gripfast::rank;
 use gripfast::results::{GripSet, RankedGrip};
 use gripfast::scene::Scene;
+use numpy::ndarray::ArrayView2;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
@@ -36,6 +37,12 @@ impl Result {
         Self { set, shown, checkpoint, written }
     }
 
+    /// A set that no run has written.
+    pub(crate) fn of_set(set: GripSet) -> Self {
+        let shown = set.grips.iter().map(|ranked| ranked.grip.id).collect();
+        Self { set, shown, checkpoint: None, written: Vec::new() }
+    }
+
     fn grip(&self, index: usize) -> PyResult<&RankedGrip> {
         self.set.grips.get(index).ok_or_else(|| {
             PyIndexError::new_err(format!("grip {index} of {}", self.set.grips.len()))
@@ -48,9 +55,7 @@ impl Result {
     /// Reads a native result file.
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let set = py.detach(|| GripSet::read(&path)).or_raise()?;
-        let shown = set.grips.iter().map(|ranked| ranked.grip.id).collect();
-        Ok(Self { set, shown, checkpoint: None, written: Vec::new() })
+        Ok(Self::of_set(py.detach(|| GripSet::read(&path)).or_raise()?))
     }
 
     fn __len__(&self) -> usize {
@@ -295,7 +300,7 @@ impl Result {
         folder: PathBuf,
         world_from_part: Option<PyReadonlyArray2<'_, f64>>,
     ) -> PyResult<(Option<usize>, Vec<String>)> {
-        let pose = world_from_part.map(|matrix| frame(&matrix)).transpose()?;
+        let pose = world_from_part.map(|matrix| frame(matrix.as_array())).transpose()?;
         py.detach(|| {
             let scene = Scene::parse("scene", scene, Path::new(&folder))?;
             let picker = Picker::new(&self.set, &scene)?;
@@ -307,10 +312,9 @@ impl Result {
     }
 }
 
-/// A 4 x 4 matrix as a frame.
-fn frame(matrix: &PyReadonlyArray2<'_, f64>) -> PyResult<gripfast::model::Frame> {
+/// A pose given as a 4 x 4 matrix.
+pub(crate) fn frame(rows: ArrayView2<'_, f64>) -> PyResult<gripfast::model::Frame> {
     use gripfast::glam::{DMat3, DVec3};
-    let rows = matrix.as_array();
     if rows.dim() != (4, 4) {
         let problem = format!("is {:?}", rows.shape());
         return Err(Error::input("pose", problem, "give a 4 x 4 matrix")).or_raise();

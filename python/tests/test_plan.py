@@ -353,3 +353,33 @@ def test_a_gripper_is_data():
     assert again.to_dict() == gripper.to_dict()
     text = (ROOT / "data/grippers/franka-hand.toml").read_text()
     assert gripfast.Gripper.from_toml(text).to_dict() == gripper.to_dict()
+
+
+def test_poses_from_outside_are_scored_as_the_program_does(bracket, program, tmp_path):
+    again = bracket.assess(bracket.poses)
+    assert len(again) == len(bracket) == len(again.result)
+    assert all(row["free"] for row in again) and again.verdicts[0] == "holds"
+    assert np.allclose(again.mu_s, bracket.mu_s, rtol=1e-9, atol=0)
+    # As tool frames, and as a file.
+    tools = bracket.assess(
+        bracket.tool_poses("moveit", "flange"), convention="moveit", origin="flange"
+    )
+    assert np.allclose(tools.mu_s, bracket.mu_s, rtol=1e-6, atol=0)
+    path = tmp_path / "poses.csv"
+    bracket.export(path)
+    base = {k: v for k, v in COARSE.items() if k in ("mass", "accel", "density")}
+    filed = gripfast.assess(str(ROOT / BRACKET), "robotiq-2f85", path, **base)
+    done = program(
+        "assess", BRACKET, "--poses", str(path), "-g", "robotiq-2f85", "--json", *flags(base)
+    )
+    assert filed.rows == json.loads(done.stdout)["poses"] and len(filed) == len(bracket)
+    # Turned by more than jaws right, and away from the part.
+    wrong = bracket.poses[:2].copy()
+    turn = np.array([[1, 0, 0], [0, np.cos(0.3), -np.sin(0.3)], [0, np.sin(0.3), np.cos(0.3)]])
+    wrong[0, :3, :3] = wrong[0, :3, :3] @ turn
+    wrong[1, :3, 3] += 0.5
+    found = bracket.assess(wrong)
+    assert len(found.result) == 0 and not any(row["free"] for row in found)
+    assert found.verdicts[0].startswith("no faces") and np.isnan(found.mu_s).all()
+    with pytest.raises(gripfast.OptionError, match="rotation"):
+        bracket.assess(np.ones((1, 4, 4)))

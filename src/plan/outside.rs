@@ -50,6 +50,47 @@ impl Assessed {
         explanation.rejection.as_ref().map(|rejection| rejection.name()).or(self.over.clone())
     }
 
+    /// What it is, in a few words; `set` is that of its [`Assessment`].
+    pub fn verdict(&self, set: &GripSet) -> String {
+        match (&self.fit, &self.explanation, &self.ranked) {
+            (Err(Misfit::Tilted(Some(angle))), ..) => {
+                format!("no faces: the nearest pair is {:.1} deg off", angle.to_degrees())
+            }
+            (Err(Misfit::Beside), ..) => "no faces between the opened pads".into(),
+            (Err(_), ..) => "no pair of faces within the stroke".into(),
+            (_, Some(explanation), _) if explanation.rejection.is_some() => {
+                format!("not free: {}", self.rejection().unwrap_or_default().replace('_', " "))
+            }
+            _ if self.over.is_some() => self.rejection().unwrap_or_default().replace('_', " "),
+            (.., Some(ranked)) if ranked.worst.status.holds() => {
+                match set.verdict(ranked).holds() {
+                    Some(false) => "slips".into(),
+                    Some(true) => "holds".into(),
+                    None => "free".into(),
+                }
+            }
+            (.., Some(ranked)) => format!("{:?}", ranked.worst.status).to_lowercase(),
+            _ => "no contact".into(),
+        }
+    }
+
+    /// All of it as `gripfast assess --json` prints it: `name`, `verdict`, `free`, `faces` (two
+    /// numbers), `failed` (tests, as text), `turned_rad`, `shifted_m`, `grip`.
+    pub fn to_json(&self, set: &GripSet) -> serde_json::Value {
+        let checks = self.explanation.as_ref().map(|explanation| {
+            let failed = explanation.checks.iter().filter(|check| !check.passed);
+            failed.map(|check| format!("{}: {}", check.name, check.detail)).collect::<Vec<_>>()
+        });
+        let faces = self.explanation.as_ref().map(|found| [found.face_i, found.face_ii]);
+        let (turned, shifted) =
+            self.fit.map_or((None, None), |fit| (Some(fit.turned), Some(fit.shifted)));
+        serde_json::json!({
+            "name": self.name, "verdict": self.verdict(set), "free": self.is_free(),
+            "faces": faces, "failed": checks, "turned_rad": turned, "shifted_m": shifted,
+            "grip": self.ranked,
+        })
+    }
+
     /// Whether it is free and a limit state exists for its worst load.
     pub fn is_grip(&self) -> bool {
         self.is_free() && self.ranked.as_ref().is_some_and(|ranked| ranked.worst.status.holds())
