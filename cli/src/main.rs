@@ -106,7 +106,7 @@ fn parse(line: Vec<std::ffi::OsString>) -> Cli {
 }
 
 /// An error of the command line with advice that helps: a value that begins with a dash is joined to
-/// its flag, and a file is no subcommand.
+/// its flag, a file is no subcommand, and a gripper or a scene comes from somewhere.
 fn plain(mut error: clap::Error) -> clap::Error {
     use clap::error::{ContextKind, ContextValue, ErrorKind};
     let text = |error: &clap::Error, kind| match error.get(kind) {
@@ -132,6 +132,21 @@ fn plain(mut error: clap::Error) -> clap::Error {
             error.remove(ContextKind::SuggestedSubcommand);
             "say what to do with this file, e.g. gripfast plan PART --gripper generic --mass 350g, \
              or gripfast part PART"
+        }
+        ErrorKind::MissingRequiredArgument => {
+            let missing = match error.get(ContextKind::InvalidArg) {
+                Some(ContextValue::Strings(missing)) => missing.as_slice(),
+                _ => &[],
+            };
+            let lacks = |flag: &str| missing.iter().any(|text| text.starts_with(flag));
+            if lacks("--gripper") {
+                "gripfast gripper list names the grippers that come with it, e.g. --gripper generic; \
+                 gripfast gripper new FILE describes your own"
+            } else if lacks("--scene") {
+                "a scene file says where the part lies and what stands around it: see docs/formats.md"
+            } else {
+                return error;
+            }
         }
         _ => return error,
     };

@@ -126,6 +126,39 @@ pub(super) fn surfaces(columns: &mut Columns, grips: &[RankedGrip]) {
     columns.add("surface_points", "f32", &rings.points);
 }
 
+/// What each face carries under the worst load where it is not plane: pressed area [m^2] and the
+/// sides of the box around it \[m\], NaN for other grips; and the notes of each grip by their places
+/// in the list that is the answer.
+pub(super) fn faces(columns: &mut Columns, grips: &[RankedGrip]) -> Vec<String> {
+    let known = |ranked: &RankedGrip| ranked.faces;
+    let area = |ranked| known(ranked).map_or([f64::NAN; 2], |faces| faces.map(|face| face.area));
+    columns.f32("face_area", grips.iter().flat_map(area));
+    let size = |ranked| {
+        let [one, two] = known(ranked)?.map(|face| {
+            let [low, high] = face.extent;
+            [high[0] - low[0], high[1] - low[1]]
+        });
+        Some([one[0], one[1], two[0], two[1]])
+    };
+    columns.f32("face_size", grips.iter().flat_map(|ranked| size(ranked).unwrap_or([f64::NAN; 4])));
+    let mut texts: Vec<String> = Vec::new();
+    let mut numbers: FxHashMap<String, u32> = FxHashMap::default();
+    let (mut rows, mut notes) = (vec![0_u32], Vec::new());
+    for ranked in grips {
+        notes.extend(ranked.notes.iter().map(|note| {
+            let text = note.to_string();
+            *numbers.entry(text.clone()).or_insert_with(|| {
+                texts.push(text);
+                texts.len() as u32 - 1
+            })
+        }));
+        rows.push(notes.len() as u32);
+    }
+    columns.u32("note_rows", rows);
+    columns.u32("note", notes);
+    texts
+}
+
 /// The exact content of a surface as something that hashes.
 fn surface_key(surfaces: &Surfaces) -> Vec<u64> {
     let mut key: Vec<u64> = surfaces.stiffness.map(f64::to_bits).to_vec();

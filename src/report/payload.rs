@@ -32,6 +32,10 @@ pub(super) const MAX_GRIPS: usize = 100_000;
 /// Values in the table of `mu_s` by load; grips beyond it keep their worst load only.
 pub(super) const MAX_LOAD_VALUES: usize = 8_000_000;
 
+/// Steps over the stroke in which the page knows the pads' way: a straight line over one leaves an
+/// arc of 50 mm by hundredths of a millimetre.
+const TRAVEL_STEPS: u32 = 32;
+
 /// Header and data, ready to stand between `script` tags.
 pub(super) struct Payload {
     /// JSON without any `<`.
@@ -112,6 +116,7 @@ impl Payload {
         columns.add("verdict", "u8", &grips.iter().map(verdict).collect::<Vec<u8>>());
         areas::contacts(&mut columns, grips);
         areas::surfaces(&mut columns, grips);
+        let notes = areas::faces(&mut columns, grips);
         let by_load = loads(&mut columns, set, grips);
         let reasons = rejected(&mut columns, misses);
         let obstacles = obstacles::obstacles(&mut columns, set);
@@ -138,7 +143,7 @@ impl Payload {
             "format": "gripfast-report", "version": 1, "provenance": provenance(set), "part": set.part, "display": display,
             "gripper": gripper, "gripper_problem": gripper_problem, "loads": set.loads, "summary": set.summary,
             "grips": { "total": set.grips.len(), "shown": grips.len() }, "statuses": statuses, "by_load": by_load,
-            "asked": asked(set), "reasons": reasons, "obstacles": obstacles, "catalogue": known_grippers(), "sections": columns.sections,
+            "asked": asked(set), "reasons": reasons, "notes": notes, "obstacles": obstacles, "catalogue": known_grippers(), "sections": columns.sections,
         });
         Ok(Self { header: script_safe(&header)?, data: packed(&columns.bytes)? })
     }
@@ -384,6 +389,15 @@ pub(super) fn matrix(frame: &Frame) -> Vec<f64> {
     [column(r.x_axis, 0.0), column(r.y_axis, 0.0), column(r.z_axis, 0.0), column(o, 1.0)].concat()
 }
 
+/// Places of the palm along `x1` over the stroke, of pads that move along arcs: `[distance of the
+/// pads, place]` at equal steps.
+fn travel(gripper: &Gripper) -> Vec<[f64; 2]> {
+    let [least, most] = gripper.stroke;
+    let gaps =
+        (0..=TRAVEL_STEPS).map(|k| least + f64::from(k) / f64::from(TRAVEL_STEPS) * (most - least));
+    gaps.map(|gap| [gap, gripper.palm_place(gap).origin.x]).collect()
+}
+
 /// The gripper with each body's placement as a column-major 4x4 matrix.
 fn gripper_json(gripper: &Gripper) -> Value {
     let body = |body: &Body| {
@@ -401,7 +415,7 @@ fn gripper_json(gripper: &Gripper) -> Value {
         "payload": gripper.payload, "moment": gripper.moment,
         "pad_friction": gripper.pad_friction, "pad_thickness": gripper.pad_thickness, "outer_pad": gripper.outer_pad,
         "flange": gripper.grip_from_flange.as_ref().map(matrix), "tool": gripper.grip_from_tool.as_ref().map(matrix),
-        "pad_ii": gripper.pad_ii, "moving": gripper.moving,
+        "pad_ii": gripper.pad_ii, "moving": gripper.moving, "travel": travel(gripper),
         "fingers_ii": gripper.fingers_ii.as_ref().map(|bodies| bodies.iter().map(body).collect::<Vec<_>>()),
         "fingers": gripper.fingers.iter().map(body).collect::<Vec<_>>(), "palm": gripper.palm.iter().map(body).collect::<Vec<_>>(),
     })

@@ -16,7 +16,7 @@ function ramp(stops, t) {
 export const friction = (t) => ramp(FRICTION, t);
 export const pressure = (t) => ramp(PRESSURE, t);
 /** Colours of reasons, told apart by the colour-blind too (Okabe and Ito 2008); what is left is grey. */
-const REASONS = ['#d55e00', '#0072b2', '#e69f00', '#009e73', '#cc79a7', '#56b4e9', '#b8a500'];
+export const REASONS = ['#d55e00', '#0072b2', '#e69f00', '#009e73', '#cc79a7', '#56b4e9', '#f0e442'];
 
 /** The colour of a reason for which candidates were rejected. */
 export function reasonColour(report, name) {

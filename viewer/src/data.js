@@ -1,5 +1,6 @@
 // The embedded result: a JSON header and one compressed block of binary columns. Nothing is fetched.
 
+import { inMm, number } from './format.js';
 import { PadState } from './pads.js';
 
 const KINDS = { u8: Uint8Array, i8: Int8Array, u16: Uint16Array, u32: Uint32Array, f32: Float32Array, f64: Float64Array, delta: Int32Array };
@@ -201,6 +202,20 @@ export class Report {
     if (k < 0) return null;
     const at = c.state_rows[row] + k;
     return new PadState(this, i, c.state_pressure.subarray(4 * at, 4 * at + 4), c.state_slip.subarray(7 * at, 7 * at + 7));
+  }
+
+  /** What is pressed of a face that is not plane under the worst load, in words; null of others. */
+  pressedArea(i, face) {
+    const area = this.column.face_area[2 * i + face];
+    if (!Number.isFinite(area)) return null;
+    const [along, across] = this.column.face_size.subarray(4 * i + 2 * face, 4 * i + 2 * face + 2);
+    return `${number(area * 1e6)}\u00a0mm\u00b2 in ${inMm(along)} \u00d7 ${inMm(across)}\u00a0mm`;
+  }
+
+  /** What to know beside the numbers of grip `i`. */
+  notes(i) {
+    const { note, note_rows: rows } = this.column;
+    return Array.from(note.subarray(rows[i], rows[i + 1]), (k) => this.header.notes[k]);
   }
 
   /** Incipient motion of grip `i` under its worst load. */

@@ -3,7 +3,7 @@
 import { css, gradient, friction, NO_LIMIT } from './colour.js';
 import { drawContact } from './contact.js';
 import { chosen, count, degrees, mm, newtons, NONE, number, percent, words } from './format.js';
-import { facts } from './run.js';
+import { facts, node } from './run.js';
 
 export const STATUS = {
   ok: ['Slip limit found', 'good', 'A slip limit exists; no other was found.'],
@@ -108,7 +108,9 @@ export class Detail {
         ['Spread to twist out \u0394d', mm(c.delta_d[i])],
         ['Score', number(c.score[i], 4)],
         ['Approach angle', degrees(c.angle[i])],
+        ...['I', 'II'].map((name, face) => [`Pressed on pad ${name}`, this.report.pressedArea(i, face)]),
       ]),
+      ...this.report.notes(i).map((text) => node('p', `Note: ${text}`, { class: 'quiet' })),
     );
   }
 

@@ -98,13 +98,15 @@ export class Jaws {
 
   /**
    * Pads at `opening`, contact areas on the faces at `width` [m], which is negative for a grip from inside. `palm`: where
-   * the palm stands along x1 and x3 in a grip with the pads `gap` apart; a fixed jaw stays there.
+   * the palm stands along x1 and x3 in a grip with the pads `gap` apart; a fixed jaw stays there. `ahead`: how far the
+   * pads of two moving jaws stand along x1 from where they are in the grip.
    */
-  place(opening, width, palm = { x: 0, z: { I: -0.5, II: 0.5 }[this.moving] * opening || 0, gap: opening }) {
+  place(opening, width, palm = { x: 0, z: { I: -0.5, II: 0.5 }[this.moving] * opening || 0, gap: opening }, ahead = 0) {
     const alone = opening - palm.gap / 2;
     this.fingers[0].position.z = { I: alone, II: palm.gap / 2 }[this.moving] ?? opening / 2;
     this.fingers[1].position.z = -({ I: palm.gap / 2, II: alone }[this.moving] ?? opening / 2);
     this.palm.position.set(palm.x, 0, palm.z);
+    if (this.moving === 'both') for (const finger of this.fingers) finger.position.x = ahead;
     if (this.moving !== 'both') {
       // A jaw on a crank alone: the grip's middle lies between the pads.
       const own = this.moving === 'I' ? -palm.x : palm.x;

@@ -2,7 +2,7 @@
 
 import { BufferAttribute, BufferGeometry, Color, Float32BufferAttribute, Group, LineBasicMaterial, LineSegments, Matrix4, MeshStandardMaterial, Points, PointsMaterial, Vector3 } from 'three';
 import { reasonColour } from './colour.js';
-import { gapsOf } from './take.js';
+import { gapsOf, palmAlong } from './take.js';
 import { dotTexture, target } from './signs.js';
 
 const MM = 1000;
@@ -70,7 +70,8 @@ export class Misses {
     const [gap, opened] = gapsOf(report, miss.width, miss.inside);
     const most = gripper?.stroke[1] ?? miss.width;
     const opening = pair ? most : miss.reason.startsWith('approach_blocked') ? opened : gap;
-    jaws.place(opening, miss.inside ? -miss.width : miss.width, pair ? undefined : { x: miss.palm[0], z: miss.palm[1], gap });
+    const palm = pair ? { x: palmAlong(report, opening), z: 0, gap: opening } : { x: miss.palm[0], z: miss.palm[1], gap };
+    jaws.place(opening, miss.inside ? -miss.width : miss.width, palm, palmAlong(report, palm.gap) - palmAlong(report, opening));
     this.target.visible = miss.place !== null;
     if (miss.place) {
       this.target.position.set(...miss.place);

@@ -11,7 +11,7 @@ import { verdict } from './detail.js';
 import { Jaws } from './jaws.js';
 import { Misses } from './misses.js';
 import { approachSign, dotTexture, fixtures, frameSign, LoadSign } from './signs.js';
-import { gaps, palmPlace } from './take.js';
+import { gaps, palmAlong, palmPlace } from './take.js';
 
 const MM = 1000;
 const MOVE_MS = 260;
@@ -302,7 +302,7 @@ export class View {
       root.quaternion.slerpQuaternions(from.q, to.q, t);
       root.position.lerpVectors(from.p, to.p, t);
       this.opening = from.opening + t * (opening - from.opening);
-      this.jaws.place(this.opening, this.inside ? -this.width : this.width, palmPlace(this.report, this.grip));
+      this.placeJaws();
       this.render();
     };
     this.moving = false;
@@ -318,6 +318,13 @@ export class View {
     this.motion = requestAnimationFrame(frame);
   }
 
+  /** Opens the jaws of the grip shown, along their arc; the palm stays where it is in the grip. */
+  placeJaws() {
+    const palm = palmPlace(this.report, this.grip);
+    const ahead = palmAlong(this.report, palm.gap) - palmAlong(this.report, this.opening);
+    this.jaws.place(this.opening, this.inside ? -this.width : this.width, palm, ahead);
+  }
+
   /** The way in and the closing of the jaws, as planned; ends in the grip. */
   play() {
     if (this.grip < 0) return;
@@ -331,7 +338,7 @@ export class View {
       const way = ease(Math.min(t / 0.6, 1)) - 1;
       root.position.set(...origin).addScaledVector(vector(x1), way * away);
       this.opening = free + ease(Math.max((t - 0.65) / 0.35, 0)) * (holding - free);
-      this.jaws.place(this.opening, this.inside ? -this.width : this.width, palmPlace(this.report, this.grip));
+      this.placeJaws();
       this.jaws.contacts.forEach((contact) => (contact.visible = t >= 1));
       this.draw();
     };

@@ -104,6 +104,15 @@ export function palmPlace(report, i) {
   return { x: palm[2 * i], z: palm[2 * i + 1], gap: gaps(report, i)[0] };
 }
 
+/** Where the palm stands along x1 with the pads `gap` apart, seen from the pads [m]. */
+export function palmAlong(report, gap) {
+  const travel = report.header.gripper?.travel ?? [];
+  const k = Math.max(1, travel.findIndex(([at]) => at >= gap));
+  if (travel.length < 2 || !travel[k]) return travel.at(-1)?.[1] ?? 0;
+  const [[from, start], [to, end]] = [travel[k - 1], travel[k]];
+  return start + ((end - start) * (gap - from)) / (to - from || 1);
+}
+
 /** One row per grip: the columns of the program's CSV, as text. */
 export function table(report, indices, frame, origin) {
   const c = report.column;

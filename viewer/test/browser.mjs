@@ -8,7 +8,7 @@ import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { chromium } from 'playwright-core';
-import { friction, pressure } from '../src/colour.js';
+import { friction, pressure, REASONS } from '../src/colour.js';
 
 const [folder, shots] = process.argv.slice(2).map((path) => resolve(path));
 const [small, large, none, slipping, curved] = ['small', 'large', 'none', 'slipping', 'curved'].map((name) => join(folder, `${name}.html`));
@@ -499,6 +499,30 @@ async function gripper(page) {
   const way = Math.max(...seen.map(({ place }) => Math.hypot(...place.map((v, k) => v - before.place[k]))));
   const after = await page.evaluate(() => ({ place: window.gripfast.view.jaws.root.position.toArray(), opening: window.gripfast.view.opening }));
   const asked = await page.evaluate(() => window.gripfast.report.header.asked.opening);
+  // Public models of this gripper: from 5 to 80 mm the flange comes nearer by 11.5 - 5.3 .. 11.6 mm.
+  const arc = await page.evaluate(() => {
+    const { report, view } = window.gripfast;
+    document.querySelector('[data-toggle="open"]').click();
+    const travel = report.header.gripper.travel;
+    const at = (gap) => travel.reduce((best, one) => (Math.abs(one[0] - gap) < Math.abs(best[0] - gap) ? one : best))[1];
+    return { nearer: at(0.08) - at(0.005), travel };
+  });
+  await rest(page);
+  // Far open, as this grip is not: there the arc shows.
+  const open = await page.evaluate(() => {
+    const { view } = window.gripfast;
+    view.opening = 0.08;
+    view.placeJaws();
+    return { finger: view.jaws.fingers[0].position.x, other: view.jaws.fingers[1].position.x, palm: view.jaws.palm.position.x, opening: view.opening };
+  });
+  const along = (gap) => {
+    const k = Math.max(1, arc.travel.findIndex(([g]) => g >= gap));
+    const [[g0, x0], [g1, x1]] = [arc.travel[k - 1], arc.travel[k]];
+    return x0 + ((x1 - x0) * (gap - g0)) / (g1 - g0);
+  };
+  check('opened jaws stand on their arc', Math.abs(open.palm - open.finger - along(open.opening)) < 1e-6 && Math.abs(open.finger) > 0.008 && open.finger === open.other && arc.nearer > 0.009 && arc.nearer < 0.013, `${JSON.stringify(open)} ${arc.nearer}`);
+  await page.click('[data-toggle="open"]');
+  await rest(page);
   check('the approach is played', seen.length > 2 && way > 0.02, `${seen.length} pictures, ${(way * 1e3).toFixed(0)} mm`);
   const widest = Math.max(...seen.map(({ opening }) => opening));
   check('with the jaws opened as planned', asked === null ? widest > before.opening : Math.abs(widest - before.opening - 2 * asked) < 1e-6, `${widest - before.opening}, asked for ${asked} per jaw`);
@@ -628,6 +652,12 @@ function scales() {
     const [x, y, z] = [(0.4124 * r + 0.3576 * g + 0.1805 * b) / 0.9505, 0.2126 * r + 0.7152 * g + 0.0722 * b, (0.0193 * r + 0.1192 * g + 0.9505 * b) / 1.089].map(f);
     return [116 * y - 16, 500 * (x - y), 200 * (y - z)];
   };
+  const seen = (matrix, rgb) => lab(matrix.map((row) => Math.min(1, Math.max(0, row.reduce((sum, m, k) => sum + m * linear(rgb[k] / 255), 0)))));
+  for (const [kind, matrix] of Object.entries(BLINDNESS)) {
+    const colours = REASONS.map((hex) => seen(matrix, [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16))));
+    const least = Math.min(...colours.flatMap((a, i) => colours.slice(i + 1).map((b) => Math.hypot(...a.map((v, k) => v - b[k])))));
+    check(`the colours of reasons are told apart with ${kind}`, least > 8, least.toFixed(1));
+  }
   for (const [name, scale] of [['friction', friction], ['pressure', pressure]]) {
     for (const [kind, matrix] of Object.entries(BLINDNESS)) {
       const seen = Array.from({ length: 13 }, (_, k) => scale(k / 12).map((v) => linear(v / 255))).map((rgb) => lab(matrix.map((row) => Math.min(1, Math.max(0, row.reduce((sum, m, k) => sum + m * rgb[k], 0))))));
@@ -659,6 +689,17 @@ async function linkAndTheme() {
   check('dark follows the system, the switch overrides it', dark !== (await ground()) && dark === 'rgb(13, 17, 21)', dark);
   await page.locator('#theme input[value="auto"]').check({ force: true });
   check('no trouble in the dark', page.trouble.length === 0, page.trouble.join('; '));
+  await page.close();
+}
+
+async function tablet() {
+  const page = await open(small, { width: 820, height: 1180, scheme: 'dark' });
+  for (const tab of ['list', 'grip', 'run']) {
+    await page.click(`#tab-${tab}`);
+    check(`the ${tab} panel fits a tablet`, (await page.evaluate(() => document.documentElement.scrollWidth - window.innerWidth)) <= 0);
+    await legible(page, `on a tablet, ${tab}`);
+  }
+  check('no trouble on a tablet', page.trouble.length === 0, page.trouble.join('; '));
   await page.close();
 }
 
@@ -788,6 +829,23 @@ async function barrel() {
     const mesh = view.jaws.contacts.map((group) => group.children[0]?.geometry.attributes.position.count ?? 0);
     return { carried, expected: [report.planned.force + along / 2, report.planned.force - along / 2], mesh, pieces: pad.pieces?.length, grip, largest: pad.largest(0), detail: detail.grip };
   });
+  const areas = await page.evaluate(() => {
+    const { report, state } = window.gripfast;
+    const pad = report.state(state.chosen);
+    return [0, 1].map((face) => {
+      const counted = pad.of(face).reduce((sum, piece) => {
+        const xs = piece.rings[0].points.map((p) => p[0]);
+        const ys = piece.rings[0].points.map((p) => p[1]);
+        const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+        let n = 0;
+        for (let i = 0; i < 400; i++) for (let j = 0; j < 400; j++) n += pad.on(piece, left + ((i + 0.5) * (right - left)) / 400, low + ((j + 0.5) * (high - low)) / 400) > 0 ? 1 : 0;
+        return sum + (n * (right - left) * (high - low)) / 160000;
+      }, 0);
+      return [counted, report.column.face_area[2 * state.chosen + face]];
+    });
+  });
+  check('the pressed area is the one that the program tells', areas.every(([a, b]) => Math.abs(a / b - 1) < 0.01), JSON.stringify(areas));
+  check('it stands among the numbers', /Pressed on pad I\n[\d.]+\u00a0mm\u00b2 in [\d.]+ \u00d7 [\d.]+\u00a0mm/.test(await page.innerText('.more')), await page.innerText('.more'));
   check('the pressure on a barrel carries the squeeze', found.pieces > 0 && found.carried.every((v, k) => Math.abs(v / found.expected[k] - 1) < 5e-3), JSON.stringify(found));
   check('the strip is drawn in the view', found.mesh.every((count) => count > 500), found.mesh.join());
   const map = await colours(page, '.contact figure:nth-child(1) svg');
@@ -846,6 +904,7 @@ try {
   await wholePage();
   await asking();
   await linkAndTheme();
+  await tablet();
   await phone();
   await nothing();
   await barrel();
