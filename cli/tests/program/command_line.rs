@@ -255,3 +255,15 @@ fn why_explains_a_grip_and_a_rejected_pose() {
     );
     assert_eq!(gripfast(&["why", path, "99999999"]).status.code(), Some(2));
 }
+
+#[test]
+fn what_is_missing_is_told_with_where_it_comes_from() {
+    for (arguments, word) in [
+        (&["plan", "data/parts/hex_nut.stl"][..], "gripfast gripper list"),
+        (&["pick", "grips.json"][..], "a scene file says"),
+    ] {
+        let output = gripfast(arguments);
+        let told = text(&output.stderr);
+        assert!(output.status.code() == Some(2) && told.contains(word), "{told}");
+    }
+}

@@ -488,8 +488,6 @@ fn small_mistakes_are_told_plainly() {
         (format!("{base} --mass -350g"), "--mass=-350g"),
         (format!("{base} --mass 20g --min-contact half"), "or 50%"),
         (part("hex_nut.stl"), "say what to do with this file"),
-        (format!("plan {}", part("hex_nut.stl")), "gripfast gripper list"),
-        ("pick grips.json".to_owned(), "a scene file says"),
         (format!("{base} --mass 20g --report nowhere/page.html"), "'nowhere' is not there"),
     ] {
         let output = gripfast(at, &line);
