@@ -520,7 +520,8 @@ async function gripper(page) {
     const [[g0, x0], [g1, x1]] = [arc.travel[k - 1], arc.travel[k]];
     return x0 + ((x1 - x0) * (gap - g0)) / (g1 - g0);
   };
-  check('opened jaws stand on their arc', Math.abs(open.palm - open.finger - along(open.opening)) < 1e-6 && Math.abs(open.finger) > 0.008 && open.finger === open.other && arc.nearer > 0.009 && arc.nearer < 0.013, `${JSON.stringify(open)} ${arc.nearer}`);
+  // Between the steps of the table straight lines leave the arc by up to 0.016 mm.
+  check('opened jaws stand on their arc', Math.abs(open.palm - open.finger - along(open.opening)) < 2e-5 && Math.abs(open.finger) > 0.008 && open.finger === open.other && arc.nearer > 0.009 && arc.nearer < 0.013, `${JSON.stringify(open)} ${arc.nearer}`);
   await page.click('[data-toggle="open"]');
   await rest(page);
   check('the approach is played', seen.length > 2 && way > 0.02, `${seen.length} pictures, ${(way * 1e3).toFixed(0)} mm`);
