@@ -258,10 +258,9 @@ impl Result {
             let mut set = self.set.clone();
             let whole = gripfast::plan::WHOLE.min(set.grips.len());
             gripfast::plan::solve_every_load(&mut set, whole)?;
-            let misses = match part {
-                Some(part) => gripfast::plan::near_misses(&set, &part.inner)?,
-                None => Vec::new(),
-            };
+            // A scene that is gone costs the rejected candidates, not the page, which says so.
+            let misses = part.and_then(|part| gripfast::plan::near_misses(&set, &part.inner).ok());
+            let misses = misses.unwrap_or_default();
             gripfast::report::render(&set, part.map(|part| &part.inner.mesh), &misses)
         })
         .or_raise()
