@@ -34,6 +34,9 @@ pub(crate) fn mapped(gap: &Gap, map: &DAffine2) -> Gap {
             at: map.transform_point2(at),
             height,
         },
+        Gap::Cone { radius, slope, axis, at, height } => {
+            Gap::Cone { radius, slope, axis: turn * axis, at: map.transform_point2(at), height }
+        }
     }
 }
 
@@ -69,13 +72,20 @@ impl Field {
             Gap::Barrel { radius, meridian, axis, at, height } => {
                 (at, axis, round(meridian.recip(), radius.recip(), height))
             }
+            Gap::Cone { radius, slope, axis, at, height } => {
+                let gap = round(0.0, radius.recip(), height);
+                (at, axis, Quadratic { g: DVec2::new(slope, 0.0), ..gap })
+            }
         };
         let axis = axis.normalize();
-        // Along the axis of a cylinder any origin serves: the nearest to the polygon.
-        let origin = match piece.gap {
-            Gap::Cylinder { .. } => origin + axis * axis.dot(middle - origin),
-            _ => origin,
+        // Along the axis of a cylinder any origin serves: the nearest to the polygon; so on a cone,
+        // by the slope.
+        let along = match piece.gap {
+            Gap::Cylinder { .. } | Gap::Cone { .. } => axis.dot(middle - origin),
+            _ => 0.0,
         };
+        let origin = origin + axis * along;
+        let gap = Quadratic { c: gap.c + gap.g.x * along, ..gap };
         let mut rings = Vec::new();
         for (ring, sense) in
             std::iter::once((&piece.outer, 1.0)).chain(piece.holes.iter().map(|hole| (hole, -1.0)))
@@ -183,6 +193,7 @@ pub(crate) fn numbers(gap: &Gap) -> [f64; 8] {
         Gap::Barrel { radius, meridian, axis, at, height } => {
             (3.0, radius, meridian, axis, at, height)
         }
+        Gap::Cone { radius, slope, axis, at, height } => (4.0, radius, slope, axis, at, height),
     };
     [kind, a, b, axis.x, axis.y, at.x, at.y, height]
 }
@@ -250,6 +261,25 @@ pub(crate) fn pressed(piece: &Piece, delta: f64) -> Patch {
                 at + half[0] * e.x * axis + half[1] * e.y * axis.perp()
             };
             vec![(0..SIDES).map(corner).collect()]
+        }
+        Gap::Cone { radius, slope, axis, at, height } => {
+            if slope == 0.0 {
+                let gap = Gap::Cylinder { radius, axis, at, height };
+                return pressed(&Piece { gap, ..piece.clone() }, delta);
+            }
+            // Uphill of a parabola whose top lies where the crest's gap is `delta`.
+            let downhill = axis.normalize() * slope.signum();
+            let top = at + downhill * ((delta - height) / slope.abs());
+            let deep = downhill.dot(top - middle) + size;
+            if radius <= 0.0 || deep <= 0.0 {
+                return if radius <= 0.0 { vec![piece.polygon()] } else { Patch::new() };
+            }
+            let half = (2.0 * radius * slope.abs() * deep).sqrt();
+            let corner = |k: usize| {
+                let y = half * (2.0 * k as f64 / SIDES as f64 - 1.0);
+                top - downhill * (deep * (y / half).powi(2)) + downhill.perp() * y
+            };
+            vec![(0..=SIDES).map(corner).collect()]
         }
     };
     windows.iter().flat_map(|window| cut(piece, window)).collect()

@@ -61,6 +61,23 @@ pub enum Gap {
         #[serde(default)]
         height: f64,
     },
+    /// A cone, `height + slope x + y^2 / (2 radius)`, `x` along the axis from `at`, `y` across it.
+    Cone {
+        /// Radius at `at` \[m\].
+        radius: f64,
+        /// Slope along `axis`: the tangent of the half angle, negative where the cone grows wider
+        /// that way.
+        slope: f64,
+        /// Direction of the axis in the pad plane, of any length; along `x1` if not given.
+        #[serde(default = "along_x1")]
+        axis: DVec2,
+        /// A point of the crest in the pad plane \[m\].
+        #[serde(default)]
+        at: DVec2,
+        /// Gap there \[m\].
+        #[serde(default)]
+        height: f64,
+    },
 }
 
 fn along_x1() -> DVec2 {
@@ -87,6 +104,9 @@ impl Gap {
             Self::Barrel { radius, meridian, axis, at, height } => {
                 ([radius, meridian], axis, [at, DVec2::splat(height)])
             }
+            Self::Cone { radius, slope, axis, at, height } => {
+                ([radius, 1.0], axis, [at, DVec2::new(slope, height)])
+            }
         };
         if radii.iter().any(|r| !r.is_finite() || *r == 0.0) {
             Some("a radius that is zero or not finite")
@@ -105,7 +125,8 @@ impl Gap {
             Self::Plane { .. } => None,
             Self::Cylinder { radius, .. }
             | Self::Sphere { radius, .. }
-            | Self::Barrel { radius, .. } => Some(radius),
+            | Self::Barrel { radius, .. }
+            | Self::Cone { radius, .. } => Some(radius),
         }
     }
 }

@@ -36,6 +36,7 @@ mod weld;
 pub use crate::units::Unit;
 pub use curves::{Axis, CurvedFace, Shape};
 pub use health::Health;
+pub(crate) use pairs::ANTIPARALLEL;
 pub(crate) use read::{KNOWN as KNOWN_SUFFIXES, is_part};
 #[cfg(feature = "step")]
 pub use read::{StepProcess, serve_step};

@@ -11,7 +11,7 @@ use crate::model::{Polygon, Ring};
 
 /// Angle between one face and the reverse of the other up to which they count as antiparallel: 0.5
 /// degrees, what the rubber of a pad takes up (0.2 mm over 20 mm).
-const ANTIPARALLEL: f64 = 0.5 * std::f64::consts::PI / 180.0;
+pub(crate) const ANTIPARALLEL: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
 /// Overlaps smaller than this are rounding, not contact [m^2].
 pub(super) fn area_floor(mesh: &Mesh) -> f64 {

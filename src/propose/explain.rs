@@ -12,11 +12,14 @@ use crate::clash::{Phase, Sweep};
 use crate::error::{Error, Result};
 use crate::geometry::clip_ring_axis;
 use crate::gripper::Jaws;
-use crate::model::{Contact, Frame, Patch, Polygon};
+use crate::model::{Contact, Frame};
 use crate::part::PairKind;
 
 /// Closing directions that differ by less are one \[rad\].
 const SAME_CLOSING: f64 = 1e-6;
+
+/// Way that an angle of a radian off those of a row counts for \[m\].
+const SAME_ROW: f64 = 1e-5;
 
 /// A stretch of two facing planes as users see it.
 #[derive(Debug, Clone, PartialEq)]
@@ -140,7 +143,11 @@ impl Proposer<'_> {
             |(_, a), (_, b)| {
                 let outside = |site: &Site| {
                     let point = local(site).truncate();
+                    let turned =
+                        site.part_from_site.rotation.transpose() * part_from_grip.rotation.x_axis;
+                    let [_, turned] = site.off_row(point, turned.truncate().to_angle());
                     (point - point.clamp(site.bounds.min, site.bounds.max)).length()
+                        + SAME_ROW * turned
                 };
                 outside(a).total_cmp(&outside(b))
             },
@@ -194,7 +201,10 @@ impl Proposer<'_> {
         let mut verdict = Verdict { checks: Vec::new(), rejection: None, place: None };
         let mut frame = work::frame(found, position, angle);
         self.explain_place(&frame, &mut verdict);
-        let contact = self.explain_contact(&prepared, position, angle, turned, &mut verdict);
+        self.explain_contact(&prepared, position, angle, jaws, &mut verdict);
+        let (mut scratch, mut known) = (Default::default(), Default::default());
+        let posture = (position, angle, jaws);
+        let touched = self.contact_at(found, &prepared.patches, posture, &mut scratch, &mut known);
         self.explain_environment(&prepared, &frame, turned, &mut verdict);
         self.explain_interference(&prepared, position, angle, turned, &frame, &mut verdict);
         frame.rotation *= jaws.turn();
@@ -210,7 +220,7 @@ impl Proposer<'_> {
             face_ii: faces[1],
             part_from_grip: frame,
             width: found.width,
-            contact,
+            contact: (*touched.contact).clone(),
             checks,
             rejection,
             place,
@@ -237,6 +247,7 @@ impl Proposer<'_> {
         }
     }
 
+    /// The areas of both contacts, face I of the grip first.
     fn explain_contact(
         &self,
         prepared: &Prepared<'_>,
@@ -244,28 +255,23 @@ impl Proposer<'_> {
         angle: f64,
         jaws: Jaws,
         verdict: &mut Verdict,
-    ) -> Contact {
+    ) {
         let pads = Pads::new(prepared.site.pads(self.gripper, jaws), angle);
-        let mut patches: [Patch; 2] = [Patch::new(), Patch::new()];
-        let areas = [0, 1].map(|side: usize| {
+        let sides: [usize; 2] = match jaws {
+            Jaws::Straight => [0, 1],
+            Jaws::Exchanged => [1, 0],
+        };
+        let areas = sides.map(|side| {
             let mut scratch = Scratch::default();
             let patch = &prepared.patches[side.min(prepared.patches.len() - 1)];
             let pad = &pads.turned[side];
             match patch.touch(pad, position, &mut scratch) {
                 Touch::Empty => 0.0,
-                Touch::Whole => {
-                    let outer = pads.outlines[side].clone();
-                    patches[side] = vec![Polygon { outer, holes: Vec::new() }];
-                    pad.area()
-                }
-                Touch::Part(area) => {
-                    patches[side] = patch.outline(pad, position, &mut scratch, angle);
-                    area
-                }
+                Touch::Whole => pad.area(),
+                Touch::Part(area) => area,
             }
         });
-        let floors =
-            [0, 1].map(|side: usize| self.contact_floor(prepared.site, &pads.turned[side]));
+        let floors = sides.map(|side| self.contact_floor(prepared.site, &pads.turned[side]));
         let reason = || {
             if areas.iter().zip(floors).all(|(&area, [share, _])| area > 0.0 && area >= share) {
                 Rejection::PadShareTooSmall
@@ -273,24 +279,18 @@ impl Proposer<'_> {
                 Rejection::ContactTooSmall
             }
         };
-        for (side, name) in ["contact on face I", "contact on face II"].into_iter().enumerate() {
-            let (area, [share, pad_share]) = (areas[side], floors[side]);
+        for (place, name) in ["contact on face I", "contact on face II"].into_iter().enumerate() {
+            let (area, [share, pad_share]) = (areas[place], floors[place]);
             let detail = format!(
                 "{:.2} mm^2, {:.1} % of the pad; at least {:.2} mm^2 by the share of the most that \
                  can touch, {:.2} mm^2 by that of the pad",
                 area * 1e6,
-                area / pads.turned[side].area() * 100.0,
+                area / pads.turned[sides[place]].area() * 100.0,
                 share * 1e6,
                 pad_share * 1e6
             );
             verdict.add(name, area > 0.0 && area >= share.max(pad_share), detail, reason);
         }
-        if let Some(relief) = &prepared.site.relief {
-            let rings = [0, 1].map(|side: usize| pads.turned[side].ring());
-            return relief.outlines(&relief.touched(rings, position, angle, jaws));
-        }
-        let [face_i, face_ii] = patches;
-        Contact { face_i, face_ii }
     }
 
     fn explain_environment(

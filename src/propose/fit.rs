@@ -82,7 +82,10 @@ impl Proposer<'_> {
             }
         }
         fits.sort_by(|a, b| {
-            let off = |fit: &Fit| fit.shifted + self.gripper.pad_reach() * fit.turned;
+            let off = |fit: &Fit| {
+                let [aside, turned] = self.sites[fit.site].off_row(fit.position, fit.angle);
+                fit.shifted + reach * fit.turned + aside + 1e-3 * reach * turned
+            };
             off(a).total_cmp(&off(b)).then(a.site.cmp(&b.site))
         });
         let touches = |fit: &&Fit| {

@@ -28,8 +28,8 @@ pub struct ProposeOptions {
     pub angle_step: f64,
     /// Approach along and across the edges of the gripped faces as well.
     pub edge_angles: bool,
-    /// Propose grips that close on curved faces from outside; `None`: where no two plane faces lie
-    /// within the stroke.
+    /// Propose grips on curved faces, and on opposite planes that are not parallel; `None`: where no
+    /// two parallel plane faces lie within the stroke.
     pub curved: Option<bool>,
     /// Smallest contact area on either face, as a share of the most that a pad can touch there: the
     /// area in which the two faces overlap, or that of a pad over the middle of its bounds, at the
@@ -260,6 +260,11 @@ pub enum Rejection {
     /// Counts face pairs, not candidates: round faces on two axes, farther apart than their radii.
     /// The part rolls out of the grip.
     RollsApart,
+    /// Counts face pairs, not candidates: planes or a cone that lean against the pads by more than
+    /// the pads' layers take up at the gripping force.
+    LeansTooMuch,
+    /// Counts bores, not candidates: the pads are too wide to go in and lie along the wall.
+    PadTooWide,
     /// The contact area on a face is below [`ProposeOptions::min_contact`].
     ContactTooSmall,
     /// The contact area on a face is below [`ProposeOptions::min_pad_share`].
@@ -303,6 +308,8 @@ impl Rejection {
             Self::TooFarFromCentreOfMass => "too_far_from_centre_of_mass".into(),
             Self::OpeningTooSmall => "face_pair_opening_too_small".into(),
             Self::RollsApart => "face_pair_rolls_apart".into(),
+            Self::LeansTooMuch => "face_pair_leans_too_much".into(),
+            Self::PadTooWide => "bore_too_narrow_for_pads".into(),
             Self::ContactTooSmall => "contact_too_small".into(),
             Self::PadShareTooSmall => "pad_share_too_small".into(),
             Self::Ground { body } => with("ground", body),

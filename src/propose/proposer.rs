@@ -35,6 +35,8 @@ const STROKE: f64 = 1e-9;
 /// Widths of face pairs outside the stroke that are told apart \[m\], and how many are kept.
 const SAME_WIDTH: f64 = 1e-5;
 const MOST_WIDTHS: usize = 5;
+/// Angles of faces to the pads that are told apart \[rad\].
+const SAME_LEAN: f64 = 1e-4;
 
 /// Counts of a run so far.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -50,6 +52,10 @@ pub struct Tally {
     /// Widths of the face pairs outside the stroke, the nearest to it first, at most five \[m\].
     #[serde(default)]
     pub widths_outside: Vec<f64>,
+    /// Angles to the pads of opposite planes and cones that the pads do not take, the least first,
+    /// at most five \[rad\].
+    #[serde(default)]
+    pub leaning: Vec<f64>,
     /// With an approach cone: smallest angle between its axis and an approach among all candidates
     /// \[rad\].
     #[serde(default)]
@@ -79,6 +85,25 @@ impl Tally {
                  opening of {:.3} mm: {}",
                 options.min_opening * 1e3,
                 count(Rejection::OpeningTooSmall)
+            ));
+        }
+        if !self.leaning.is_empty() {
+            let angles: Vec<String> =
+                self.leaning.iter().map(|angle| format!("{:.2}", angle.to_degrees())).collect();
+            remarks.push(format!(
+                "opposite faces lean by {} deg against the pads; those of {} take planes of up to \
+                 {:.2} deg at {} N",
+                angles.join(", "),
+                gripper.name,
+                site::steepest(gripper, options).to_degrees(),
+                options.force.unwrap_or(gripper.force[1])
+            ));
+        }
+        if count(Rejection::PadTooWide) > 0 {
+            remarks.push(format!(
+                "bores whose radius is less than 2.5 times half the width of the pads, which touch \
+                 the wall with their edges only: {}",
+                count(Rejection::PadTooWide)
             ));
         }
         if count(Rejection::PadShareTooSmall) > 0 {
@@ -228,6 +253,10 @@ impl<'a> Proposer<'a> {
             site::sites(part, gripper, options, &environment, &pairs, chosen.as_deref())?;
         tally.pairs = pairs.len() as u64 + round.pairs;
         round.widths.iter().for_each(|&width| tally.note_width(width, gripper.stroke));
+        tally.leaning = round.leans;
+        tally.leaning.sort_by(f64::total_cmp);
+        tally.leaning.dedup_by(|a, b| (*a - *b).abs() < SAME_LEAN);
+        tally.leaning.truncate(MOST_WIDTHS);
         for (reason, count) in round.rejections {
             *tally.rejections.entry(reason.name()).or_default() += count;
         }

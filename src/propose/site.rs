@@ -7,6 +7,7 @@
 mod places;
 mod relief;
 mod round;
+mod rows;
 mod shapes;
 mod special;
 
@@ -16,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use places::{angles, main_direction, positions, straight_edges};
 pub(super) use relief::Relief;
 pub(super) use round::Round;
+pub(super) use rows::steepest;
 use shapes::{project, same_shape, stretches, to_site};
 use special::{Landmarks, Posture};
 
@@ -86,6 +88,8 @@ pub(super) struct Site {
     pub(super) bounds: Bounds2,
     /// What the pads touch, where it is not plane.
     pub(super) relief: Option<Relief>,
+    /// Whether its width holds along its own places and at its own angles only.
+    pub(super) row: bool,
 }
 
 /// Axes of a closing direction: rows of the matrix are the axes in the part frame, the third is the
@@ -155,6 +159,7 @@ pub(super) fn sites(
         let curved;
         (curved, round) = finder.round()?;
         sites.extend(curved);
+        sites.extend(finder.leaning(&mut round)?);
     }
     Ok(Sites { sites, directions: finder.directions, plane, round })
 }
@@ -325,6 +330,7 @@ impl Finder<'_> {
             special: vec![Vec::new(); angles.len()],
             angles,
             relief,
+            row: false,
         };
         let landmarks = Landmarks {
             overlap: &local,
@@ -449,6 +455,18 @@ impl Site {
             Places::Grid => &self.positions,
             Places::Special => &self.special[angle],
         }
+    }
+
+    /// How far a place is from those that the site is made for \[m\], and an angle likewise \[rad\].
+    pub(super) fn off_row(&self, place: DVec2, angle: f64) -> [f64; 2] {
+        let turn = std::f64::consts::TAU;
+        let apart = |known: &f64| {
+            let apart = (angle - known).rem_euclid(turn);
+            apart.min(turn - apart)
+        };
+        let turned = self.angles.iter().map(apart).fold(turn, f64::min);
+        let off = place.distance(place.clamp(self.bounds.min, self.bounds.max));
+        if self.row { [off, turned] } else { [0.0; 2] }
     }
 
     /// Distance of the pads in its grips \[m\].

@@ -462,7 +462,7 @@ struct Posed {
     wrench: Wrench,
 }
 
-/// A random body of one of seven kinds under a random load.
+/// A random body of one of eight kinds under a random load.
 fn posed(number: u64) -> Posed {
     let mut random = Random::new(number.wrapping_mul(0x5851_F42D_4C95_7F2D) ^ 0x1234);
     let r = random.range(0.005, 0.03);
@@ -483,7 +483,7 @@ fn posed(number: u64) -> Posed {
     let plane = vec![rectangle([-x, -flat], [x, flat], Gap::default())];
     let give = 0.5 * share * share * r;
     let mut distance = 2.0 * r;
-    let (face_i, face_ii, spins) = match number % 7 {
+    let (face_i, face_ii, spins) = match number % 8 {
         0 => (side(cylinder), side(cylinder), vec![DVec2::X]),
         1 => (side(sphere), side(sphere), vec![DVec2::X, DVec2::Y]),
         2 => (side(barrel), side(barrel), vec![DVec2::X]),
@@ -511,7 +511,13 @@ fn posed(number: u64) -> Posed {
             ];
             (step, plane, vec![])
         }
-        _ => (plane, side(sphere), vec![]),
+        6 => (plane, side(sphere), vec![]),
+        _ => {
+            // By as much as the layers give over the pad, towards either end.
+            let slope = random.signed() * give / x;
+            let cone = Gap::Cone { radius: r, slope, axis, at, height };
+            (side(cone), side(cone), vec![DVec2::X])
+        }
     };
     let size = force * random.range(0.1, 0.7);
     let mut vector = || DVec3::new(random.signed(), random.signed(), random.signed());
@@ -541,6 +547,7 @@ fn gap(of: &Gap, x: DVec2) -> f64 {
         Gap::Barrel { radius, meridian, .. } => {
             x.x * x.x / (2.0 * meridian) + x.y * x.y / (2.0 * radius)
         }
+        Gap::Cone { radius, slope, .. } => slope * x.x + x.y * x.y / (2.0 * radius),
     }
 }
 
@@ -548,7 +555,7 @@ fn gap(of: &Gap, x: DVec2) -> f64 {
 fn felt(of: &Gap, tilt: DVec2) -> DVec2 {
     match of {
         Gap::Plane { .. } => tilt,
-        Gap::Cylinder { .. } => DVec2::new(tilt.x, 0.0),
+        Gap::Cylinder { .. } | Gap::Cone { .. } => DVec2::new(tilt.x, 0.0),
         Gap::Sphere { .. } | Gap::Barrel { .. } => DVec2::ZERO,
     }
 }
@@ -717,7 +724,7 @@ fn agree_on_points(numbers: std::ops::Range<u64>, grid: usize) -> Seen {
             let mut spins = posed.spins.clone();
             // A barrel that would turn far along its meridian counts as free to.
             if got.notes.iter().any(|note| matches!(note, Note::SettlesBy { .. })) {
-                assert_eq!(number % 7, 2, "case {number}");
+                assert_eq!(number % 8, 2, "case {number}");
                 spins.push(DVec2::Y);
             }
             assert_eq!(free, spins.len(), "case {number}");

@@ -5,6 +5,7 @@
 mod bodies;
 mod curved;
 mod interference;
+mod leaning;
 mod motion;
 mod negatives;
 mod options;

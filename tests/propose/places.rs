@@ -251,3 +251,58 @@ fn two_tessellations_of_a_part_give_the_same_angles() {
     assert!(!found[0].is_empty());
     assert_eq!(found[0], found[1]);
 }
+
+/// With the jaws exchanged the areas are those of the flip, and the areas are told by its faces.
+#[test]
+fn a_pose_with_exchanged_jaws_is_explained_as_the_flip_is_listed() {
+    // A step on one side only: the contacts differ.
+    let ring = [(0.0, 0.0), (40.0, 0.0), (40.0, 20.0), (15.0, 20.0), (15.0, 12.0), (0.0, 12.0)];
+    let corner = |(x, y): (f64, f64), z: f64| DVec3::new(x, y, z) * 1e-3;
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for k in 0..6 {
+        let (a, b) = (ring[k], ring[(k + 1) % 6]);
+        let base = vertices.len() as u32;
+        vertices.extend([corner(a, 0.0), corner(b, 0.0), corner(b, 25.0), corner(a, 25.0)]);
+        triangles.extend([[base, base + 1, base + 2], [base, base + 2, base + 3]]);
+    }
+    for (z, up) in [(0.0, false), (25.0, true)] {
+        for [a, b, c] in [[0, 1, 4], [0, 4, 5], [1, 2, 4], [2, 3, 4]] {
+            let base = vertices.len() as u32;
+            vertices.extend([a, b, c].map(|k: usize| corner(ring[k], z)));
+            triangles.push(if up {
+                [base, base + 1, base + 2]
+            } else {
+                [base, base + 2, base + 1]
+            });
+        }
+    }
+    let part = Part::from_triangles("step", &vertices, &triangles).unwrap();
+    assert!(part.health.watertight, "{:?}", part.health.lines());
+    let gripper = gripfast::gripper::find("robotiq-2f85").unwrap();
+    let options = ProposeOptions::default().with_flips(true).with_min_contact(0.05);
+    let mut proposer = Proposer::new(&part, &gripper, &options).unwrap();
+    let grips: Vec<_> = proposer.by_ref().flat_map(|chunk| chunk.grips).collect();
+    let mut unequal = 0;
+    for grip in grips.iter().step_by(7) {
+        let told = proposer.explain_pose(grip.face_i, grip.face_ii, &grip.part_from_grip).unwrap();
+        assert_eq!((told.face_i, told.face_ii), (grip.face_i, grip.face_ii));
+        let measures = |contact: &gripfast::model::Contact| {
+            [&contact.face_i, &contact.face_ii].map(|patch| {
+                let moments = gripfast::geometry::patch_moments(patch);
+                [moments.area * 1e3, moments.centroid.x, moments.centroid.y]
+            })
+        };
+        let (told_i, listed) = (measures(&told.contact), measures(&grip.contact));
+        for (a, b) in told_i.iter().flatten().zip(listed.iter().flatten()) {
+            assert!((a - b).abs() < 1e-9, "{told_i:?} {listed:?}");
+        }
+        for (check, [area, ..]) in
+            told.checks.iter().filter(|check| check.name.starts_with("contact")).zip(listed)
+        {
+            assert!(check.detail.starts_with(&format!("{:.2} mm^2", area * 1e3)), "{check:?}");
+        }
+        let flipped = grip.flip_of.is_some();
+        unequal += usize::from(flipped && (listed[0][0] - listed[1][0]).abs() > 1e-6);
+    }
+    assert!(unequal > 5, "{unequal}");
+}

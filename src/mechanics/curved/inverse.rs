@@ -33,6 +33,10 @@ pub fn force_needed(
         let mu = score.mu_s.filter(|_| score.status.holds());
         mu.map_or(f64::INFINITY, |mu| (mu / friction).ln())
     };
+    if size == 0.0 {
+        // What leans is pushed out in proportion to the force: any holds it, or none.
+        return (excess(start) <= 0.0).then_some(0.0);
+    }
     let most = MOST * size.max(start);
     // `low` is too little, `high` enough.
     let mut low: Option<(f64, f64)> = None;

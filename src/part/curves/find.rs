@@ -182,14 +182,19 @@ impl Growth<'_> {
         losers.dedup();
         self.claim(&found);
         for loser in losers.into_iter().filter(|&loser| loser != FREE) {
-            let left = &mut faces[loser as usize].found.members;
-            let before = left.len();
-            left.retain(|&facet| self.owner[facet as usize] == loser);
+            let Face { found: left, cut } = &mut faces[loser as usize];
+            let before = left.members.len();
+            left.members.retain(|&facet| self.owner[facet as usize] == loser);
             // A rest is no surface any more.
-            if 2 * left.len() < before {
-                for facet in left.drain(..) {
+            if 2 * left.members.len() < before {
+                for facet in left.members.drain(..) {
                     self.owner[facet as usize] = FREE;
                 }
+            }
+            left.points = self.points(&left.members);
+            left.residual = left.surface.residual(&left.points);
+            if matches!(left.kind, Kind::Cylinder | Kind::Cone) {
+                cut.turn = turn(left, std::f64::consts::TAU / cut.facets);
             }
         }
         faces.push(Face { found, cut });

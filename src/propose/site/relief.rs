@@ -49,7 +49,7 @@ impl Relief {
         pads: &[Ring; 2],
         place: DVec2,
     ) -> Option<Self> {
-        let mut relief = Self { pieces, pressed: Default::default(), layer, force };
+        let relief = Self { pieces, pressed: Default::default(), layer, force };
         let rings = pads.each_ref().map(|pad| moved_ring(pad, place));
         let under = relief.under(
             [&rings[0], &rings[1]],
@@ -57,13 +57,21 @@ impl Relief {
             Jaws::Straight,
         );
         let squeezed = Pads::new(&under).ok()?.squeezed(force)?;
-        for side in 0..2 {
-            let patches = relief.pieces[side].iter();
-            // What faces share of an outline is pressed once.
-            relief.pressed[side] =
-                patches.flat_map(|piece| pressed(piece, squeezed[side].delta)).collect();
-        }
-        Some(relief)
+        let deltas = squeezed.map(|face| face.delta);
+        Some(Self::pressed_by(relief.pieces, layer, force, deltas))
+    }
+
+    /// With the pressure of pads whose layers are compressed by `deltas` at the pads' planes.
+    pub(super) fn pressed_by(
+        pieces: [Vec<Piece>; 2],
+        layer: Layer,
+        force: f64,
+        deltas: [f64; 2],
+    ) -> Self {
+        let pressed = [0, 1].map(|side: usize| {
+            pieces[side].iter().flat_map(|piece| pressed(piece, deltas[side])).collect()
+        });
+        Self { pieces, pressed, layer, force }
     }
 
     /// As seen from another origin and turn.
@@ -133,7 +141,9 @@ impl Relief {
     /// Directions of the crests, in the site's `(x, y)`.
     fn crests(&self) -> impl Iterator<Item = DVec2> + '_ {
         self.pieces.iter().flatten().filter_map(|piece| match piece.gap {
-            Gap::Cylinder { axis, .. } | Gap::Barrel { axis, .. } => Some(axis),
+            Gap::Cylinder { axis, .. } | Gap::Barrel { axis, .. } | Gap::Cone { axis, .. } => {
+                Some(axis)
+            }
             Gap::Plane { .. } | Gap::Sphere { .. } => None,
         })
     }
@@ -308,6 +318,29 @@ impl Surveyor<'_> {
                 let radius = if face.outside { radius } else { -radius };
                 let gap = Gap::Cylinder { radius, axis: direction, at, height };
                 self.outline(face, &window, gap, pieces);
+                true
+            }
+            Shape::Cone { apex, axis, half_angle, along } if face.outside => {
+                let Some(direction) = level(axis) else { return false };
+                let (apex, slope) = (place(apex), half_angle.tan());
+                // Where the plane meets it, or at the end that comes nearest.
+                let behind = self.side * (self.height - apex.z);
+                let radius = behind.clamp(slope * along[0], slope * along[1]);
+                if radius <= 0.0 {
+                    return false;
+                }
+                let height = behind - radius;
+                if height < self.reach {
+                    let at = apex.truncate() + direction * (radius / slope);
+                    let (length, across) = (along[1] - along[0], half(radius, height));
+                    let corner = |x: f64, y: f64| {
+                        apex.truncate() + (along[0] + x * length) * direction + y * direction.perp()
+                    };
+                    let window = [(0.0, -across), (1.0, -across), (1.0, across), (0.0, across)]
+                        .map(|(x, y)| corner(x, y));
+                    let gap = Gap::Cone { radius, slope: -slope, axis: direction, at, height };
+                    self.outline(face, &window, gap, pieces);
+                }
                 true
             }
             Shape::Sphere { centre, radius } if face.outside => {

@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3};
 
 use super::relief::{LEVEL, Relief, Surveyor};
+use super::rows::upright;
 use super::shapes::{project, stretches};
 use super::{Base, Finder, SAME_PLANE, Site, axes, lie};
 use crate::error::Result;
@@ -33,7 +34,7 @@ const MOST_DIVISIONS: usize = 8;
 /// are the same.
 const ON_ONE_AXIS: f64 = 2e-3;
 /// Rounding of a width against the stroke \[m\].
-const STROKE: f64 = 1e-9;
+pub(super) const STROKE: f64 = 1e-9;
 
 /// What came of the pairs of curved faces.
 #[derive(Debug, Default)]
@@ -43,6 +44,25 @@ pub(in crate::propose) struct Round {
     /// Pairs without, by reason, and their widths outside of the stroke.
     pub(in crate::propose) rejections: Vec<(Rejection, u64)>,
     pub(in crate::propose) widths: Vec<f64>,
+    /// Angles to the pads that these do not take \[rad\].
+    pub(in crate::propose) leans: Vec<f64>,
+}
+
+impl Round {
+    /// Adds what came of pairs.
+    pub(super) fn count(&mut self, pairs: BTreeMap<(u32, u32), Option<Rejection>>) {
+        for outcome in pairs.into_values() {
+            match outcome {
+                None => self.pairs += 1,
+                Some(reason) => {
+                    match self.rejections.iter_mut().find(|(known, _)| *known == reason) {
+                        Some((_, count)) => *count += 1,
+                        None => self.rejections.push((reason, 1)),
+                    }
+                }
+            }
+        }
+    }
 }
 
 /// A place where a flat pad touches the part first.
@@ -63,7 +83,7 @@ impl Finder<'_> {
         let mut sites = Vec::new();
         let mut seen: BTreeMap<(u32, u32), Option<Rejection>> = BTreeMap::new();
         let mut widths = Vec::new();
-        if self.part.curved.iter().all(|face| !face.reachable || !face.outside) {
+        if !self.options.outside || self.round_faces().next().is_none() {
             return Ok((sites, Round::default()));
         }
         let loose = self.loose();
@@ -89,22 +109,12 @@ impl Finder<'_> {
             }
         }
         let mut round = Round { widths, ..Round::default() };
-        for outcome in seen.into_values() {
-            match outcome {
-                None => round.pairs += 1,
-                Some(reason) => {
-                    match round.rejections.iter_mut().find(|(known, _)| *known == reason) {
-                        Some((_, count)) => *count += 1,
-                        None => round.rejections.push((reason, 1)),
-                    }
-                }
-            }
-        }
+        round.count(seen);
         Ok((sites, round))
     }
 
     /// Triangles of no face.
-    fn loose(&self) -> Vec<u32> {
+    pub(super) fn loose(&self) -> Vec<u32> {
         let mut taken = vec![false; self.part.mesh.triangles.len()];
         let plane = self.part.faces.iter().map(|face| &face.triangles);
         let curved = self.part.curved.iter().map(|face| &face.triangles);
@@ -112,67 +122,73 @@ impl Finder<'_> {
         (0..taken.len() as u32).filter(|&triangle| !taken[triangle as usize]).collect()
     }
 
-    fn may_touch(&self, id: u32) -> bool {
+    pub(super) fn may_touch(&self, id: u32) -> bool {
         self.chosen.is_none_or(|chosen| chosen.get(id as usize).is_some_and(|chosen| *chosen))
     }
 
     /// Faces with a crest that pads may touch.
-    fn round_faces(&self) -> impl Iterator<Item = &CurvedFace> {
+    pub(super) fn round_faces(&self) -> impl Iterator<Item = &CurvedFace> {
         let faces = self.part.curved.iter();
         faces.filter(|face| face.outside && face.reachable && self.may_touch(face.id))
     }
 
     /// Closing directions to try, one of each two opposite ones, in a stable order.
     fn closings(&self) -> Vec<DVec3> {
-        let mut found: Vec<DVec3> = Vec::new();
-        let mut add = |direction: DVec3| {
-            let direction = if direction[direction.abs().max_position()] < 0.0 {
-                -direction
-            } else {
-                direction
-            };
-            if !found.iter().any(|known| known.cross(direction).length() < SAME_CLOSING) {
-                found.push(direction);
-            }
-        };
-        let cone = self.options.approach_cone.map(|cone| cone.axis.normalize());
+        let mut found = Vec::new();
         for axis in self.round_axes() {
-            let mut planes: Vec<_> = self
-                .part
-                .faces
-                .iter()
-                .filter(|face| face.reachable && face.normal.dot(axis).abs() < LEVEL)
-                .collect();
-            planes.truncate(MOST_PLANES);
-            // Across the axis: from the largest plane along it, or one of the part's own axes.
-            let own = DVec3::AXES[axis.abs().min_position()];
-            let first = planes.first().map_or(own, |face| face.normal);
-            let first = (first - axis * axis.dot(first)).normalize();
-            let second = axis.cross(first);
-            if let Some(across) = cone.and_then(|cone| cone.cross(axis).try_normalize()) {
-                add(across);
-            }
-            let count = (std::f64::consts::PI / self.options.angle_step).round().max(1.0) as usize;
-            for index in 0..count {
-                let turn = DVec2::from_angle(std::f64::consts::PI * index as f64 / count as f64);
-                add(first * turn.x + second * turn.y);
-            }
-            planes.iter().for_each(|face| add(face.normal));
+            self.add_closings(axis, &mut found);
         }
         let is_sphere = |face: &CurvedFace| matches!(face.shape, Shape::Sphere { .. });
         if self.round_faces().any(is_sphere) {
             let divisions = (ICOSAHEDRON / self.options.angle_step).round() as usize;
             let divisions = divisions.clamp(1, MOST_DIVISIONS);
-            directions(10 * divisions * divisions + 2).into_iter().for_each(&mut add);
-            if let Some(axis) = cone {
+            let evenly = directions(10 * divisions * divisions + 2);
+            evenly.into_iter().for_each(|direction| add(direction, &mut found));
+            if let Some(axis) = self.cone() {
                 let (first, second) = axis.any_orthonormal_pair();
                 for index in 0..2 * divisions {
                     let turn = std::f64::consts::PI * index as f64 / (2 * divisions) as f64;
-                    add(first * turn.cos() + second * turn.sin());
+                    add(first * turn.cos() + second * turn.sin(), &mut found);
                 }
             }
         }
         found
+    }
+
+    /// Closing directions across an axis.
+    pub(super) fn closings_about(&self, axis: DVec3) -> Vec<DVec3> {
+        let mut found = Vec::new();
+        self.add_closings(axis, &mut found);
+        found
+    }
+
+    /// Middle of the cone of approaches asked for.
+    fn cone(&self) -> Option<DVec3> {
+        self.options.approach_cone.map(|cone| cone.axis.normalize())
+    }
+
+    fn add_closings(&self, axis: DVec3, found: &mut Vec<DVec3>) {
+        let mut planes: Vec<_> = self
+            .part
+            .faces
+            .iter()
+            .filter(|face| face.reachable && face.normal.dot(axis).abs() < LEVEL)
+            .collect();
+        planes.truncate(MOST_PLANES);
+        // Across the axis: from the largest plane along it, or one of the part's own axes.
+        let own = DVec3::AXES[axis.abs().min_position()];
+        let first = planes.first().map_or(own, |face| face.normal);
+        let first = (first - axis * axis.dot(first)).normalize();
+        let second = axis.cross(first);
+        if let Some(across) = self.cone().and_then(|cone| cone.cross(axis).try_normalize()) {
+            add(across, found);
+        }
+        let count = (std::f64::consts::PI / self.options.angle_step).round().max(1.0) as usize;
+        for index in 0..count {
+            let turn = DVec2::from_angle(std::f64::consts::PI * index as f64 / count as f64);
+            add(first * turn.x + second * turn.y, found);
+        }
+        planes.iter().for_each(|face| add(face.normal, found));
     }
 
     /// Axes of faces that are round about one, the largest first.
@@ -342,6 +358,14 @@ impl Finder<'_> {
         let map = axes(closing) * axes(-closing).transpose();
         let corners = [bounds.min, bounds.max, DVec2::new(bounds.min.x, bounds.max.y)];
         Bounds2::of(&corners.map(|corner| (map * corner.extend(0.0)).truncate()))
+    }
+}
+
+/// Adds a direction, unless it or its opposite is there.
+fn add(direction: DVec3, found: &mut Vec<DVec3>) {
+    let direction = upright(direction);
+    if !found.iter().any(|known| known.cross(direction).length() < SAME_CLOSING) {
+        found.push(direction);
     }
 }
 

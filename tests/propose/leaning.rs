@@ -1,0 +1,302 @@
+//! Grips on what leans against the pads: drafted planes, cones and bores.
+
+use std::f64::consts::TAU;
+use std::sync::atomic::AtomicBool;
+
+use glam::{DVec2, DVec3};
+use gripfast::gripper;
+use gripfast::load::wrench_in_grip;
+use gripfast::model::{LoadCase, Status, Wrench};
+use gripfast::part::{Part, Shape};
+use gripfast::plan::Plan;
+use gripfast::propose::{ProposeOptions, Proposer};
+use gripfast::request::{Choice, Request, Side};
+use gripfast::results::{GripSet, RankedGrip};
+use gripfast::units::{Angle, Force, Length, Mass};
+
+const FORCE: f64 = 60.0;
+
+/// A block of 40 x 20 x 30 mm whose faces at `-y` and `+y` are drafted by these angles \[rad\].
+fn wedge(drafts: [f64; 2]) -> Part {
+    let corner = |x: f64, z: f64| {
+        let y = |draft: f64| 0.010 - z * draft.tan();
+        [DVec3::new(x, -y(drafts[0]), z), DVec3::new(x, y(drafts[1]), z)]
+    };
+    let places = [(-0.02, 0.0), (0.02, 0.0), (-0.02, 0.03), (0.02, 0.03)];
+    // Pairs of corners (-y, +y): 0 1, 2 3 below, 4 5, 6 7 above.
+    let vertices: Vec<DVec3> = places.iter().flat_map(|&(x, z)| corner(x, z)).collect();
+    let quads =
+        [[0, 2, 6, 4], [3, 1, 5, 7], [0, 1, 3, 2], [4, 6, 7, 5], [1, 0, 4, 5], [2, 3, 7, 6]];
+    let triangles: Vec<[u32; 3]> =
+        quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let part = Part::from_triangles("wedge", &vertices, &triangles).unwrap();
+    assert!(part.health.watertight && part.mass_properties(1.0).volume > 0.0);
+    part
+}
+
+/// A solid between two circles about `z`, or a square block of 80 mm with such a hole. The number of
+/// facets is 4 times an odd one, so that the square has its corners.
+fn lathe(radii: [f64; 2], length: f64, facets: u32, hole: bool) -> Part {
+    let ray = |k: u32| DVec2::from_angle(TAU * (f64::from(k) + 0.5) / f64::from(facets));
+    let at = |e: DVec2, end: usize| e.extend([-0.5, 0.5][end] * length);
+    let circle = |k: u32, end: usize| at(ray(k) * radii[end], end);
+    let outer = |k: u32, end: usize| at(ray(k) * (0.04 / ray(k).abs().max_element()), end);
+    let middle = |end: usize| at(DVec2::ZERO, end);
+    let mut soup: Vec<DVec3> = Vec::new();
+    for k in 0..facets {
+        let n = (k + 1) % facets;
+        let mut quad = |[a, b, c, d]: [DVec3; 4]| soup.extend([a, b, c, a, c, d]);
+        if hole {
+            quad([circle(n, 0), circle(k, 0), circle(k, 1), circle(n, 1)]);
+            quad([outer(k, 0), outer(n, 0), outer(n, 1), outer(k, 1)]);
+            quad([circle(k, 0), circle(n, 0), outer(n, 0), outer(k, 0)]);
+            quad([circle(n, 1), circle(k, 1), outer(k, 1), outer(n, 1)]);
+        } else {
+            quad([circle(k, 0), circle(n, 0), circle(n, 1), circle(k, 1)]);
+            soup.extend([circle(n, 0), circle(k, 0), middle(0)]);
+            soup.extend([circle(k, 1), circle(n, 1), middle(1)]);
+        }
+    }
+    let triangles: Vec<[u32; 3]> =
+        (0..soup.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+    let part = Part::from_triangles("turned", &soup, &triangles).unwrap();
+    assert!(part.health.watertight, "{:?}", part.health.lines());
+    part
+}
+
+fn load(name: &str, force: DVec3, moment: DVec3) -> LoadCase {
+    LoadCase { name: name.into(), wrench: Wrench { force, moment } }
+}
+
+/// Places a step of `spacing` apart, closing directions by `step` degrees.
+fn planned(
+    part: Part,
+    gripper: &str,
+    loads: Vec<LoadCase>,
+    grips: Side,
+    (spacing, step): (f64, f64),
+) -> GripSet {
+    let mut request = Request::new("", gripper);
+    request.mass = Some(Mass(0.2));
+    request.force = Some(Force(FORCE));
+    request.candidates.spacing = Some(Length(spacing));
+    request.candidates.curved = Some(true);
+    request.candidates.grips = grips;
+    request.candidates.angle_step = Angle(step.to_radians());
+    request.scoring.backend = Choice::Cpu;
+    let plan = Plan::builder(request).part(part).loads(loads).build().unwrap();
+    plan.run(&mut (), &AtomicBool::new(false)).unwrap().set
+}
+
+/// Grips on what is not plane.
+fn curved(set: &GripSet) -> Vec<&RankedGrip> {
+    set.grips.iter().filter(|ranked| ranked.grip.surfaces.is_some()).collect()
+}
+
+#[test]
+fn drafted_faces_need_the_tangent_of_the_draft() {
+    for degrees in [[0.5, 0.5], [2.0, 2.0], [1.0, 2.0], [0.0, 3.0]] {
+        let drafts = degrees.map(f64::to_radians);
+        let none = vec![load("none", DVec3::ZERO, DVec3::ZERO)];
+        let set = planned(wedge(drafts), "robotiq-2f85", none, Side::Outside, (0.008, 45.0));
+        let half = 0.5 * (drafts[0] + drafts[1]);
+        let found = curved(&set);
+        assert!(found.len() > 20, "{degrees:?}: {}", found.len());
+        // In the frame of the bisector, about the middle plane of the two faces.
+        let lean = 0.5 * (drafts[1] - drafts[0]);
+        let closing = DVec3::new(0.0, lean.cos(), lean.sin());
+        for ranked in found {
+            let frame = ranked.grip.part_from_grip;
+            assert!(frame.rotation.z_axis.cross(closing).length() < 1e-9, "{degrees:?}");
+            let mu = ranked.worst.mu_s.unwrap();
+            assert!((mu / half.tan() - 1.0).abs() < 1e-9, "{degrees:?}: {mu}");
+            assert_eq!(ranked.worst.status, Status::Ok);
+            // The pads stand as far apart as the faces where the pads touch first: at the upper
+            // edge of the pads, or of the faces.
+            let up = closing.cross(DVec3::X);
+            let up = if up.z > 0.0 { -up } else { up };
+            let pad = DVec2::new(0.0335, 0.02) / 2.0;
+            let along = [frame.rotation.x_axis, frame.rotation.y_axis].map(|e| e.dot(up).abs());
+            let place = frame.origin + up * (pad.x * along[0] + pad.y * along[1]);
+            let gap = |place: DVec3| {
+                let distance = |side: f64, draft: f64| {
+                    let normal = DVec3::new(0.0, side * draft.cos(), draft.sin());
+                    (0.010 * draft.cos() - normal.dot(place)) / normal.dot(closing)
+                };
+                distance(1.0, drafts[1]) - distance(-1.0, drafts[0])
+            };
+            // Where the faces end: at z = 0 on the one that ends first.
+            let ends = [(1.0, drafts[1]), (-1.0, drafts[0])]
+                .map(|(side, _)| up.dot(DVec3::new(0.0, side * 0.010, 0.0)));
+            let end = frame.origin + up * (ends[0].min(ends[1]) - up.dot(frame.origin));
+            let expected = if up.dot(place) < up.dot(end) { gap(place) } else { gap(end) };
+            assert!(
+                (ranked.grip.width - expected).abs() < 1e-9,
+                "{degrees:?}: {} {expected}",
+                ranked.grip.width
+            );
+        }
+    }
+}
+
+#[test]
+fn parallel_faces_stay_as_they_are_beside_drafted_ones() {
+    let gripper = gripper::find("robotiq-2f85").unwrap();
+    let options = ProposeOptions::default().with_spacing(Some(0.006)).with_force(Some(FORCE));
+    for degrees in [0.2_f64, 1.0] {
+        let part = wedge([degrees.to_radians(); 2]);
+        let grips = |curved: bool| -> Vec<_> {
+            let options = options.clone().with_curved(Some(curved));
+            let proposer = Proposer::new(&part, &gripper, &options).unwrap();
+            proposer.flat_map(|chunk| chunk.grips).collect()
+        };
+        let (without, with) = (grips(false), grips(true));
+        assert!(!without.is_empty());
+        let plane: Vec<_> = with.iter().filter(|grip| grip.surfaces.is_none()).cloned().collect();
+        assert_eq!(plane, without, "{degrees}");
+        // Half a degree in all is what counts as parallel.
+        assert_eq!(with.len() > without.len(), degrees > 0.25, "{degrees}");
+        let last = without.iter().map(|grip| grip.id).max().unwrap();
+        assert!(with.iter().all(|grip| grip.surfaces.is_none() || grip.id > last));
+    }
+}
+
+#[test]
+fn what_the_layer_does_not_take_is_told_with_its_angle() {
+    let part = wedge([14_f64.to_radians(); 2]);
+    let gripper = gripper::find("robotiq-2f85").unwrap();
+    let options = ProposeOptions::default().with_curved(Some(true)).with_force(Some(235.0));
+    let proposer = Proposer::new(&part, &gripper, &options).unwrap();
+    let tally = proposer.tally();
+    assert_eq!(tally.rejections.get("face_pair_leans_too_much"), Some(&1), "{tally:?}");
+    let remarks = tally.remarks(&gripper, &options);
+    let remark = remarks.iter().find(|remark| remark.contains("14.00 deg")).unwrap();
+    // A strip of the layer along the longer side, compressed by a third of 2 mm.
+    let most = (5e9 * 0.0335 * (2e-3_f64 / 3.0).powi(2) / (2.0 * 235.0)).atan().to_degrees();
+    assert!(remark.contains(&format!("{most:.2} deg at 235 N")), "{remark} {most}");
+    // A little less than that is taken.
+    let part = wedge([(most - 0.05).to_radians(); 2]);
+    let proposer = Proposer::new(&part, &gripper, &options).unwrap();
+    assert!(!proposer.tally().rejections.contains_key("face_pair_leans_too_much"));
+    assert!(proposer.tries_curved());
+}
+
+#[test]
+fn a_grip_on_a_row_is_explained_as_it_was_proposed() {
+    let gripper = gripper::find("robotiq-2f85").unwrap();
+    let options = ProposeOptions::default()
+        .with_curved(Some(true))
+        .with_spacing(Some(0.004))
+        .with_force(Some(FORCE));
+    let part = wedge([2_f64.to_radians(); 2]);
+    let mut proposer = Proposer::new(&part, &gripper, &options).unwrap();
+    let grips: Vec<_> = proposer.by_ref().flat_map(|chunk| chunk.grips).collect();
+    let leaning: Vec<_> = grips.iter().filter(|grip| grip.surfaces.is_some()).collect();
+    assert!(leaning.len() > 100, "{}", leaning.len());
+    for grip in leaning.iter().step_by(5) {
+        let told = proposer.explain_pose(grip.face_i, grip.face_ii, &grip.part_from_grip).unwrap();
+        assert!(told.rejection.is_none() && told.width == grip.width, "{told:?}");
+        let sums = |contact: &gripfast::model::Contact| -> Vec<DVec2> {
+            let rings = contact.face_i.iter().chain(&contact.face_ii);
+            rings.map(|polygon| polygon.outer.iter().copied().sum()).collect()
+        };
+        for (a, b) in sums(&told.contact).into_iter().zip(sums(&grip.contact)) {
+            assert!(a.distance(b) < 1e-12, "{a} {b}");
+        }
+        let fit = proposer.fit(&grip.part_from_grip, 0.01).unwrap();
+        assert_eq!(proposer.grip_at(&fit, grip.id).width, grip.width);
+    }
+}
+
+#[test]
+fn a_bore_is_gripped_from_inside_about_its_axis() {
+    let (radius, half): (f64, f64) = (0.03, 0.010);
+    let part = lathe([radius; 2], 0.04, 68, true);
+    let bore = part.curved.iter().find(|face| !face.outside).unwrap();
+    assert!(matches!(bore.shape, Shape::Cylinder { .. }));
+    let loads = vec![
+        load("along", DVec3::new(0.0, 0.0, 9.0), DVec3::ZERO),
+        load("about", DVec3::ZERO, DVec3::new(0.0, 0.0, 0.2)),
+        load("both", DVec3::new(0.0, 0.0, 7.0), DVec3::new(0.0, 0.0, 0.25)),
+    ];
+    let centre = part.mass_properties(1.0).centre_of_mass;
+    let set = planned(part, "generic", loads.clone(), Side::Inside, (0.008, 45.0));
+    let found = curved(&set);
+    assert!(found.len() > 10, "{} {:?}", found.len(), set.summary.rejections);
+    let mut checked = 0;
+    for ranked in found {
+        let frame = ranked.grip.part_from_grip;
+        assert!(ranked.grip.inside && (ranked.grip.width - 2.0 * radius).abs() < 1e-6);
+        assert!(frame.origin.truncate().length() < 1e-7, "on the axis: {}", frame.origin);
+        if frame.origin.distance(centre) > 1e-6 {
+            continue;
+        }
+        // The pads slide along and about the axis, each with half of the load at the bore's radius.
+        let wrench = wrench_in_grip(&loads[2].wrench, centre, &frame);
+        let mu = 7.0_f64.hypot(wrench.moment.length() / radius) / (2.0 * FORCE);
+        assert!((ranked.worst.mu_s.unwrap() / mu - 1.0).abs() < 1e-8, "{:?} {mu}", ranked.worst);
+        assert_eq!(ranked.worst.load, 2);
+        // Both edges of the pads touch: N = 2 k L int (y^2 - c^2)/(2 R) dy from c to the edge.
+        let faces = ranked.faces.unwrap();
+        let length = 0.02;
+        let k = ranked.grip.surfaces.as_ref().unwrap().stiffness[0];
+        let carried =
+            |c: f64| k * length / radius * ((half.powi(3) - c.powi(3)) / 3.0 - c * c * (half - c));
+        let (mut low, mut high) = (0.0, half);
+        for _ in 0..80 {
+            let c = 0.5 * (low + high);
+            if carried(c) > FORCE { low = c } else { high = c }
+        }
+        assert!((faces[0].area / (2.0 * length * (half - low)) - 1.0).abs() < 1e-6, "{faces:?}");
+        let greatest = k * (half * half - low * low) / (2.0 * radius);
+        assert!((faces[0].greatest_pressure / greatest - 1.0).abs() < 1e-6, "{faces:?}");
+        checked += 1;
+    }
+    assert!(checked >= 4, "{checked}");
+    // Too narrow for the pads.
+    let narrow = lathe([0.02; 2], 0.04, 68, true);
+    let gripper = gripper::find("generic").unwrap();
+    let options =
+        ProposeOptions::default().with_outside(false).with_inside(true).with_curved(Some(true));
+    let proposer = Proposer::new(&narrow, &gripper, &options).unwrap();
+    assert_eq!(proposer.tally().rejections.get("bore_too_narrow_for_pads"), Some(&1));
+    assert!(!proposer.tries_curved());
+}
+
+#[test]
+fn a_cone_needs_the_tangent_of_its_half_angle_and_more_to_be_turned() {
+    let radii = [0.0150, 0.0140];
+    let part = lathe(radii, 0.05, 68, false);
+    let kinds: Vec<_> = part.curved.iter().map(|face| face.shape.name()).collect();
+    assert_eq!(kinds, ["cone"]);
+    let tangent = (radii[0] - radii[1]) / 0.05;
+    let moment = 0.04;
+    for (moment, loads) in [
+        (0.0, vec![load("none", DVec3::ZERO, DVec3::ZERO)]),
+        (moment, vec![load("about", DVec3::ZERO, DVec3::new(0.0, 0.0, moment))]),
+    ] {
+        let set = planned(part.clone(), "robotiq-2f85", loads, Side::Outside, (0.016, 90.0));
+        let found = curved(&set);
+        assert!(found.len() > 20, "{} {:?}", found.len(), set.summary.rejections);
+        let mut middle = 0;
+        for ranked in found {
+            let grip = &ranked.grip;
+            let r = 0.5 * grip.width;
+            let (place, rotation) = (grip.part_from_grip.origin, grip.part_from_grip.rotation);
+            // The widest place under the pads, or of the cone.
+            let pad = DVec2::new(0.0335, 0.02) / 2.0;
+            let reach = pad.x * rotation.x_axis.z.abs() + pad.y * rotation.y_axis.z.abs();
+            let z = (place.z - reach).max(-0.025);
+            let widest = radii[0] - tangent * (z + 0.025);
+            assert!((r - widest).abs() < 2e-7, "{r} {widest} at {place}");
+            if place.truncate().length() > 1e-7 {
+                continue;
+            }
+            let mu = tangent.hypot(moment / (2.0 * FORCE * r));
+            let found = ranked.worst.mu_s.unwrap();
+            assert!((found / mu - 1.0).abs() < 2e-5, "{found} {mu} {:?}", ranked.worst);
+            middle += 1;
+        }
+        assert!(middle > 5, "{middle}");
+    }
+}
