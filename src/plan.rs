@@ -25,6 +25,7 @@
 
 mod ahead;
 mod assess;
+mod cause;
 pub mod checkpoint;
 mod collect;
 mod limits;
@@ -276,6 +277,12 @@ impl Plan {
         let lost = found.collector.take_lost();
         let misses = self.misses(&proposer, &lost);
         let (set, shown) = self.finish(&proposer, &assessor, found, lost)?;
+        if complete && set.grips.is_empty() {
+            let rejections = &set.summary.rejections;
+            let tally = proposer.tally();
+            let causes = cause::causes(&self.part, &self.gripper, &self.propose, tally, rejections);
+            causes.iter().for_each(|cause| observer.note(cause));
+        }
         let written = self.write(&set, complete, &misses)?;
         if let Some(partial) = partial.filter(|_| complete) {
             partial.remove()?;

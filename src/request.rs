@@ -28,7 +28,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::error::{Error, Result};
 use crate::file;
-use crate::units::{Acceleration, Angle, Density, Force, Length, Mass, Memory, Time, Unit};
+use crate::units::{
+    Acceleration, Angle, Density, Force, Length, Mass, Memory, Pressure, Time, Unit,
+};
 
 pub use text::{Cone, EarlierWeights, Ground, InertiaMatrix, PoseError, Position, Region};
 pub use words::{Choice, Polish, Refiner, Separation, Side};
@@ -165,6 +167,10 @@ pub struct Scoring {
     pub pad_friction: Option<f64>,
     /// Safety factor: a grip holds where `mu_s` times this is at most the pads' friction.
     pub safety: f64,
+    /// Greatest pressure that does not mark the part, of the squeeze without a load on either face;
+    /// absent: any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_pressure: Option<Pressure>,
     /// Uncertainty of the part's position along the pads, for alpha.
     pub position_error: Length,
     /// Pad friction while closing, for alpha.
@@ -295,6 +301,7 @@ impl Default for Scoring {
             k2: 1.0,
             pad_friction: None,
             safety: 1.0,
+            max_pressure: None,
             position_error: Length(0.0),
             closing_friction: 0.0,
             separation: Separation::Solve,
@@ -424,6 +431,13 @@ impl Request {
         if !(safety.is_finite() && safety > 0.0) {
             return Err(Error::input("safety", format!("is {safety}"), "give a number above zero")
                 .with_options(&["safety"]));
+        }
+        if let Some(pressure) = self.scoring.max_pressure
+            && (pressure.0.is_nan() || pressure.0 <= 0.0)
+        {
+            let remedy = "give a pressure above zero, e.g. 2MPa";
+            return Err(Error::input("max_pressure", format!("is {pressure}"), remedy)
+                .with_options(&["max_pressure"]));
         }
         if let Some(inertia) = self.inertia {
             inertia.check()?;

@@ -263,6 +263,8 @@ quantities! {
     Acceleration, "g";
     /// A density [kg/m^3]; `2700kg/m3` as a text.
     Density, "kg/m3";
+    /// A pressure \[Pa\]; `2MPa` as a text.
+    Pressure, "MPa";
     /// A time \[s\]; `30s` as a text.
     Time, "s";
     /// A size in memory \[bytes\]; `2GB` as a text.

@@ -277,7 +277,7 @@ fn fill(entry: &mut Entry, set: &GripSet, health: Option<Value>, notes: &[String
         let counts = counts.map(|(reason, count)| format!("{count} {reason}"));
         let counts = counts.collect::<Vec<_>>().join(", ");
         entry.reason = Some(match (notes, counts.as_str()) {
-            ([], "") => "no two opposite planar faces".to_owned(),
+            ([], "") => "no two opposite faces".to_owned(),
             ([], counts) => format!("rejected: {counts}"),
             (notes, "") => notes.join("; "),
             (notes, counts) => format!("rejected: {counts}; {}", notes.join("; ")),

@@ -19,6 +19,6 @@ pub mod twist_out;
 pub use crate::request::{Refiner, Separation};
 pub use branch::COUPLING_SEARCH;
 pub(crate) use compare::{Comparison, Neighbour, below};
-pub use pads::{Load, Pads};
+pub use pads::{Load, Pads, squeeze_pressure};
 pub(crate) use solve::check;
 pub use solve::{Options, Search, Start, limit_states, refused, solve, solve_next, solve_pads};

@@ -4,7 +4,9 @@ use glam::{DVec2, DVec3};
 
 use crate::contact::{Loops, PlaneWrench, Twist, moments};
 use crate::geometry::hull::{convex_hull, support};
-use crate::model::{Contact, Pressure, Slip, Wrench};
+use crate::model::{Contact, Grip, Pressure, Slip, Wrench};
+
+use super::{curved, pressure};
 
 /// Both contact areas in units of `length`, about `origin`; all that a contact decides for every
 /// load on it. Both areas lie in the pads' plane and are pressed by the pads' tilt alone; an area on
@@ -73,6 +75,18 @@ impl Pads {
         }
     }
 
+    /// Greatest pressure on either face at a squeeze with `force` \[N\] and no load \[Pa\]; `None`
+    /// where the pads would turn the part.
+    pub fn greatest_pressure(&self, force: f64) -> Option<f64> {
+        let q = pressure::solve(self, [1.0; 2], DVec2::ZERO, None, &mut Loops::default())?;
+        let of = |k: usize| {
+            let [p0, p1, p2] = pressure::face_pressure(&q, k);
+            let points = self.areas[k].points().iter();
+            points.map(|x| p0 + p1 * x.x + p2 * x.y).fold(0.0, f64::max)
+        };
+        Some(of(0).max(of(1)) * force / (self.length * self.length))
+    }
+
     /// Pressure planes in SI about the grip origin from scaled coefficients `(a_i0, a_ii0, a1,
     /// a2)`.
     pub fn pressure(&self, q: [f64; 4], force: f64) -> Pressure {
@@ -100,6 +114,19 @@ impl Pads {
             u2: u2 + omega * self.origin.x,
             omega: omega * self.length,
         }
+    }
+}
+
+/// Greatest pressure on either face of a grip at a squeeze with `force` \[N\] and no load \[Pa\]: of
+/// rigid pads on planes, of the pads' layers on what is not plane. `None` without contact, or where
+/// the pads would turn the part.
+pub fn squeeze_pressure(grip: &Grip, force: f64) -> Option<f64> {
+    match &grip.surfaces {
+        Some(surfaces) => {
+            let faces = curved::Pads::new(surfaces).ok()?.squeezed(force)?;
+            Some(faces.iter().map(|face| face.greatest_pressure).fold(0.0, f64::max))
+        }
+        None => Pads::new(&grip.contact)?.greatest_pressure(force),
     }
 }
 

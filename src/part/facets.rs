@@ -16,6 +16,11 @@ const ARC: f64 = 0.01;
 /// is taken for a facet.
 const SMALL: f64 = 0.02;
 
+/// Angle between the halves of a plane that noise has folded \[rad\]: 0.1 degrees.
+const FOLD: f64 = 2e-3;
+/// Share of the flat area that is folded from which on a mesh is rough.
+const FOLDED: f64 = 0.01;
+
 /// A neighbour under a small angle.
 struct Smooth {
     region: usize,
@@ -128,10 +133,48 @@ impl Facets {
                 None => {}
             }
         }
+        let [convex, concave] = self.folds(part, regions, within);
+        if convex + concave > FOLDED * flat && convex.min(concave) > FOLDED / 10.0 * flat {
+            return true;
+        }
         // Measured: clean tessellations stay below 3.0e-3 in all or have nothing on one side;
         // corners moved at random by 1e-5 of the diagonal give 3.5e-3 to 4e-2. A wrong guess only
         // widens tolerances that are narrow either way.
         above + below > 3.2e-3 * flat && above.min(below) > 2e-4 * flat
+    }
+}
+
+impl Facets {
+    /// Area of flat regions of much the same size that `within` \[m\] would join, by the way in which
+    /// they are folded: a plane of two triangles whose corners lie off it falls into halves, which
+    /// no part has that bend both ways.
+    fn folds(&self, part: &Repaired, regions: &Regions, within: f64) -> [f64; 2] {
+        let mut folds = [0.0; 2];
+        for (index, region) in regions.all.iter().enumerate() {
+            if self.is_facet[index] {
+                continue;
+            }
+            for &Border { other, .. } in self.borders.of(index) {
+                let face = &regions.all[other as usize];
+                let is_pair = (region.area, index) < (face.area, other as usize)
+                    && face.area < 10.0 * region.area
+                    && !self.is_facet[other as usize]
+                    && region.plane.normal.angle_between(face.plane.normal) < FOLD;
+                if !is_pair {
+                    continue;
+                }
+                let heights = || {
+                    let triangles = regions.triangles(index).iter();
+                    triangles
+                        .flat_map(|&triangle| part.mesh.corners(triangle))
+                        .map(|corner| face.plane.normal.dot(corner) - face.plane.offset)
+                };
+                if heights().all(|height| height.abs() < within) {
+                    folds[usize::from(heights().sum::<f64>() > 0.0)] += region.area;
+                }
+            }
+        }
+        folds
     }
 }
 

@@ -97,7 +97,10 @@ impl Settings {
                 value: scoring.pad_friction.or(gripper.pad_friction),
                 safety: scoring.safety,
             },
-            limits: Limits::from(gripper),
+            limits: Limits {
+                pressure: scoring.max_pressure.map(|pressure| pressure.0),
+                ..Limits::from(gripper)
+            },
             score: ScoreOptions {
                 polish: Polish::Worst,
                 separation: scoring.separation,
@@ -164,7 +167,11 @@ impl Assessor<'_> {
     /// The limit of the gripper that a load exceeds in this grip, as rejections name it.
     pub(super) fn over(&self, grip: &Grip) -> Option<String> {
         let limits = &self.settings.limits;
-        if limits.is_empty() { None } else { limits.exceeded(&self.wrenches(grip)) }
+        if limits.is_empty() {
+            return None;
+        }
+        let exceeded = limits.exceeded(&self.wrenches(grip));
+        exceeded.or_else(|| limits.marks(grip, self.settings.force))
     }
 
     /// Scores every grip under its worst load, in order. The answers depend neither on the number

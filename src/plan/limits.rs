@@ -1,7 +1,9 @@
-//! What a gripper may carry whatever the friction of its pads: payload, and moments at the pads.
+//! What a gripper may carry whatever the friction of its pads: payload, and moments at the pads; and
+//! the pressure that a part may be held with.
 
 use crate::gripper::Gripper;
-use crate::model::{LoadCase, Wrench};
+use crate::mechanics::squeeze_pressure;
+use crate::model::{Grip, LoadCase, Wrench};
 use crate::units::STANDARD_GRAVITY;
 
 /// Loads may exceed a limit by this share: rounding.
@@ -14,6 +16,8 @@ pub struct Limits {
     pub force: Option<f64>,
     /// Largest moment of a load about the grip axes, at the pads [N m].
     pub moment: Option<[f64; 3]>,
+    /// Greatest pressure of the squeeze alone that does not mark the part \[Pa\].
+    pub pressure: Option<f64>,
 }
 
 impl From<&Gripper> for Limits {
@@ -21,6 +25,7 @@ impl From<&Gripper> for Limits {
         Self {
             force: gripper.payload.map(|payload| payload * STANDARD_GRAVITY),
             moment: gripper.moment,
+            pressure: None,
         }
     }
 }
@@ -45,6 +50,15 @@ impl Limits {
             wrenches.iter().any(|wrench| over(wrench.moment[axis].abs(), moment[axis]))
         })?;
         Some(format!("over_moment:x{}_{}_Nm", axis + 1, short(moment[axis])))
+    }
+
+    /// Whether a grip squeezed with `force` \[N\] presses harder than the part bears, named with the
+    /// limit: `over_pressure:2_MPa`.
+    pub fn marks(&self, grip: &Grip, force: f64) -> Option<String> {
+        let limit = self.pressure?;
+        let pressed = squeeze_pressure(grip, force)?;
+        (pressed > limit * (1.0 + ROUNDING))
+            .then(|| format!("over_pressure:{}_MPa", short(limit / 1e6)))
     }
 
     /// A warning where a load is over the payload, in any grip.
@@ -79,7 +93,11 @@ mod tests {
 
     #[test]
     fn a_load_over_a_limit_is_named_with_the_number() {
-        let limits = Limits { force: Some(5.0 * STANDARD_GRAVITY), moment: Some([5.0, 4.0, 3.0]) };
+        let limits = Limits {
+            force: Some(5.0 * STANDARD_GRAVITY),
+            moment: Some([5.0, 4.0, 3.0]),
+            pressure: None,
+        };
         let wrench = |force: f64, moment: [f64; 3]| Wrench {
             force: DVec3::new(0.0, -force, 0.0),
             moment: DVec3::from_array(moment),

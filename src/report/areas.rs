@@ -193,6 +193,12 @@ fn polynomial(gap: &Gap) -> [f64; 6] {
             let e = axis.normalize_or_zero();
             round(height, at, along(e.perp(), 1.0 / radius) + along(e, 1.0 / meridian))
         }
+        Gap::Cone { radius, slope, axis, at, height } => {
+            let e = axis.normalize_or_zero();
+            let (height, lean) = (height - slope * e.dot(at), slope * e);
+            let [c, g1, g2, h11, h12, h22] = round(height, at, along(e.perp(), 1.0 / radius));
+            [c, g1 + lean.x, g2 + lean.y, h11, h12, h22]
+        }
     }
 }
 
@@ -223,6 +229,7 @@ mod tests {
                     Gap::Barrel { radius, meridian, axis, at, height },
                     cylinder + along * along / (2.0 * meridian),
                 ),
+                (Gap::Cone { radius, slope: 0.07, axis, at, height }, cylinder + 0.07 * along),
             ] {
                 let [c, g1, g2, h11, h12, h22] = polynomial(&gap);
                 let bend = (h11 * x.x * x.x + 2.0 * h12 * x.x * x.y + h22 * x.y * x.y) / 2.0;

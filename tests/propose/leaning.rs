@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use glam::{DVec2, DVec3};
 use gripfast::gripper;
 use gripfast::load::wrench_in_grip;
+use gripfast::mechanics::curved::Pads;
 use gripfast::model::{LoadCase, Status, Wrench};
 use gripfast::part::{Part, Shape};
 use gripfast::plan::Plan;
@@ -228,9 +229,6 @@ fn a_bore_is_gripped_from_inside_about_its_axis() {
         let frame = ranked.grip.part_from_grip;
         assert!(ranked.grip.inside && (ranked.grip.width - 2.0 * radius).abs() < 1e-6);
         assert!(frame.origin.truncate().length() < 1e-7, "on the axis: {}", frame.origin);
-        if frame.origin.distance(centre) > 1e-6 {
-            continue;
-        }
         // The pads slide along and about the axis, each with half of the load at the bore's radius.
         let wrench = wrench_in_grip(&loads[2].wrench, centre, &frame);
         let mu = 7.0_f64.hypot(wrench.moment.length() / radius) / (2.0 * FORCE);
@@ -238,7 +236,7 @@ fn a_bore_is_gripped_from_inside_about_its_axis() {
         assert_eq!(ranked.worst.load, 2);
         // Both edges of the pads touch: N = 2 k L int (y^2 - c^2)/(2 R) dy from c to the edge.
         let faces = ranked.faces.unwrap();
-        let length = 0.02;
+        let length = 0.010 + (0.02 - frame.origin.z.abs()).min(0.010);
         let k = ranked.grip.surfaces.as_ref().unwrap().stiffness[0];
         let carried =
             |c: f64| k * length / radius * ((half.powi(3) - c.powi(3)) / 3.0 - c * c * (half - c));
@@ -252,7 +250,7 @@ fn a_bore_is_gripped_from_inside_about_its_axis() {
         assert!((faces[0].greatest_pressure / greatest - 1.0).abs() < 1e-6, "{faces:?}");
         checked += 1;
     }
-    assert!(checked >= 4, "{checked}");
+    assert!(checked > 10, "{checked}");
     // Too narrow for the pads.
     let narrow = lathe([0.02; 2], 0.04, 68, true);
     let gripper = gripper::find("generic").unwrap();
@@ -270,33 +268,39 @@ fn a_cone_needs_the_tangent_of_its_half_angle_and_more_to_be_turned() {
     let kinds: Vec<_> = part.curved.iter().map(|face| face.shape.name()).collect();
     assert_eq!(kinds, ["cone"]);
     let tangent = (radii[0] - radii[1]) / 0.05;
-    let moment = 0.04;
-    for (moment, loads) in [
-        (0.0, vec![load("none", DVec3::ZERO, DVec3::ZERO)]),
-        (moment, vec![load("about", DVec3::ZERO, DVec3::new(0.0, 0.0, moment))]),
-    ] {
-        let set = planned(part.clone(), "robotiq-2f85", loads, Side::Outside, (0.016, 90.0));
-        let found = curved(&set);
-        assert!(found.len() > 20, "{} {:?}", found.len(), set.summary.rejections);
-        let mut middle = 0;
-        for ranked in found {
-            let grip = &ranked.grip;
-            let r = 0.5 * grip.width;
-            let (place, rotation) = (grip.part_from_grip.origin, grip.part_from_grip.rotation);
-            // The widest place under the pads, or of the cone.
-            let pad = DVec2::new(0.0335, 0.02) / 2.0;
-            let reach = pad.x * rotation.x_axis.z.abs() + pad.y * rotation.y_axis.z.abs();
-            let z = (place.z - reach).max(-0.025);
-            let widest = radii[0] - tangent * (z + 0.025);
-            assert!((r - widest).abs() < 2e-7, "{r} {widest} at {place}");
-            if place.truncate().length() > 1e-7 {
-                continue;
-            }
-            let mu = tangent.hypot(moment / (2.0 * FORCE * r));
-            let found = ranked.worst.mu_s.unwrap();
-            assert!((found / mu - 1.0).abs() < 2e-5, "{found} {mu} {:?}", ranked.worst);
-            middle += 1;
+    let gripper = gripper::find("robotiq-2f85").unwrap();
+    let options = ProposeOptions::default()
+        .with_curved(Some(true))
+        .with_spacing(Some(0.008))
+        .with_angle_step(std::f64::consts::FRAC_PI_2)
+        .with_force(Some(FORCE));
+    let proposer = Proposer::new(&part, &gripper, &options).unwrap();
+    let grips: Vec<_> = proposer.flat_map(|chunk| chunk.grips).collect();
+    let found: Vec<_> = grips.iter().filter(|grip| grip.surfaces.is_some()).collect();
+    assert!(found.len() > 20, "{}", found.len());
+    let mut middle = 0;
+    for grip in found {
+        let r = 0.5 * grip.width;
+        let (place, rotation) = (grip.part_from_grip.origin, grip.part_from_grip.rotation);
+        // The widest place under the pads, or of the cone.
+        let pad = DVec2::new(0.0335, 0.02) / 2.0;
+        let reach = pad.x * rotation.x_axis.z.abs() + pad.y * rotation.y_axis.z.abs();
+        let z = (place.z - reach).max(-0.025);
+        let widest = radii[0] - tangent * (z + 0.025);
+        assert!((r - widest).abs() < 2e-7, "{r} {widest} at {place}");
+        if place.truncate().length() > 1e-7 {
+            continue;
         }
-        assert!(middle > 5, "{middle}");
+        let pads = Pads::new(grip.surfaces.as_ref().unwrap()).unwrap();
+        for moment in [0.0, 0.04] {
+            let wrench = Wrench { force: DVec3::ZERO, moment: DVec3::Z * moment };
+            let wrench = wrench_in_grip(&wrench, DVec3::ZERO, &grip.part_from_grip);
+            let score = pads.solve(grip.distance(), FORCE, &wrench).score;
+            let mu = tangent.hypot(moment / (2.0 * FORCE * r));
+            assert_eq!(score.status, Status::Ok);
+            assert!((score.mu_s.unwrap() / mu - 1.0).abs() < 2e-5, "{score:?} {mu}");
+        }
+        middle += 1;
     }
+    assert!(middle > 5, "{middle}");
 }

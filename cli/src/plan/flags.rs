@@ -8,7 +8,9 @@ use gripfast::request::{
     Choice, Cone, EarlierWeights, Ground, InertiaMatrix, Polish, PoseError, Position, Refiner,
     Region, Request, Separation, Side,
 };
-use gripfast::units::{Acceleration, Angle, Density, Force, Length, Mass, Memory, Time, Unit};
+use gripfast::units::{
+    Acceleration, Angle, Density, Force, Length, Mass, Memory, Pressure, Time, Unit,
+};
 use serde_json::{Map, Value};
 
 use super::several::{self, Variant};
@@ -196,6 +198,11 @@ struct ScoringArgs {
     /// Safety factor: a grip holds where mu_s times this is at most the pads' friction.
     #[arg(long, value_name = "FACTOR")]
     safety: Option<f64>,
+    /// Greatest pressure that does not mark the part, e.g. 2MPa: grips whose squeeze alone, without
+    /// a load, presses harder anywhere on either face are rejected. On plane faces it is that of
+    /// rigid pads, on curved and drafted ones that of the pads' layers.
+    #[arg(long, value_name = "PRESSURE")]
+    max_pressure: Option<Pressure>,
     /// Uncertainty of the part's position along the pads, for alpha.
     #[arg(long, value_name = "LENGTH")]
     position_error: Option<Length>,
@@ -405,8 +412,8 @@ impl JobArgs {
         }
         let (flags, group) = (self.scoring, &mut request.scoring);
         give!(flags => group;
-            backend, adapter, seeds, k1, k2, safety, position_error, closing_friction,
-            separation, polish, refiner, threads);
+            backend, adapter, seeds, k1, k2, safety, max_pressure, position_error,
+            closing_friction, separation, polish, refiner, threads);
         if let [friction] = flags.pad_friction[..] {
             group.pad_friction = Some(friction);
         }
@@ -473,7 +480,7 @@ mod tests {
         --keep-out 0mm,0mm,0mm:1mm,1mm,1mm --scene cell.toml --faces 0,2 --faces-in 0mm,0mm,0mm:1mm,1mm,1mm \
         --grips both --flips --opening 4mm --min-opening 1mm --clearance 1mm \
         --approach-distance 80mm --backend cpu --adapter 0 --seeds 200 --k1 2 --k2 3 \
-        --pad-friction 0.7 --safety 2 --com 1mm,2mm,3mm \
+        --pad-friction 0.7 --safety 2 --max-pressure 2MPa --com 1mm,2mm,3mm \
         --inertia 3gmm2,3gmm2,3gmm2,0gmm2,0gmm2,0gmm2 --ids 3,17 --position-error 1mm --closing-friction 0.1 --separation discard \
         --polish all --refiner shanno --threads 2 --top 3 --diverse --merge-symmetric --keep 77 \
         -o out.json --report out.html --json -q --yes --resume --checkpoint 9s --pose-noise 1mm,2deg \

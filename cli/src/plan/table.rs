@@ -4,9 +4,11 @@ use std::io::Write;
 
 use comfy_table::Table;
 use glam::DVec3;
+use gripfast::geometry::patch_area;
 use gripfast::gripper::Gripper;
 use gripfast::lab::compare::places_by_score;
-use gripfast::model::{Slip, Status};
+use gripfast::mechanics::squeeze_pressure;
+use gripfast::model::{Contact, Slip, Status};
 use gripfast::plan::OUTRANKED;
 use gripfast::results::{Comparison, EarlierScore, ForceRange, GripSet, RankedGrip};
 
@@ -26,7 +28,7 @@ pub(super) fn print(
         if set.summary.pairs == 0 {
             writeln!(
                 out,
-                "no two opposite planar faces lie within the stroke of {:.1} to {:.1} mm",
+                "no two opposite faces lie within the stroke of {:.1} to {:.1} mm",
                 gripper.stroke[0] * 1e3,
                 gripper.stroke[1] * 1e3
             )?;
@@ -77,6 +79,14 @@ fn legend(
             "safety, force needed: not known without the friction of the pads (--pad-friction)."
                 .to_owned(),
         ),
+    }
+    let limited = set.provenance.request.scoring.max_pressure.is_some();
+    if limited || shown.iter().any(|grip| grip.grip.surfaces.is_some()) {
+        texts.push(
+            "contact: pressed area of the face where it is smaller, MPa: greatest pressure, both of \
+             the squeeze without a load."
+                .to_owned(),
+        );
     }
     if shown.iter().any(|grip| !grip.merged.is_empty()) {
         texts.push(
@@ -207,6 +217,20 @@ fn columns<'a>(set: &'a GripSet, shown: &[&RankedGrip], gripper: &'a Gripper) ->
         columns.push(words("verdict", 0, |grip| set.verdict(grip).name().to_owned()));
     }
     columns.extend(measures(set, gripper));
+    let limited = set.provenance.request.scoring.max_pressure.is_some();
+    if limited || shown.iter().any(|grip| grip.grip.surfaces.is_some()) {
+        let force = set.provenance.resolved.force.0;
+        columns.extend([
+            number("contact mm2", 2, |grip| {
+                let Contact { face_i, face_ii } = &*grip.grip.contact;
+                significant(patch_area(face_i).min(patch_area(face_ii)) * 1e6)
+            }),
+            number("MPa", 1, move |grip| {
+                let pressure = squeeze_pressure(&grip.grip, force);
+                pressure.map_or_else(|| "-".into(), |pressure| significant(pressure / 1e6))
+            }),
+        ]);
+    }
     columns.extend([
         number("width mm", 2, |grip| {
             let side = if grip.grip.inside { "inside " } else { "" };
