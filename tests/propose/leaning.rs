@@ -4,16 +4,18 @@ use std::f64::consts::TAU;
 use std::sync::atomic::AtomicBool;
 
 use glam::{DVec2, DVec3};
+use gripfast::geometry::patch_area;
 use gripfast::gripper;
 use gripfast::load::wrench_in_grip;
 use gripfast::mechanics::curved::Pads;
+use gripfast::mechanics::squeeze_pressure;
 use gripfast::model::{LoadCase, Status, Wrench};
 use gripfast::part::{Part, Shape};
-use gripfast::plan::Plan;
+use gripfast::plan::{Observer, Plan};
 use gripfast::propose::{ProposeOptions, Proposer};
 use gripfast::request::{Choice, Request, Side};
 use gripfast::results::{GripSet, RankedGrip};
-use gripfast::units::{Angle, Force, Length, Mass};
+use gripfast::units::{Angle, Force, Length, Mass, Pressure};
 
 const FORCE: f64 = 60.0;
 
@@ -251,6 +253,11 @@ fn a_bore_is_gripped_from_inside_about_its_axis() {
         checked += 1;
     }
     assert!(checked > 10, "{checked}");
+    // Nothing but the wall counts, though the block's own sides lie beyond the pads.
+    let surfaces = set.grips.iter().filter_map(|ranked| ranked.grip.surfaces.as_ref());
+    assert!(surfaces.flat_map(|one| one.face_i.iter().chain(&one.face_ii)).all(|piece| {
+        matches!(piece.gap, gripfast::model::Gap::Cylinder { radius, .. } if radius < 0.0)
+    }));
     // Too narrow for the pads.
     let narrow = lathe([0.02; 2], 0.04, 68, true);
     let gripper = gripper::find("generic").unwrap();
@@ -303,4 +310,95 @@ fn a_cone_needs_the_tangent_of_its_half_angle_and_more_to_be_turned() {
         middle += 1;
     }
     assert!(middle > 5, "{middle}");
+}
+
+#[test]
+fn grips_that_mark_the_part_are_rejected_and_counted() {
+    let none = || vec![load("none", DVec3::ZERO, DVec3::ZERO)];
+    // A plane block: the squeeze over the area, which for the whole pad is the least.
+    let block = wedge([0.0; 2]);
+    let least = FORCE / (0.020 * 0.020);
+    let run = |part: &Part, gripper: &str, limit: Option<f64>| {
+        let mut request = Request::new("", gripper);
+        request.mass = Some(Mass(0.2));
+        request.force = Some(Force(FORCE));
+        request.candidates.spacing = Some(Length(0.006));
+        request.candidates.curved = Some(true);
+        request.candidates.angle_step = Angle(90_f64.to_radians());
+        request.scoring.backend = Choice::Cpu;
+        request.scoring.max_pressure = limit.map(Pressure);
+        let plan = Plan::builder(request).part(part.clone()).loads(none()).build().unwrap();
+        plan.run(&mut (), &AtomicBool::new(false)).unwrap().set
+    };
+    let all = run(&block, "generic", None);
+    let some = run(&block, "generic", Some(1.5 * least));
+    let pressure = |ranked: &RankedGrip| {
+        let contact = &ranked.grip.contact;
+        FORCE / patch_area(&contact.face_i).min(patch_area(&contact.face_ii))
+    };
+    let wanted = all.grips.iter().filter(|ranked| pressure(ranked) <= 1.5 * least).count();
+    assert!(wanted > 10 && wanted < all.grips.len(), "{wanted} of {}", all.grips.len());
+    assert_eq!(some.grips.len(), wanted);
+    assert_eq!(
+        some.summary.rejections["over_pressure:0.225_MPa"] as usize,
+        all.grips.len() - wanted
+    );
+    // A wedge pressed over a strip at its thick end: u = sqrt(2 F s/(k W)).
+    let slope = 2_f64.to_radians();
+    let wedge = wedge([slope; 2]);
+    let steep = run(&wedge, "robotiq-2f85", None);
+    let k = curved(&steep)[0].grip.surfaces.as_ref().unwrap().stiffness[0];
+    let strip = |width: f64| (2.0 * FORCE * slope.tan() * k / width).sqrt();
+    let limit = 0.5 * (strip(0.020) + strip(0.0335));
+    let left = run(&wedge, "robotiq-2f85", Some(limit));
+    let width = |ranked: &RankedGrip| {
+        let faces = ranked.faces.unwrap();
+        faces[0].extent[1][0] - faces[0].extent[0][0]
+    };
+    assert!(!curved(&left).is_empty() && curved(&left).len() < curved(&steep).len());
+    for ranked in curved(&left) {
+        let pressure = squeeze_pressure(&ranked.grip, FORCE).unwrap();
+        assert!(pressure <= limit * (1.0 + 1e-9), "{pressure} {limit}");
+        // All that are left lie with the pads' long side along the rows.
+        let along = ranked.grip.part_from_grip.rotation.x_axis.x.abs();
+        assert!(along > 0.99 && width(ranked) > 0.0, "{along}");
+    }
+    for ranked in curved(&steep) {
+        let pressure = squeeze_pressure(&ranked.grip, FORCE).unwrap();
+        let whole = [0.020, 0.0335].iter().any(|w| (pressure / strip(*w) - 1.0).abs() < 1e-9);
+        assert!(whole || pressure > strip(0.0335), "{pressure}");
+    }
+}
+
+/// Notes of a run.
+#[derive(Default)]
+struct Heard(Vec<String>);
+
+impl Observer for Heard {
+    fn note(&mut self, text: &str) {
+        self.0.push(text.to_owned());
+    }
+}
+
+#[test]
+fn no_grip_is_told_in_words_of_the_part() {
+    let told = |part: Part, gripper: &str| {
+        let mut request = Request::new("", gripper);
+        request.mass = Some(Mass(0.2));
+        request.candidates.spacing = Some(Length(0.02));
+        request.candidates.angle_step = Angle(90_f64.to_radians());
+        request.scoring.backend = Choice::Cpu;
+        let plan = Plan::builder(request).part(part).build().unwrap();
+        let mut heard = Heard::default();
+        let set = plan.run(&mut heard, &AtomicBool::new(false)).unwrap().set;
+        assert!(set.grips.is_empty(), "{}", set.grips.len());
+        heard.0.join("\n")
+    };
+    // 120 mm thick, 250 mm long.
+    let thick = told(lathe([0.06; 2], 0.25, 68, false), "robotiq-2f85");
+    let barrel = "barrel 120 mm x 250 mm (face 2): the stroke of Robotiq 2F-85 ends at 85 mm; \
+                  robotiq-2f140 of the catalogue reaches it";
+    assert!(thick.contains(barrel), "{thick}");
+    assert!(thick.contains("turned is 250 mm wide between opposite faces"), "{thick}");
+    assert!(thick.contains("no gripper of the catalogue reaches it"), "{thick}");
 }

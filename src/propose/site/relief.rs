@@ -206,6 +206,8 @@ pub(super) struct Surveyor<'a> {
     pub(super) side: f64,
     /// Largest gap that counts \[m\].
     pub(super) reach: f64,
+    /// How far above the pad's plane what counts may rise \[m\]: more is on the pad's other side.
+    pub(super) above: f64,
     /// Where pads get to.
     pub(super) region: Bounds2,
 }
@@ -226,6 +228,7 @@ impl Surveyor<'_> {
         for triangle in facets {
             self.facet(triangle, &mut pieces);
         }
+        pieces.retain(|piece| largest(piece) > -self.above);
         pieces
     }
 
@@ -393,6 +396,20 @@ impl Surveyor<'_> {
         for Polygon { outer, holes } in intersect_convex(window, &even_odd(&rings)) {
             pieces.push(Piece { outer, holes, gap });
         }
+    }
+}
+
+/// Largest gap of a plane piece, of others the one at the crest \[m\].
+fn largest(piece: &Piece) -> f64 {
+    match piece.gap {
+        Gap::Plane { height, slope } => {
+            let gaps = piece.outer.iter().map(|x| height + slope.dot(*x));
+            gaps.fold(f64::NEG_INFINITY, f64::max)
+        }
+        Gap::Cylinder { height, .. }
+        | Gap::Sphere { height, .. }
+        | Gap::Barrel { height, .. }
+        | Gap::Cone { height, .. } => height,
     }
 }
 

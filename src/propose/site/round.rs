@@ -326,6 +326,7 @@ impl Finder<'_> {
                 height: heights[side],
                 side: [1.0, -1.0][side],
                 reach: layer.reach(),
+                above: layer.reach(),
                 region,
             };
             surveyor.pieces()

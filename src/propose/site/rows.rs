@@ -503,6 +503,7 @@ impl Finder<'_> {
                 height: heights[side],
                 side: [1.0, -1.0][side],
                 reach: layer.reach() + sag,
+                above: layer.reach() + sag + 4.0 * reach * taper.slope,
                 region: Bounds2::of(&around),
             };
             surveyor.pieces()
