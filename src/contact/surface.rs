@@ -52,6 +52,26 @@ pub(crate) struct Field {
     pub(crate) gap: Quadratic,
 }
 
+/// Extent of a polygon over the radius up to which it is plane: it rises by 13 um over a metre.
+const NEARLY_PLANE: f64 = 1e-4;
+
+/// The gap without the curvatures that do not show over the polygon. A tilt rolls a curve on its pad
+/// and presses a plane: a radius that only rounding tells from none must not decide.
+fn flattened(mut gap: Quadratic, rings: &[Ring]) -> Quadratic {
+    for axis in 0..2 {
+        let places = || rings.iter().flatten().map(|x| x[axis]);
+        let low = places().fold(f64::INFINITY, f64::min);
+        let high = places().fold(f64::NEG_INFINITY, f64::max);
+        let (bend, middle) = (gap.l[axis], 0.5 * (low + high));
+        if bend != 0.0 && (bend * (high - low)).abs() < NEARLY_PLANE {
+            gap.c -= 0.5 * bend * middle * middle;
+            gap.g[axis] += bend * middle;
+            gap.l[axis] = 0.0;
+        }
+    }
+    gap
+}
+
 impl Field {
     pub(crate) fn new(piece: &Piece) -> Self {
         let middle = piece.outer.iter().sum::<DVec2>() / piece.outer.len().max(1) as f64;
@@ -105,6 +125,7 @@ impl Field {
             }
             rings.push(local);
         }
+        let gap = flattened(gap, &rings);
         Self { origin, axis, rings, gap }
     }
 

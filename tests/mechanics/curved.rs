@@ -225,6 +225,32 @@ fn a_wedge_needs_the_tangent_of_its_half_angle() {
     close(got.score.mu_s.unwrap(), 0.02, 1e-11, &got);
 }
 
+/// A radius that only rounding tells from none is none, on either face and wherever its crest lies.
+#[test]
+fn what_is_nearly_plane_is_plane() {
+    let on = |gap: Gap| vec![rectangle([-0.01, -0.008], [0.01, 0.008], gap)];
+    let wrench = Wrench { force: DVec3::new(5.0, 3.0, 2.0), moment: DVec3::new(0.05, 0.02, 0.03) };
+    let mu = |face_i: Gap, face_ii: Gap| {
+        let (face_i, face_ii) = (on(face_i), on(face_ii));
+        let surfaces = Surfaces { face_i, face_ii, stiffness: [5e9; 2], layer: None };
+        solve(&surfaces, 0.02, 60.0, &wrench).unwrap().score.mu_s.unwrap()
+    };
+    let plane = mu(Gap::default(), Gap::default());
+    for radius in [1e3, 1e6, 1e9, 1e12, -1e4] {
+        let (axis, height) = (DVec2::X, 0.0);
+        let cylinder = Gap::Cylinder { radius, axis, at: DVec2::ZERO, height };
+        let sphere = Gap::Sphere { radius, at: DVec2::ZERO, height };
+        for (one, two) in [(cylinder, cylinder), (cylinder, Gap::default()), (sphere, sphere)] {
+            close(mu(one, two), plane, 1e-12, &(one, two));
+        }
+        // Far from its crest it leans.
+        let at = DVec2::new(0.0, 1e-3 * radius);
+        let leans = Gap::Plane { height: 0.5e-6 * radius, slope: DVec2::new(0.0, -1e-3) };
+        let aside = Gap::Cylinder { radius, axis, at, height };
+        close(mu(aside, cylinder), mu(leans, Gap::default()), 1e-6, &aside);
+    }
+}
+
 /// Planes: the planar solver's answers, also separated.
 #[test]
 fn the_flat_limit_is_the_planar_solver() {
