@@ -267,7 +267,8 @@ impl Plan {
             observer.note(&remark);
         }
         let curved = self.part.curved.iter().filter(|face| face.outside && face.reachable).count();
-        if self.propose.curved.is_none() && !proposer.tries_curved() && curved > 0 {
+        let plane_only = proposer.tally().pairs > 0 && !proposer.tries_curved();
+        if self.propose.curved.is_none() && plane_only && curved > 0 {
             observer.note(&format!(
                 "the part has {curved} curved faces that pads can close on: they are tried when the \
                  option curved is set, which takes long with many loads"

@@ -8,6 +8,8 @@ use crate::propose::{ProposeOptions, Tally};
 
 /// Round faces that are spoken of, the largest ones.
 const MOST_ROUND: usize = 3;
+/// Widths that differ by less are one \[m\].
+const SAME_WIDTH: f64 = 1e-5;
 /// An arc that covers less has no two sides opposite each other \[rad\].
 const HALF_TURN: f64 = 3.1;
 
@@ -20,16 +22,21 @@ pub(super) fn causes(
     rejections: &BTreeMap<String, u64>,
 ) -> Vec<String> {
     let mut causes = Vec::new();
-    let reach = |width: f64| within(width, gripper).err();
+    let round = || part.curved.iter().filter(|face| face.outside && face.reachable);
+    // Round faces speak for themselves.
+    let of_round = |width: f64| {
+        let mut own = round().filter_map(describe);
+        own.any(|(_, across)| (across - width).abs() < SAME_WIDTH)
+    };
+    let beyond = |&width: &f64| Some((width, within(width, gripper).err()?));
+    let mut widths = tally.widths_outside.iter().filter(|width| !of_round(**width));
     if tally.pairs == 0
         && options.outside
-        && let Some((width, why)) =
-            tally.widths_outside.iter().find_map(|&width| Some((width, reach(width)?)))
+        && let Some((width, why)) = widths.find_map(beyond)
     {
         causes.push(format!("{} is {} wide between opposite faces: {why}", part.name, mm(width)));
     }
-    let round = part.curved.iter().filter(|face| face.outside && face.reachable);
-    for face in round.take(MOST_ROUND).filter(|_| options.outside) {
+    for face in round().take(MOST_ROUND).filter(|_| options.outside) {
         let Some((name, across)) = describe(face) else { continue };
         let turn = match face.shape {
             Shape::Cylinder { turn, .. } => turn,
