@@ -76,7 +76,9 @@ fn within(width: f64, gripper: &Gripper) -> Result<(), String> {
         .map(|(name, _)| *name)
         .filter(|name| {
             gripper::find(name).is_ok_and(|other| {
-                other.name != gripper.name && (other.stroke[0]..=other.stroke[1]).contains(&width)
+                other.name != gripper.name
+                    && *name != "generic"
+                    && (other.stroke[0]..=other.stroke[1]).contains(&width)
             })
         })
         .collect();
