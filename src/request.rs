@@ -98,7 +98,7 @@ pub struct Candidates {
     /// Approach along and across the edges of the gripped faces as well.
     pub edge_angles: bool,
     /// Close on curved faces from outside; absent: only where no two plane faces lie within the
-    /// stroke, because every load of such a grip is solved, which takes long.
+    /// stroke, because such a grip takes several times as long as one between planes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub curved: Option<bool>,
     /// Smallest contact area on either face, as a share of the most that a pad can touch there: the

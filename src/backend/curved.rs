@@ -1,12 +1,12 @@
-//! Grips on what is not plane: on the processor, every load solved to the end.
+//! Grips on what is not plane: on the processor, the loads that can be the worst solved to the end.
 //!
-//! The seed stage knows the twists of planes only. The slip problem of a round part has up to five
-//! dimensions, and its answer is mostly at a crease that is tested first.
+//! The seed stage knows the twists of planes only. Here a load begins at the state of another one
+//! ([`Screen`]), and those that stay below the worst are left before their solution.
 
 use rayon::prelude::*;
 
 use super::score::{Scored, TIE, usable};
-use crate::mechanics::curved::Pads;
+use crate::mechanics::curved::{Compared, Pads, Screen};
 use crate::mechanics::refused;
 use crate::model::{Score, Status, Wrench};
 use crate::request::Polish;
@@ -27,36 +27,134 @@ pub struct CurvedProblem<'a> {
 /// The worst load of each grip, in order; under [`Polish::All`] all of them. The answers do not
 /// depend on the number of threads.
 pub fn score_curved(problems: &[CurvedProblem<'_>], polish: Polish) -> Vec<Scored> {
-    problems.par_iter().map(|problem| problem.score(polish)).collect()
+    problems
+        .par_iter()
+        .map(|problem| match polish {
+            Polish::All => problem.score_all(),
+            _ => problem.screened().unwrap_or_else(|| problem.score()),
+        })
+        .collect()
+}
+
+/// Loads looked at so far.
+#[derive(Default)]
+struct Seen {
+    /// Held, with their `mu_s` but for rounding.
+    near: Vec<(usize, f64)>,
+    /// Solved.
+    solved: Vec<(usize, Score)>,
+    compared: usize,
 }
 
 impl CurvedProblem<'_> {
-    fn score(&self, polish: Polish) -> Scored {
-        let mut all = Vec::with_capacity(self.wrenches.len());
-        let mut worst: Option<(usize, Score)> = None;
-        for (load, wrench) in self.wrenches.iter().enumerate() {
-            let score = match self.pads {
-                Some(pads) => pads.solve(self.distance, self.force, wrench).score,
-                None => refused(Status::NoContact, 0),
-            };
-            all.push(score);
-            // A load that is not held is the worst; else the first of the largest.
-            let worse = match (worst.map(|(_, known)| usable(&known)), usable(&score)) {
-                (None, _) | (Some(Some(_)), None) => true,
-                (Some(None), _) => false,
-                (Some(Some(known)), Some(mu)) => mu > known * (1.0 + TIE),
-            };
-            if worse {
-                worst = Some((load, score));
+    fn solve(&self, load: usize) -> Score {
+        match self.pads {
+            Some(pads) => pads.solve(self.distance, self.force, &self.wrenches[load]).score,
+            None => refused(Status::NoContact, 0),
+        }
+    }
+
+    fn score_all(&self) -> Scored {
+        let all: Vec<Score> = (0..self.wrenches.len())
+            .into_par_iter()
+            .with_min_len(8)
+            .map(|load| self.solve(load))
+            .collect();
+        let worst = worst(all.iter().copied().enumerate());
+        Scored { worst, solved: all.len(), all, compared: 0, outranked: false }
+    }
+
+    /// Every load solved, up to the first that is not held.
+    fn score(&self) -> Scored {
+        let mut solved = 0;
+        let scores = (0..self.wrenches.len()).map(|load| {
+            solved += 1;
+            (load, self.solve(load))
+        });
+        let worst = worst(scores);
+        Scored { worst, all: Vec::new(), solved, compared: 0, outranked: false }
+    }
+
+    /// The same answer from fewer solutions; `None` where loads cannot be compared.
+    fn screened(&self) -> Option<Scored> {
+        let mut screen = self.pads?.screen(self.distance, self.force, self.wrenches)?;
+        let estimates: Vec<f64> =
+            self.wrenches.iter().map(|wrench| screen.estimate(wrench)).collect();
+        let mut order: Vec<usize> = (0..self.wrenches.len()).collect();
+        order.sort_by(|&a, &b| estimates[b].total_cmp(&estimates[a]).then(a.cmp(&b)));
+        let (mut seen, mut largest) = (Seen::default(), 0.0);
+        for (place, &load) in order.iter().enumerate() {
+            match self.held(&mut screen, load, largest * (1.0 - 2.0 * TIE), &mut seen) {
+                Some(mu) => largest = f64::max(largest, mu),
+                None => return Some(self.first_refused(&mut screen, &order[place..], seen)),
             }
-            if polish != Polish::All && usable(&score).is_none() {
+        }
+        // The first of those that tie is the answer.
+        seen.near.retain(|&(_, mu)| mu >= largest * (1.0 - 2.0 * TIE));
+        seen.near.sort_by_key(|&(load, _)| load);
+        for (load, mu) in std::mem::take(&mut seen.near) {
+            let score = self.solve(load);
+            seen.solved.push((load, score));
+            let found = usable(&score)?;
+            if (found - mu).abs() > TIE * mu {
+                return None;
+            }
+            if found >= largest * (1.0 - TIE) {
                 break;
             }
         }
-        let solved = all.len();
-        if polish != Polish::All {
-            all.clear();
-        }
-        Scored { worst, all, solved, compared: 0, outranked: false }
+        seen.solved.sort_by_key(|&(load, _)| load);
+        let Seen { solved, compared, .. } = seen;
+        let worst = worst(solved.iter().copied());
+        Some(Scored { worst, all: Vec::new(), solved: solved.len(), compared, outranked: false })
     }
+
+    /// At least the `mu_s` of a load that is held, or no more than `value`.
+    fn held(
+        &self,
+        screen: &mut Screen<'_>,
+        load: usize,
+        value: f64,
+        seen: &mut Seen,
+    ) -> Option<f64> {
+        seen.compared += 1;
+        match screen.compare(&self.wrenches[load], value) {
+            Compared::Below => Some(0.0),
+            Compared::At(mu) => {
+                seen.near.push((load, mu));
+                Some(mu)
+            }
+            Compared::Open => {
+                seen.compared -= 1;
+                let score = self.solve(load);
+                seen.solved.push((load, score));
+                usable(&score)
+            }
+        }
+    }
+
+    /// The answer where the first load of `rest` is not held: it, or one before it by number.
+    fn first_refused(&self, screen: &mut Screen<'_>, rest: &[usize], mut seen: Seen) -> Scored {
+        let mut open: Vec<usize> = rest[1..].iter().copied().filter(|&x| x < rest[0]).collect();
+        open.sort_unstable();
+        open.into_iter().find(|&load| self.held(screen, load, 0.0, &mut seen).is_none());
+        let worst = seen.solved.last().copied();
+        let Seen { solved, compared, .. } = seen;
+        let refused = solved.iter().filter(|(_, score)| usable(score).is_none());
+        let worst = refused.min_by_key(|(load, _)| *load).copied().or(worst);
+        Scored { worst, all: Vec::new(), solved: solved.len(), compared, outranked: false }
+    }
+}
+
+/// Of loads by rising number: the first that is not held, else the first of the largest `mu_s`.
+fn worst(scores: impl Iterator<Item = (usize, Score)>) -> Option<(usize, Score)> {
+    let mut worst: Option<(usize, Score)> = None;
+    for (load, score) in scores {
+        let Some(mu) = usable(&score) else { return Some((load, score)) };
+        let known = worst.as_ref().and_then(|(_, known)| usable(known));
+        if known.is_none_or(|known| mu > known * (1.0 + TIE)) {
+            worst = Some((load, score));
+        }
+    }
+    worst
 }

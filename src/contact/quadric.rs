@@ -34,6 +34,9 @@ const LINE: f64 = 1e-8;
 /// Gauss points on panels that are at most this long over their distance from the slip centre, with
 /// the same error.
 const FEWER: [(f64, usize); 2] = [(0.2, 6), (0.4, 8)];
+/// Turn over the shift, on the area, up to which a motion counts as a shift and a first correction:
+/// the error is of the order of the square.
+const SHIFT: f64 = 1e-8;
 /// Turn of an arc's tangent up to which it is one element \[rad\].
 const TURN: f64 = 0.4;
 
@@ -79,7 +82,19 @@ impl Quadratic {
 struct Element {
     a: DVec2,
     b: DVec2,
-    arc: bool,
+    arc: Option<Arc>,
+}
+
+/// What an arc keeps of its chord.
+#[derive(Debug, Clone, Copy)]
+struct Arc {
+    /// Unit vector across the chord.
+    normal: DVec2,
+    /// Bends of the quadratic along and across it.
+    bend: f64,
+    curve: f64,
+    /// Slope across the chord at its start, and its change along it.
+    slope: [f64; 2],
 }
 
 /// An area in its surface's own axes, with the quadratic that is positive in it.
@@ -100,6 +115,20 @@ pub struct Dissipation {
     pub gradient: [f64; 3],
     /// Second derivatives, symmetric.
     pub hessian: [[f64; 3]; 3],
+}
+
+impl Dissipation {
+    /// The same after a small change of the twist.
+    fn turned(&mut self, by: [f64; 3]) {
+        for i in 0..3 {
+            let bent: f64 = (0..3).map(|j| self.hessian[i][j] * by[j]).sum();
+            self.value += (self.gradient[i] + 0.5 * bent) * by[i];
+        }
+        let bent = self.hessian.map(|row| (0..3).map(|j| row[j] * by[j]).sum::<f64>());
+        for (gradient, bent) in self.gradient.iter_mut().zip(bent) {
+            *gradient += bent;
+        }
+    }
 }
 
 impl Region {
@@ -219,6 +248,16 @@ impl Region {
 
     fn push(&mut self, a: DVec2, b: DVec2, arc: bool) {
         if a != b {
+            let step = b - a;
+            let arc = arc.then(|| {
+                let (l, normal) = (self.u.l, step.perp() / step.length());
+                Arc {
+                    normal,
+                    bend: 0.5 * l.dot(step * step),
+                    curve: 0.5 * l.dot(normal * normal),
+                    slope: [self.u.slope(a).dot(normal), (l * step).dot(normal)],
+                }
+            });
             self.elements.push(Element { a, b, arc });
         }
     }
@@ -226,32 +265,29 @@ impl Region {
     /// An arc in pieces that turn little.
     fn push_arc(&mut self, a: DVec2, b: DVec2, depth: u32) {
         let (one, two) = (self.u.slope(a), self.u.slope(b));
-        let element = Element { a, b, arc: true };
-        if depth < 12 && one.angle_to(two).abs() > TURN {
+        self.push(a, b, true);
+        if depth < 12
+            && one.angle_to(two).abs() > TURN
+            && let Some(element) = self.elements.pop_if(|element| (element.a, element.b) == (a, b))
+        {
             let (middle, _) = self.at(&element, 0.5);
             self.push_arc(a, middle, depth + 1);
             self.push_arc(middle, b, depth + 1);
-        } else {
-            self.push(a, b, true);
         }
     }
 
     /// The point of an element at `t` of its chord, and its derivative. The arc stands off the
     /// chord by the smaller root of a quadratic whose constant term is exact: it is zero at both
     /// ends.
+    #[inline(always)]
     fn at(&self, element: &Element, t: f64) -> (DVec2, DVec2) {
-        let Element { a, b, arc } = *element;
-        let step = b - a;
-        let on_chord = a + t * step;
-        if !arc {
+        let step = element.b - element.a;
+        let on_chord = element.a + t * step;
+        let Some(Arc { normal, bend, curve, slope }) = element.arc else {
             return (on_chord, step);
-        }
-        let l = self.u.l;
-        let normal = step.perp() / step.length();
-        let bend = 0.5 * l.dot(step * step);
+        };
         let value = bend * t * (t - 1.0);
-        let slope = self.u.slope(on_chord).dot(normal);
-        let curve = 0.5 * l.dot(normal * normal);
+        let slope = slope[0] + t * slope[1];
         let root = (slope * slope - 4.0 * curve * value).max(0.0).sqrt();
         let off = -2.0 * value / (slope + root.copysign(slope));
         if !off.is_finite() {
@@ -291,7 +327,7 @@ impl Region {
     /// the fourth degree besides `u` on straight pieces; weights may be negative where the area is not convex.
     pub fn points(&self, mut visit: impl FnMut(DVec2, f64)) {
         for element in &self.elements {
-            let rule = &RULES[if element.arc { POINTS } else { 5 }];
+            let rule = &RULES[if element.arc.is_some() { POINTS } else { 5 }];
             for &(s, ws) in rule {
                 let (x, dx) = self.at(element, s);
                 let (foot, turn) = self.foot(x, dx);
@@ -352,82 +388,116 @@ impl Region {
         (area, load)
     }
 
+    /// `int f q dA` for `f` of `u`, `1`, `x1`, `x2` (rows) and `q` of `1`, `x1`, `x2`, `x x grad gap`.
+    pub fn moments(&self, gap: &Quadratic) -> [[f64; 4]; 4] {
+        let mut sums = [[0.0; 4]; 4];
+        self.points(|x, weight| {
+            let values = [1.0, x.x, x.y, x.perp_dot(gap.slope(x))];
+            let factors = [weight * self.u.value(x), weight, weight * x.x, weight * x.y];
+            for (row, factor) in sums.iter_mut().zip(factors) {
+                for (sum, value) in row.iter_mut().zip(values) {
+                    *sum += factor * value;
+                }
+            }
+        });
+        sums
+    }
+
     /// `int u |v| dA` for the twist `(u1, u2, omega)` about the origin of the region's axes, any
     /// but zero.
     pub fn dissipation(&self, twist: [f64; 3]) -> Dissipation {
+        self.integrals::<false>(twist).0
+    }
+
+    /// The same, and the gradients of what `1`, `x1` and `x2` in place of `u` would dissipate: how the
+    /// gradient changes with `u`, which is zero where the area ends.
+    pub fn dissipation_by_pressure(&self, twist: [f64; 3]) -> (Dissipation, [[f64; 3]; 3]) {
+        self.integrals::<true>(twist)
+    }
+
+    fn integrals<const BY: bool>(&self, twist: [f64; 3]) -> (Dissipation, [[f64; 3]; 3]) {
         let [u1, u2, omega] = twist;
-        if omega == 0.0 {
-            return self.sliding(DVec2::new(u1, u2));
+        let mut sum = (Dissipation::default(), [[0.0; 3]; 3]);
+        // Of the area's middle.
+        let shift = DVec2::new(u1 - omega * self.middle.y, u2 + omega * self.middle.x);
+        if omega.abs() * (self.half.x + self.half.y) <= SHIFT * shift.length() {
+            self.sliding::<BY>(shift, &mut sum);
+            sum.0.turned([omega * self.middle.y, -omega * self.middle.x, omega]);
+            return sum;
         }
         // Distance of the slip centre from the box, times omega.
         let off = DVec2::new(-u2, u1) - omega * self.middle;
         let outside = (off.abs() - omega.abs() * self.half).max(DVec2::ZERO);
         let near = OUTSIDE * omega.abs() * self.half.min_element();
-        let mut sum = Dissipation::default();
+        let centre = DVec2::new(-u2, u1) / omega;
         if outside.length_squared() > near * near {
-            let centre = DVec2::new(-u2, u1) / omega;
+            let whole = [[0.0, 1.0]; 2];
             for element in &self.elements {
-                self.area_panel(element, twist, centre, [0.0, 1.0], [0.0, 1.0], 0, &mut sum);
+                self.area_panel::<BY>(element, twist, centre, whole, 0, &mut sum);
             }
-        } else {
-            let centre = DVec2::new(-u2, u1) / omega;
-            let mut edge = EdgeSums::default();
-            for element in &self.elements {
-                self.edge_panel(element, centre, [0.0, 1.0], 0, &mut edge);
-            }
-            sum = edge.assemble(centre, omega);
+            return sum;
         }
-        sum
+        let mut edge = EdgeSums::default();
+        for element in &self.elements {
+            // An edge on a line through the slip centre adds nothing.
+            let across = (element.a - centre).perp_dot(element.b - element.a);
+            if element.arc.is_some() || across != 0.0 {
+                self.edge_panel::<BY>(element, centre, [0.0, 1.0], 0, &mut edge);
+            }
+        }
+        edge.assemble(centre, omega)
     }
 
     /// [`Self::dissipation`] of a translation: moments of the pressure.
-    fn sliding(&self, v: DVec2) -> Dissipation {
-        let mut sum = Dissipation::default();
+    fn sliding<const BY: bool>(&self, v: DVec2, sum: &mut (Dissipation, [[f64; 3]; 3])) {
         let speed = v.length();
         let e = v / speed;
-        self.points(|x, weight| {
-            let weight = weight * self.u.value(x);
+        self.points(|x, area| {
+            let weight = area * self.u.value(x);
             let tangent = [e.x, e.y, x.perp_dot(e)];
             let normal = [e.y, -e.x, -x.dot(e)];
-            sum.value += weight * speed;
+            sum.0.value += weight * speed;
             for i in 0..3 {
-                sum.gradient[i] += weight * tangent[i];
+                sum.0.gradient[i] += weight * tangent[i];
                 for j in 0..3 {
-                    sum.hessian[i][j] += weight / speed * normal[i] * normal[j];
+                    sum.0.hessian[i][j] += weight / speed * normal[i] * normal[j];
                 }
             }
+            if BY {
+                by_pressure(&mut sum.1, area, x, tangent);
+            }
         });
-        sum
     }
 
-    /// Points between a part of an element and the line of [`Self::foot`], cut until the slip centre
-    /// is far from each part.
-    #[allow(clippy::too_many_arguments, reason = "a recursion over a rectangle of two parameters")]
-    fn area_panel(
+    /// Points between a part of an element and the line of [`Self::foot`], `range` of both
+    /// parameters, cut until the slip centre is far from each part.
+    fn area_panel<const BY: bool>(
         &self,
         element: &Element,
         twist: [f64; 3],
         centre: DVec2,
-        s: [f64; 2],
-        t: [f64; 2],
+        range: [[f64; 2]; 2],
         depth: u32,
-        sum: &mut Dissipation,
+        sum: &mut (Dissipation, [[f64; 3]; 3]),
     ) {
+        let [s, t] = range;
         let middle = |r: [f64; 2]| 0.5 * (r[0] + r[1]);
         let mut points = POINTS;
         if centre.is_finite() && depth < 40 {
-            let point = |s: f64, t: f64| {
+            let line = |s: f64| {
                 let (x, dx) = self.at(element, s);
-                self.foot(x, dx).0.lerp(x, t)
+                (self.foot(x, dx).0, x)
             };
-            let along = (point(s[1], t[1]) - point(s[0], t[1])).length();
-            let across = (point(middle(s), t[1]) - point(middle(s), t[0])).length();
-            let distance = (point(middle(s), middle(t)) - centre).length();
+            let (first, half, last) = (line(s[0]), line(middle(s)), line(s[1]));
+            let point = |line: (DVec2, DVec2), t: f64| line.0.lerp(line.1, t);
+            let along = (point(last, t[1]) - point(first, t[1])).length();
+            let across = (point(half, t[1]) - point(half, t[0])).length();
+            let distance = (point(half, middle(t)) - centre).length();
             if along.max(across) > PANEL * distance {
                 let split = |r: [f64; 2]| [[r[0], middle(r)], [middle(r), r[1]]];
-                for half in split(if along > across { s } else { t }) {
-                    let (s, t) = if along > across { (half, t) } else { (s, half) };
-                    self.area_panel(element, twist, centre, s, t, depth + 1, sum);
+                for part in split(if along > across { s } else { t }) {
+                    let range = if along > across { [part, t] } else { [s, part] };
+                    self.area_panel::<BY>(element, twist, centre, range, depth + 1, sum);
                 }
                 return;
             }
@@ -435,7 +505,8 @@ impl Region {
             points = FEWER.iter().find(|few| ratio <= few.0).map_or(POINTS, |few| few.1);
         }
         let [u1, u2, omega] = twist;
-        for &(ns, ws) in &RULES[if element.arc { POINTS } else { points }] {
+        let along = if element.arc.is_some() { POINTS } else { points };
+        for &(ns, ws) in &RULES[along] {
             let (x, dx) = self.at(element, s[0] + ns * (s[1] - s[0]));
             let (foot, turn) = self.foot(x, dx);
             if turn == 0.0 {
@@ -444,26 +515,30 @@ impl Region {
             let turn = ws * (s[1] - s[0]) * turn;
             for &(nt, wt) in &RULES[points] {
                 let x = foot.lerp(x, t[0] + nt * (t[1] - t[0]));
-                let weight = turn * wt * (t[1] - t[0]) * self.u.value(x);
+                let area = turn * wt * (t[1] - t[0]);
+                let weight = area * self.u.value(x);
                 let v = DVec2::new(u1 - omega * x.y, u2 + omega * x.x);
                 let speed = v.length();
                 let e = v / speed;
-                sum.value += weight * speed;
+                sum.0.value += weight * speed;
                 let tangent = [e.x, e.y, x.perp_dot(e)];
                 let normal = [e.y, -e.x, -x.dot(e)];
                 let bend = weight / speed;
                 for i in 0..3 {
-                    sum.gradient[i] += weight * tangent[i];
+                    sum.0.gradient[i] += weight * tangent[i];
                     for j in 0..3 {
-                        sum.hessian[i][j] += bend * normal[i] * normal[j];
+                        sum.0.hessian[i][j] += bend * normal[i] * normal[j];
                     }
+                }
+                if BY {
+                    by_pressure(&mut sum.1, area, x, tangent);
                 }
             }
         }
     }
 
     /// The boundary's part of the integrals about the slip centre, cut finer towards it.
-    fn edge_panel(
+    fn edge_panel<const BY: bool>(
         &self,
         element: &Element,
         centre: DVec2,
@@ -475,13 +550,16 @@ impl Region {
         let length = (self.at(element, s[1]).0 - self.at(element, s[0]).0).length();
         let distance = (self.at(element, middle).0 - centre).length();
         if length > PANEL * distance && depth < 48 {
-            self.edge_panel(element, centre, [s[0], middle], depth + 1, sum);
-            self.edge_panel(element, centre, [middle, s[1]], depth + 1, sum);
+            self.edge_panel::<BY>(element, centre, [s[0], middle], depth + 1, sum);
+            self.edge_panel::<BY>(element, centre, [middle, s[1]], depth + 1, sum);
             return;
         }
+        let ratio = length / distance;
+        let fewer = FEWER.iter().find(|few| ratio <= few.0).filter(|_| element.arc.is_none());
+        let points = fewer.map_or(POINTS, |few| few.1);
         let here = self.u.value(centre);
         let slope = self.u.slope(centre);
-        for &(node, weight) in &RULES[POINTS] {
+        for &(node, weight) in &RULES[points] {
             let (x, dx) = self.at(element, s[0] + node * (s[1] - s[0]));
             let y = x - centre;
             let r = y.length();
@@ -499,31 +577,63 @@ impl Region {
             sum.h[0] += bend * e.x * e.x;
             sum.h[1] += bend * e.x * e.y;
             sum.h[2] += bend * e.y * e.y;
+            if BY {
+                let (of_one, of_y) = (turn / 2.0, turn / 3.0 * y);
+                sum.by_e[0] += of_one * e;
+                sum.by_e[1] += of_y.x * e;
+                sum.by_e[2] += of_y.y * e;
+                sum.by_r[0] += r * turn / 3.0;
+                sum.by_r[1] += r * turn / 4.0 * y.x;
+                sum.by_r[2] += r * turn / 4.0 * y.y;
+            }
         }
     }
 }
 
-/// `int u r`, `int u e` and `int u e e^T / r` about the slip centre, `e` the unit vector from it.
+/// Adds a point's share of the gradients for `1`, `x1` and `x2` in place of the pressure.
+#[inline(always)]
+fn by_pressure(by: &mut [[f64; 3]; 3], area: f64, x: DVec2, tangent: [f64; 3]) {
+    for (row, factor) in by.iter_mut().zip([area, area * x.x, area * x.y]) {
+        for (sum, tangent) in row.iter_mut().zip(tangent) {
+            *sum += factor * tangent;
+        }
+    }
+}
+
+/// `int u r`, `int u e` and `int u e e^T / r` about the slip centre, `e` the unit vector from it; the
+/// first two also for `1`, `y1`, `y2` in place of `u`, `y` the place as seen from the centre.
 #[derive(Debug, Clone, Copy, Default)]
 struct EdgeSums {
     r: f64,
     e: DVec2,
     h: [f64; 3],
+    by_r: [f64; 3],
+    by_e: [DVec2; 3],
 }
 
 impl EdgeSums {
-    fn assemble(&self, c: DVec2, omega: f64) -> Dissipation {
+    fn assemble(&self, c: DVec2, omega: f64) -> (Dissipation, [[f64; 3]; 3]) {
         let sign = omega.signum();
-        let force = sign * self.e.perp();
+        let gradient = |r: f64, e: DVec2| {
+            let force = sign * e.perp();
+            [force.x, force.y, sign * r + c.perp_dot(force)]
+        };
         let [h11, h12, h22] = self.h.map(|h| h / omega.abs());
         let h13 = -c.y * h11 + c.x * h12;
         let h23 = -c.y * h12 + c.x * h22;
         let h33 = -c.y * h13 + c.x * h23;
-        Dissipation {
+        // x = c + y.
+        let by = [
+            gradient(self.by_r[0], self.by_e[0]),
+            gradient(c.x * self.by_r[0] + self.by_r[1], c.x * self.by_e[0] + self.by_e[1]),
+            gradient(c.y * self.by_r[0] + self.by_r[2], c.y * self.by_e[0] + self.by_e[2]),
+        ];
+        let found = Dissipation {
             value: omega.abs() * self.r,
-            gradient: [force.x, force.y, sign * self.r + c.perp_dot(force)],
+            gradient: gradient(self.r, self.e),
             hessian: [[h11, h12, h13], [h12, h22, h23], [h13, h23, h33]],
-        }
+        };
+        (found, by)
     }
 }
 
@@ -547,178 +657,4 @@ fn roots(c: f64, b: f64, a: f64) -> [Option<f64>; 2] {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn rectangle(half: DVec2) -> Ring {
-        [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-            .map(|(x, y)| half * DVec2::new(x, y))
-            .to_vec()
-    }
-
-    fn shapes() -> Vec<(Vec<Ring>, Quadratic)> {
-        let square = vec![rectangle(DVec2::new(2.0, 1.5))];
-        let mut hollow = square.clone();
-        hollow.push(rectangle(DVec2::new(0.3, 0.2)).into_iter().rev().collect());
-        let kinds = [
-            // Cylinder with and without tilt, parted; sphere; barrel cut by the ends; planes; bore.
-            (1.0, (0.0, 0.0), (0.0, -4.0)),
-            (1.0, (0.2, 0.1), (0.0, -4.0)),
-            (0.3, (0.4, 0.0), (0.0, -4.0)),
-            (0.5, (0.1, -0.2), (-1.5, -1.5)),
-            (1.0, (0.1, 0.2), (-0.2, -3.0)),
-            (1.0, (0.1, 0.2), (-3.0, -0.1)),
-            (1.0, (0.2, -0.1), (0.0, 0.0)),
-            (0.5, (0.6, -0.2), (0.0, 0.0)),
-            (-0.5, (0.1, 0.05), (0.0, 2.0)),
-        ];
-        let quadratic = |(c, g, l): (f64, (f64, f64), (f64, f64))| Quadratic {
-            c,
-            g: DVec2::from(g),
-            l: DVec2::from(l),
-        };
-        kinds
-            .into_iter()
-            .flat_map(|kind| [(square.clone(), quadratic(kind)), (hollow.clone(), quadratic(kind))])
-            .collect()
-    }
-
-    /// The integrals as they are defined: lines of Gauss points between all places where something
-    /// happens on the line.
-    fn by_lines(rings: &[Ring], u: &Quadratic, f: impl Fn(DVec2) -> f64) -> f64 {
-        let mut total = 0.0;
-        let n = 3000;
-        for i in 0..n {
-            let x = -2.0 + 4.0 * (f64::from(i) + 0.5) / f64::from(n);
-            let mut cuts = vec![-1.5, 1.5, -0.2, 0.2];
-            let at = |y: f64| u.value(DVec2::new(x, y));
-            let bend = 0.5 * u.l.y;
-            cuts.extend(roots(at(0.0), u.g.y, bend).into_iter().flatten());
-            cuts.retain(|y| y.abs() <= 1.5);
-            cuts.sort_by(f64::total_cmp);
-            for pair in cuts.windows(2) {
-                let middle = DVec2::new(x, 0.5 * (pair[0] + pair[1]));
-                if !contains(rings, middle) || u.value(middle) <= 0.0 {
-                    continue;
-                }
-                for &(t, w) in &RULES[12] {
-                    let y = DVec2::new(x, pair[0] + t * (pair[1] - pair[0]));
-                    total += w * (pair[1] - pair[0]) * f(y) * u.value(y);
-                }
-            }
-        }
-        total * 4.0 / f64::from(n)
-    }
-
-    #[test]
-    fn areas_and_dissipations_agree_with_lines_of_points() {
-        for (rings, u) in shapes() {
-            let region = Region::new(&rings, u);
-            let (_, load) = region.area_and_load();
-            let wanted = by_lines(&rings, &u, |_| 1.0);
-            assert!((load / wanted - 1.0).abs() < 3e-5, "{u:?} {load} {wanted}");
-            for twist in [[0.3, 0.2, 1.0], [1.0, -2.0, 0.3], [0.0, 0.1, -1.0], [1.0, 0.5, 0.0]] {
-                let got = region.dissipation(twist).value;
-                let [u1, u2, omega] = twist;
-                let speed = |x: DVec2| DVec2::new(u1 - omega * x.y, u2 + omega * x.x).length();
-                let wanted = by_lines(&rings, &u, speed);
-                assert!((got / wanted - 1.0).abs() < 3e-5, "{u:?} {twist:?} {got} {wanted}");
-            }
-        }
-    }
-
-    /// Both ways to integrate agree where both apply, and the derivatives are those of the value.
-    #[test]
-    fn both_ways_agree_and_the_derivatives_are_those_of_the_value() {
-        for (rings, u) in shapes() {
-            let region = Region::new(&rings, u);
-            for i in 0..40 {
-                let angle = 0.7 * f64::from(i);
-                let c = region.middle
-                    + region.half * (0.1 + 0.05 * f64::from(i)) * DVec2::from_angle(angle);
-                let twist = [c.y, -c.x, 1.0].map(|x| if i % 2 == 0 { x } else { -x });
-                let got = region.dissipation(twist);
-                // Points of the area serve at a slip centre inside too, on many panels.
-                let (mut points, mut edge) = (Dissipation::default(), EdgeSums::default());
-                for element in &region.elements {
-                    region.area_panel(element, twist, c, [0.0, 1.0], [0.0, 1.0], 0, &mut points);
-                    region.edge_panel(element, c, [0.0, 1.0], 0, &mut edge);
-                }
-                let edges = edge.assemble(c, twist[2]);
-                assert!(
-                    (points.value / edges.value - 1.0).abs() < 1e-11,
-                    "{u:?} {twist:?} {points:?} {edges:?}"
-                );
-                let euler: f64 = (0..3).map(|k| got.gradient[k] * twist[k]).sum();
-                assert!((euler / got.value - 1.0).abs() < 1e-13, "{u:?} {twist:?} {got:?}");
-                let step = 1e-5;
-                for k in 0..3 {
-                    let moved = |by: f64| {
-                        let mut twist = twist;
-                        twist[k] += by;
-                        region.dissipation(twist)
-                    };
-                    let (up, down) = (moved(step), moved(-step));
-                    let slope = (up.value - down.value) / (2.0 * step);
-                    assert!(
-                        (slope - got.gradient[k]).abs() < 1e-7 * got.value,
-                        "{u:?} {twist:?} {k}: {slope} {got:?}"
-                    );
-                    for j in 0..3 {
-                        let bend = (up.gradient[j] - down.gradient[j]) / (2.0 * step);
-                        assert!(
-                            (bend - got.hessian[j][k]).abs() < 1e-5 * got.value,
-                            "{u:?} {twist:?} {j}{k}: {bend} {got:?}"
-                        );
-                    }
-                }
-            }
-        }
-    }
-
-    /// The sphere's closed form: pressure `1 - r^2` on the unit disc, slip centre at a distance.
-    #[test]
-    fn the_sphere_agrees_with_its_closed_form() {
-        let u = Quadratic { c: 1.0, g: DVec2::ZERO, l: DVec2::splat(-2.0) };
-        let region = Region::new(&[rectangle(DVec2::splat(3.0))], u);
-        let (area, load) = region.area_and_load();
-        let half = std::f64::consts::FRAC_PI_2;
-        assert!((load / half - 1.0).abs() < 1e-14 && (area / half - 2.0).abs() < 1e-7);
-        for (k, wanted) in [
-            (0.0, 4.0 * std::f64::consts::PI / 15.0),
-            (0.3, 0.930_427_403_020_475_5),
-            (0.6, 1.190_088_973_586_390_5),
-            (0.95, 1.636_037_182_195_247_7),
-            (1.0, 128.0 / 75.0),
-        ] {
-            let got = region.dissipation([0.0, -k, 1.0]).value;
-            assert!((got / wanted - 1.0).abs() < 1e-14, "{k}: {got} {wanted}");
-        }
-    }
-
-    /// The planar integrals of this library, for the special case of a plane.
-    #[test]
-    fn a_plane_agrees_with_the_planar_closed_forms() {
-        use crate::contact::{Field, Loops, Twist, friction};
-        use crate::model::Polygon;
-        let ring = rectangle(DVec2::new(2.0, 1.5));
-        let area = Loops::new(&[Polygon { outer: ring.clone(), holes: Vec::new() }]);
-        let p = [1.0, 0.3, -0.2];
-        let u = Quadratic { c: p[0], g: DVec2::new(p[1], p[2]), l: DVec2::ZERO };
-        let region = Region::new(&[ring], u);
-        for i in 0..60 {
-            let c = 0.1 * f64::from(i) * DVec2::from_angle(f64::from(i));
-            let twist = [c.y, -c.x, 1.0];
-            let wanted = friction(Field { area: &area, p }, Twist::about(c));
-            let gradient = wanted.gradient(p);
-            let got = region.dissipation(twist);
-            for j in 0..3 {
-                assert!((got.gradient[j] - gradient[j]).abs() < 1e-13 * 12.0 * (1.0 + c.length()));
-                for k in 0..3 {
-                    let off = (got.hessian[j][k] - wanted.hessian[j][k]).abs();
-                    assert!(off < 1e-12 * (1.0 + c.length_squared()) * 12.0, "{c:?} {off:e}");
-                }
-            }
-        }
-    }
-}
+mod tests;

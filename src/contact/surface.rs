@@ -144,6 +144,16 @@ impl Field {
         self.outward(self.gap.slope(x))
     }
 
+    /// What a pressure carries from its integrals over `1`, `x1`, `x2` and `x x grad gap` in the
+    /// surface's axes: force, `int p x`, `int p grad gap` and the moment of the push against the
+    /// slope, in the pad plane.
+    pub(crate) fn carried(&self, [load, one, two, turn]: &[f64; 4]) -> [f64; 6] {
+        let (load, first) = (*load, DVec2::new(*one, *two));
+        let slope = self.outward(self.gap.g * load + self.gap.l * first);
+        let first = self.origin * load + self.outward(first);
+        [load, first.x, first.y, slope.x, slope.y, -self.origin.perp_dot(slope) - turn]
+    }
+
     /// The part of a tilt, in the pad plane, that turns the surface and not only rolls it: none
     /// across a curve.
     pub(crate) fn felt(&self, tilt: DVec2) -> DVec2 {

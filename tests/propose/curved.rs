@@ -3,14 +3,16 @@
 use std::sync::atomic::AtomicBool;
 
 use glam::{DMat3, DVec2, DVec3};
+use gripfast::backend::{CurvedProblem, Scored, score_curved};
 use gripfast::geometry::patch_area;
 use gripfast::gripper;
-use gripfast::load::wrench_in_grip;
+use gripfast::load::{LoadSet, wrench_in_grip};
+use gripfast::mechanics::curved::Pads;
 use gripfast::model::{Gap, LoadCase, Slip, Status, Wrench};
 use gripfast::part::Part;
 use gripfast::plan::Plan;
 use gripfast::propose::{ProposeOptions, Proposer};
-use gripfast::request::{Choice, Request};
+use gripfast::request::{Choice, Polish, Request};
 use gripfast::results::{GripSet, RankedGrip};
 use gripfast::units::{Angle, Force, Length, Mass};
 
@@ -217,4 +219,85 @@ fn a_shaft_is_gripped_on_its_barrel() {
         assert!((mu / (weight / 120.0) - 1.0).abs() < 1e-6, "{file}: {mu}");
         assert!(set.grips[0].grip.surfaces.is_some() || file != "cyl_20x60", "{file}");
     }
+}
+
+/// The worst loads of some curved grips of a part, from comparisons and from solving every load;
+/// how many loads were solved, and all.
+fn screened_as_solved(name: &str, part: &Part, count: usize) -> [usize; 2] {
+    let gripper = gripper::find("robotiq-2f85").unwrap();
+    let force = 40.0;
+    let options = ProposeOptions::default()
+        .with_curved(Some(true))
+        .with_spacing(Some(0.008))
+        .with_angle_step(0.8)
+        .with_force(Some(force));
+    let grips: Vec<_> = Proposer::new(part, &gripper, &options)
+        .unwrap()
+        .flat_map(|chunk| chunk.grips)
+        .filter(|grip| grip.surfaces.is_some())
+        .collect();
+    assert!(!grips.is_empty(), "{name}");
+    let step = (grips.len() / count).max(1);
+    let mass = part.mass_properties(0.2 / part.mass_properties(1.0).volume);
+    let centre = mass.centre_of_mass;
+    let (mut solved, mut all) = (0, 0);
+    for source in ["gravity", "gravity:26", "ball:40", "heavy"] {
+        // Loads up to twisting out too.
+        let (text, grown) = if source == "heavy" { ("ball:30", 15.0) } else { (source, 1.0) };
+        let loads = LoadSet::parse("loads", text).unwrap().cases(&mass).unwrap();
+        for grip in grips.iter().step_by(step) {
+            let pads = Pads::new(grip.surfaces.as_ref().unwrap()).unwrap();
+            let wrenches: Vec<Wrench> = loads
+                .iter()
+                .map(|load| {
+                    let Wrench { force, moment } = load.wrench;
+                    let wrench = Wrench { force: grown * force, moment: grown * moment };
+                    wrench_in_grip(&wrench, centre, &grip.part_from_grip)
+                })
+                .collect();
+            let (pads, distance) = (Some(&pads), grip.distance());
+            let problem = CurvedProblem { pads, distance, force, wrenches: &wrenches };
+            let worst =
+                |polish| -> Scored { score_curved(&[problem], polish).into_iter().next().unwrap() };
+            let (screened, every) = (worst(Polish::Worst), worst(Polish::All));
+            assert_eq!(every.all.len(), wrenches.len());
+            let ((load, score), (wanted, truth)) = (screened.worst.unwrap(), every.worst.unwrap());
+            assert_eq!((load, score.status), (wanted, truth.status), "{name} {source} {}", grip.id);
+            match (score.mu_s, truth.mu_s) {
+                (Some(a), Some(b)) => {
+                    assert!((a - b).abs() <= 1e-9 * b, "{name} {source} {}: {a} {b}", grip.id)
+                }
+                (a, b) => assert_eq!(a, b),
+            }
+            solved += screened.solved;
+            all += wrenches.len();
+        }
+    }
+    println!("{name}: {solved} of {all} loads solved");
+    [solved, all]
+}
+
+#[test]
+fn comparing_loads_gives_the_worst_one_that_solving_all_of_them_gives() {
+    let mut sums = [0; 2];
+    let mut add = |[solved, all]: [usize; 2]| sums = [sums[0] + solved, sums[1] + all];
+    add(screened_as_solved("shaft", &shaft(0.3), 6));
+    // Off its axis by the mass of a head, and short.
+    let (mut vertices, mut triangles) = cylinder(0.006, 0.050, 48, 0.1);
+    let (head, more) = cylinder(0.012, 0.016, 64, 0.0);
+    let first = vertices.len() as u32;
+    vertices.extend(head.iter().map(|v| *v + DVec3::Z * 0.040));
+    triangles.extend(more.iter().map(|triangle| triangle.map(|corner| corner + first)));
+    let part = Part::from_triangles("pin", &vertices, &triangles).unwrap();
+    add(screened_as_solved("pin", &part, 6));
+    for file in ["curved/cyl_20x60", "curved/sphere", "curved/dshaft", "draft/frustum1"] {
+        if let Some(path) = crate::support::reference(&format!("trials/{file}.stl")) {
+            let part = Part::read(&path, &Default::default()).unwrap();
+            if part.curved.iter().any(|face| face.outside) {
+                add(screened_as_solved(file, &part, 6));
+            }
+        }
+    }
+    let [solved, all] = sums;
+    assert!(4 * solved < all, "{solved} of {all}");
 }

@@ -8,6 +8,7 @@ use glam::DVec2;
 use nalgebra::Vector5;
 
 use super::face::{Face, Pressed};
+use super::joint::{Joint, Mode, Place, Reached};
 use super::slip::{self, Slipping, Space};
 use crate::model::Wrench;
 
@@ -52,6 +53,8 @@ impl State<'_> {
 const SOLVED: f64 = 1e-9;
 /// Residual at which Newton's method is content; its last step has mostly gone far beyond.
 const ENOUGH: f64 = 1e-13;
+/// Residual at which a state from all derivatives is left as it is.
+const NEAR: f64 = 1e-13;
 /// Newton steps at most.
 const STEPS: u32 = 40;
 /// Step of the difference quotients, in units of the tilt.
@@ -219,6 +222,40 @@ impl<'a> Problem<'a> {
             }
         }
         (state.error() <= SOLVED).then_some(state)
+    }
+
+    /// The state next to that without friction's lever, all unknowns at once, from the `pressed`
+    /// faces without tilt; `None` where that does not succeed.
+    pub(super) fn direct(&self, pressed: [&Pressed<'_>; 2]) -> Option<State<'a>> {
+        if self.held.is_empty() {
+            return None;
+        }
+        let give = pressed[0].compression().max(pressed[1].compression());
+        let joint = Joint::new(self, slip::length(pressed), give);
+        let solved = |place: &Place| match joint.newton(place, 0.0)? {
+            Reached::Solution(found) => Some(found),
+            Reached::Below(..) => None,
+        };
+        let start = Place::new(pressed);
+        let still = solved(&start)?;
+        let Place { angles, delta, .. } = still.place;
+        let faces = still.pressed(self.normal);
+        let faces = [&faces[0], &faces[1]];
+        let w = self.along(faces, self.moment_beyond(faces), DVec2::ZERO);
+        let slip = slip::solve(&self.space, faces, self.distance, w, None)?;
+        if slip.mu == 0.0 {
+            return None;
+        }
+        let mode = slip.rolls_on.map_or(Mode::Slips, Mode::Rolls);
+        let found = solved(&Place { mode, motion: joint.motion(&slip, &w), angles, delta })?;
+        let Place { motion, angles, .. } = found.place;
+        let angles = angles[..self.held.len()].to_vec();
+        let zeta = if mode == Mode::Slips { motion } else { slip.zeta };
+        let slip = Some(Slipping { zeta, ..slip });
+        let faces = found.pressed(self.normal);
+        let near = State { angles, faces, slip, residual: Vec::new() };
+        let state = self.at(&near.angles, 1.0, Some(&near))?;
+        if state.error() <= NEAR { Some(state) } else { self.newton(state, 1.0) }
     }
 
     /// The state on the branch from `d = 0`: friction's lever grows from nothing.

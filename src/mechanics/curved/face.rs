@@ -1,9 +1,9 @@
 //! One face under its pad: the pressure for a given tilt and normal force, and what it carries.
 
 use glam::DVec2;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3, Vector6};
 
-use crate::contact::quadric::Region;
+use crate::contact::quadric::{Dissipation, Region};
 use crate::contact::surface::{Field, Piece};
 
 /// A face made ready.
@@ -14,6 +14,7 @@ pub(super) struct Face {
     stiffness: f64,
     /// +1 on face I, -1 on face II.
     pub(super) sign: f64,
+    reach: f64,
 }
 
 /// A face with a pressure on it.
@@ -40,8 +41,22 @@ pub(super) struct Pressed<'a> {
     second: f64,
 }
 
+/// What a pressure carries, linear in it: the normal force, `int p x`, `int p grad h`, and the moment
+/// about `x3` of the push against the slope.
+pub(super) type Carried = Vector6<f64>;
+
+/// A face under some compression and tilt, with the derivatives of what it carries.
+#[derive(Debug, Clone)]
+pub(super) struct Trial<'a> {
+    pub(super) face: &'a Face,
+    regions: Vec<Region>,
+    pub(super) carried: Carried,
+    /// Per compression, and per tilt in each of the directions asked for.
+    pub(super) by: [Carried; 3],
+}
+
 /// Dissipation and its derivatives in the planar twist of a face.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct FaceDissipation {
     pub(super) value: f64,
     pub(super) gradient: Vector3<f64>,
@@ -59,12 +74,19 @@ impl Face {
             .map(Field::new)
             .filter(|field| field.area() > 0.0)
             .collect();
-        Self { fields, stiffness, sign }
+        let corners = pieces.iter().flat_map(|piece| &piece.outer);
+        let reach = corners.map(|corner| corner.length()).fold(0.0, f64::max);
+        Self { fields, stiffness, sign, reach }
     }
 
     /// Area of all pieces [m^2].
     pub(super) fn area(&self) -> f64 {
         self.fields.iter().map(Field::area).sum()
+    }
+
+    /// Distance of the farthest corner from the origin of the pad plane \[m\].
+    pub(super) fn reach(&self) -> f64 {
+        self.reach
     }
 
     /// The regions pressed at a compression and tilt, their area, and the normal force.
@@ -76,6 +98,40 @@ impl Face {
             (area + a, load + l)
         });
         (regions, area, self.stiffness * load)
+    }
+
+    /// What a compression and tilt carry, with the derivatives for the compression and for more tilt
+    /// in the `directions`, at most two.
+    pub(super) fn trial(&self, delta: f64, tilt: DVec2, directions: &[DVec2]) -> Trial<'_> {
+        let tilt = self.sign * tilt;
+        let mut trial = Trial {
+            face: self,
+            regions: Vec::with_capacity(self.fields.len()),
+            carried: Carried::zeros(),
+            by: [Carried::zeros(); 3],
+        };
+        for field in &self.fields {
+            let region = field.pressed(delta, tilt);
+            if !region.is_empty() {
+                let sums = region.moments(&field.gap);
+                let by = sums.map(|row| self.stiffness * Carried::from(field.carried(&row)));
+                trial.carried += by[0];
+                trial.by[0] += by[1];
+                for (sum, direction) in trial.by[1..].iter_mut().zip(directions) {
+                    let (one, rise) = self.rise(field, *direction);
+                    *sum += one * by[1] + rise.x * by[2] + rise.y * by[3];
+                }
+            }
+            trial.regions.push(region);
+        }
+        trial
+    }
+
+    /// What a tilt in a direction changes of the compression: a constant, and a slope in the
+    /// surface's axes.
+    fn rise(&self, field: &Field, direction: DVec2) -> (f64, DVec2) {
+        let felt = self.sign * field.inward(field.felt(direction));
+        (self.sign * direction.dot(field.origin), felt)
     }
 
     /// The pressure that carries `load` at a tilt. The force grows convexly with the compression,
@@ -148,6 +204,78 @@ impl Face {
         (pressed.first, pressed.slope, pressed.second) = (first, slope, second);
         (pressed.turn, pressed.tilted) = (turn, tilted);
         pressed
+    }
+}
+
+impl<'a> Trial<'a> {
+    /// As the pressure that carries `load`, which it does but for rounding.
+    pub(super) fn pressed(self, delta: f64, tilt: DVec2, load: f64) -> Pressed<'a> {
+        let area = self.by[0][0] / self.face.stiffness;
+        self.face.measure(delta, tilt, self.regions, load, area)
+    }
+
+    /// Middle of pressure.
+    pub(super) fn centre(&self) -> DVec2 {
+        DVec2::new(self.carried[1], self.carried[2]) / self.carried[0]
+    }
+
+    /// The dissipation, and how its gradient changes with the compression and with more tilt in
+    /// each of the `directions`.
+    pub(super) fn dissipation(
+        &self,
+        v: &Vector3<f64>,
+        directions: &[DVec2],
+    ) -> (FaceDissipation, [Vector3<f64>; 3]) {
+        let mut sum = FaceDissipation::default();
+        let mut by = [Vector3::zeros(); 3];
+        if v.amax() == 0.0 {
+            return (sum, by);
+        }
+        for (field, region) in self.face.fields.iter().zip(&self.regions) {
+            if region.is_empty() {
+                continue;
+            }
+            let local = local(field);
+            let (found, rows) = region.dissipation_by_pressure((local * v).into());
+            sum.add(&local, &found);
+            let rows = rows.map(|row| local.tr_mul(&Vector3::from(row)));
+            by[0] += rows[0];
+            for (sum, direction) in by[1..].iter_mut().zip(directions) {
+                let (one, rise) = self.face.rise(field, *direction);
+                *sum += one * rows[0] + rise.x * rows[1] + rise.y * rows[2];
+            }
+        }
+        let k = self.face.stiffness;
+        (sum.times(k), by.map(|row| k * row))
+    }
+}
+
+/// A twist of the pad plane in a surface's own axes.
+fn local(field: &Field) -> Matrix3<f64> {
+    let (o, e) = (field.origin, field.axis);
+    Matrix3::new(
+        e.x,
+        e.y,
+        e.y * o.x - e.x * o.y, //
+        -e.y,
+        e.x,
+        e.y * o.y + e.x * o.x, //
+        0.0,
+        0.0,
+        1.0,
+    )
+}
+
+impl FaceDissipation {
+    fn add(&mut self, local: &Matrix3<f64>, found: &Dissipation) {
+        self.value += found.value;
+        self.gradient += local.tr_mul(&Vector3::from(found.gradient));
+        let bend = Matrix3::from_fn(|i, j| found.hessian[i][j]);
+        self.hessian += local.tr_mul(&bend) * local;
+    }
+
+    fn times(self, k: f64) -> Self {
+        Self { value: k * self.value, gradient: k * self.gradient, hessian: k * self.hessian }
     }
 }
 
@@ -231,39 +359,26 @@ impl Pressed<'_> {
 
     /// `int p |v| dA` for a planar twist about the origin; zero with zero derivatives at rest.
     pub(super) fn dissipation(&self, v: &Vector3<f64>) -> FaceDissipation {
-        let mut sum =
-            FaceDissipation { value: 0.0, gradient: Vector3::zeros(), hessian: Matrix3::zeros() };
+        let mut sum = FaceDissipation::default();
         if v.amax() == 0.0 {
             return sum;
         }
         for (field, region) in self.face.fields.iter().zip(&self.regions) {
-            if region.is_empty() {
-                continue;
+            if !region.is_empty() {
+                let local = local(field);
+                sum.add(&local, &region.dissipation((local * v).into()));
             }
-            let (o, e) = (field.origin, field.axis);
-            // The twist in the surface's own axes.
-            let local = Matrix3::new(
-                e.x,
-                e.y,
-                e.y * o.x - e.x * o.y, //
-                -e.y,
-                e.x,
-                e.y * o.y + e.x * o.x, //
-                0.0,
-                0.0,
-                1.0,
-            );
-            let found = region.dissipation((local * v).into());
-            sum.value += found.value;
-            sum.gradient += local.tr_mul(&Vector3::from(found.gradient));
-            let bend = Matrix3::from_fn(|i, j| found.hessian[i][j]);
-            sum.hessian += local.tr_mul(&bend) * local;
         }
-        let k = self.face.stiffness;
-        FaceDissipation {
-            value: k * sum.value,
-            gradient: k * sum.gradient,
-            hessian: k * sum.hessian,
+        sum.times(self.face.stiffness)
+    }
+
+    /// The gradient alone, of a translation without any integral.
+    pub(super) fn support(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        let speed = v.x.hypot(v.y);
+        if v.z != 0.0 || speed == 0.0 {
+            return self.dissipation(v).gradient;
         }
+        let e = DVec2::new(v.x, v.y) / speed;
+        Vector3::new(self.load * e.x, self.load * e.y, self.first.perp_dot(e))
     }
 }

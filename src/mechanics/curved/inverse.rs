@@ -29,7 +29,7 @@ pub fn force_needed(
     }
     // The logarithm of mu_s over the friction; infinite where there is no limit state.
     let excess = |force: f64| {
-        let score = pads.solve(distance, force, wrench).score;
+        let score = pads.answer(distance, force, wrench, false).score;
         let mu = score.mu_s.filter(|_| score.status.holds());
         mu.map_or(f64::INFINITY, |mu| (mu / friction).ln())
     };

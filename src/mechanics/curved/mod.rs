@@ -9,7 +9,9 @@
 mod equilibrium;
 mod face;
 mod inverse;
+mod joint;
 mod note;
+mod screen;
 mod slip;
 mod space;
 
@@ -26,6 +28,7 @@ use equilibrium::{Problem, State};
 use face::{Face, Pressed};
 pub use inverse::force_needed;
 pub use note::{Note, SoftLimit};
+pub use screen::{Compared, Screen};
 use slip::{Slipping, Space};
 use space::{Kind, Rotation};
 
@@ -140,6 +143,12 @@ impl Pads {
 
     /// As [`solve`]; numbers must be finite and `force` positive.
     pub fn solve(&self, distance: f64, force: f64, wrench: &Wrench) -> Answer {
+        self.answer(distance, force, wrench, true)
+    }
+
+    /// `search`: look for further limit states where there may be some; that decides only whether
+    /// the status is ambiguous, and what is found where the first way leads nowhere.
+    fn answer(&self, distance: f64, force: f64, wrench: &Wrench, search: bool) -> Answer {
         if self.faces.iter().any(|face| face.fields.is_empty()) {
             return no_answer(Status::NoContact);
         }
@@ -151,7 +160,7 @@ impl Pads {
         let [Some(one), Some(two)] = &pressed else { return no_answer(Status::NotConverged) };
         let rotations = space::rotations([one, two], distance);
         let faces = &self.faces;
-        let case = Case { faces, pressed: [one, two], distance, normal, wrench, rotations };
+        let case = Case { faces, pressed: [one, two], distance, normal, wrench, rotations, search };
         let mut answer = case.solve();
         answer.notes.extend(case.softness(self, &answer));
         answer
@@ -183,20 +192,22 @@ impl Pads {
 }
 
 /// A case with what is known of it before any slip.
-struct Case<'a> {
+struct Case<'a, 'c> {
     faces: &'a [Face; 2],
     /// Without tilt.
-    pressed: [&'a Pressed<'a>; 2],
+    pressed: [&'c Pressed<'a>; 2],
     distance: f64,
     normal: [f64; 2],
-    wrench: &'a Wrench,
+    wrench: &'c Wrench,
     rotations: [Rotation; 2],
+    /// See [`Pads::answer`].
+    search: bool,
 }
 
 /// Lever of a stiffness over the distance of the faces below which it is none.
 const NO_LEVER: f64 = 1e-6;
 
-impl<'a> Case<'a> {
+impl<'a> Case<'a, '_> {
     /// With the rotations free that are free in any case, and those that turn out to be.
     fn solve(&self) -> Answer {
         let force = 0.5 * (self.normal[0] + self.normal[1]);
@@ -220,7 +231,7 @@ impl<'a> Case<'a> {
         });
         loop {
             let problem = self.problem(free);
-            let (status, state) = find(&problem);
+            let (status, state) = find(&problem, self.pressed, self.search);
             // A round part that turns by more than the layers give is free to turn.
             let mut settles = None;
             for i in 0..2 {
@@ -374,16 +385,24 @@ impl<'a> Case<'a> {
     }
 }
 
+/// Whether friction's lever is so long that there may be further limit states.
+fn strong(problem: &Problem<'_>, mu: f64) -> bool {
+    let width = problem.widths.iter().copied().fold(f64::INFINITY, f64::min);
+    mu * problem.distance.abs() > COUPLING_SEARCH * width
+}
+
 /// The limit state of a problem, and its status.
-fn find<'a>(problem: &Problem<'a>) -> (Status, Option<State<'a>>) {
-    let branch = problem.branch();
-    let strong = |state: &State<'_>| {
-        let mu = state.slip.map_or(0.0, |slip| slip.mu);
-        let width = problem.widths.iter().copied().fold(f64::INFINITY, f64::min);
-        mu * problem.distance.abs() > COUPLING_SEARCH * width
-    };
-    match branch {
-        Some(state) if problem.held.is_empty() || !strong(&state) => (Status::Ok, Some(state)),
+fn find<'a>(
+    problem: &Problem<'a>,
+    pressed: [&Pressed<'_>; 2],
+    search: bool,
+) -> (Status, Option<State<'a>>) {
+    let strong = |state: &State<'_>| strong(problem, state.slip.map_or(0.0, |slip| slip.mu));
+    let direct = problem.direct(pressed).filter(|state| !strong(state));
+    match direct.or_else(|| problem.branch()) {
+        Some(state) if problem.held.is_empty() || !search || !strong(&state) => {
+            (Status::Ok, Some(state))
+        }
         branch => {
             let (states, any) = problem.scan(branch.clone());
             match (states.len(), branch) {

@@ -82,6 +82,8 @@ const ENOUGH: f64 = 1e-14;
 /// Share of the sliding face's friction below which the other face counts as at rest: at a tie both
 /// may slip.
 const AT_REST: f64 = 1.0 - 1e-9;
+/// The same where only `mu` is asked for.
+const ALIKE: f64 = 1.0 + 1e-10;
 /// The same where Newton's method finds nothing, so near the tie.
 const TIED: f64 = 1.0 + 1e-6;
 
@@ -97,55 +99,65 @@ pub(super) fn solve(
     w: Vector5<f64>,
     start: Option<&Slipping>,
 ) -> Option<Slipping> {
-    let basis = [space.basis(0, distance), space.basis(1, distance)];
-    let length = length(faces);
-    let reach = 2.0 / distance.abs();
-    let problem = Problem {
-        faces,
-        basis,
-        active: space.dimensions(),
-        units: Vector5::new(1.0, 1.0, 1.0 / length, reach, reach),
-        normal: faces[0].load + faces[1].load,
-        evaluations: std::cell::Cell::new(0),
-    };
+    let problem = Problem::new(space, faces, distance);
     if w.amax() == 0.0 {
         let bounds = Bounds { lower: 0.0, upper: 0.0 };
         let shares = [Vector3::zeros(); 2];
         let zeta = Vector5::zeros();
         return Some(Slipping { mu: 0.0, zeta, shares, rolls_on: None, bounds, evaluations: 0 });
     }
-    let held = |candidate: &Option<Rolling>, most: f64| {
-        candidate.filter(|rolling| rolling.alone <= most * rolling.answer.mu)
-    };
     let zeta = start.map(|near| &near.zeta);
+    // Newton's method from the neighbour's motion.
+    let mut moving = None;
     match start.map(|near| near.rolls_on) {
         Some(None) => {
+            moving = problem.interior(&w, zeta);
             let sure = |answer: &Slipping| answer.bounds.upper <= answer.mu * (1.0 + SURE);
-            if let Some(answer) = problem.interior(&w, zeta).filter(sure) {
+            if let Some(answer) = moving.filter(sure) {
                 return Some(problem.counted(answer));
             }
         }
         Some(Some(k)) => {
             let rolling = problem.rolling(space, k, distance, &w);
-            if let Some(rolling) = held(&rolling, AT_REST) {
+            if let Some(rolling) = rolling.filter(|rolling| problem.rests(rolling)) {
                 return Some(problem.counted(rolling.answer));
             }
         }
         None => {}
     }
     let candidates = [0, 1].map(|k| problem.rolling(space, k, distance, &w));
-    let rolls = candidates.iter().find_map(|candidate| held(candidate, AT_REST));
-    if let Some(rolling) = rolls {
+    if let Some(rolling) = candidates.iter().flatten().find(|rolling| problem.rests(rolling)) {
         return Some(problem.counted(rolling.answer));
     }
-    problem
-        .interior(&w, zeta)
+    if start.is_none_or(|near| near.rolls_on.is_some()) {
+        moving = problem.interior(&w, zeta);
+    }
+    moving
         .or_else(|| {
             let start = problem.off_crease(&w, &candidates)?;
             problem.interior(&w, Some(&start))
         })
-        .or_else(|| candidates.iter().find_map(|candidate| held(candidate, TIED)).map(|r| r.answer))
+        .or_else(|| candidates.iter().flatten().find_map(|rolling| problem.tied(rolling)))
         .map(|answer| problem.counted(answer))
+}
+
+/// Whether face `k` bears `load` at rest while the other slides at the friction `mu`: whether it
+/// needs no more alone, ties among them.
+pub(super) fn rests(faces: [&Pressed<'_>; 2], k: usize, load: &Vector3<f64>, mu: f64) -> bool {
+    let problem = Problem::new(&Space::default(), faces, 1.0);
+    problem.bears(k, load, mu * ALIKE)
+}
+
+/// What holds the load `w` for certain: an upper bound of `mu` from a few supports.
+pub(super) fn enough(
+    space: &Space,
+    faces: [&Pressed<'_>; 2],
+    distance: f64,
+    w: Vector5<f64>,
+) -> Option<f64> {
+    let problem = Problem::new(space, faces, distance);
+    let w = w.component_mul(&problem.units) / problem.normal;
+    problem.made_up(&w)
 }
 
 /// Root mean square distance of the pressure from its middle on both faces, but for a constant.
@@ -154,7 +166,19 @@ pub(super) fn length(faces: [&Pressed<'_>; 2]) -> f64 {
     (spread / faces.iter().map(|face| face.load).sum::<f64>()).sqrt()
 }
 
-impl Problem<'_, '_> {
+impl<'a, 'b> Problem<'a, 'b> {
+    fn new(space: &Space, faces: [&'a Pressed<'b>; 2], distance: f64) -> Self {
+        let reach = 2.0 / distance.abs();
+        Self {
+            faces,
+            basis: [space.basis(0, distance), space.basis(1, distance)],
+            active: space.dimensions(),
+            units: Vector5::new(1.0, 1.0, 1.0 / length(faces), reach, reach),
+            normal: faces[0].load + faces[1].load,
+            evaluations: std::cell::Cell::new(0),
+        }
+    }
+
     fn both(&self, z: &Vector5<f64>) -> Both {
         self.evaluations.set(self.evaluations.get() + 1);
         let mut sum = Both {
@@ -293,6 +317,11 @@ impl Problem<'_, '_> {
         if left.amax() <= 4.0 * f64::EPSILON && error.amax() <= 1e-14 {
             return Some(lower + 5.0 * left.amax());
         }
+        Some(lower + self.made_up(&left)?)
+    }
+
+    /// Sizes of the coefficients with which supports make up a load in units.
+    fn made_up(&self, load: &Vector5<f64>) -> Option<f64> {
         // About the middle of pressure, so that a turn's support is a moment.
         let loads = self.faces[0].load + self.faces[1].load;
         let centre = (self.faces[0].first + self.faces[1].first) / loads;
@@ -303,15 +332,56 @@ impl Problem<'_, '_> {
             if i == 2 {
                 let turn = self.units[2];
                 (z[0], z[1]) = (centre.y * turn, -centre.x * turn);
+                self.evaluations.set(self.evaluations.get() + 1);
             }
-            supports.set_column(i, &self.both(&z).gradient);
+            supports.set_column(i, &self.support(&z));
         }
-        let coefficients = supports.lu().solve(&left)?;
-        Some(lower + coefficients.iter().map(|c| c.abs()).sum::<f64>())
+        let coefficients = supports.lu().solve(load)?;
+        Some(coefficients.iter().map(|c| c.abs()).sum())
+    }
+
+    /// The gradient of the dissipation alone.
+    fn support(&self, z: &Vector5<f64>) -> Vector5<f64> {
+        let zeta = z.component_mul(&self.units);
+        let faces =
+            [0, 1].map(|k| self.basis[k].tr_mul(&self.faces[k].support(&(self.basis[k] * zeta))));
+        (faces[0] + faces[1]).component_mul(&self.units) / self.normal
+    }
+
+    /// Whether face `k` alone bears `load` at the friction `mu`: first by a bound.
+    fn bears(&self, k: usize, load: &Vector3<f64>, mu: f64) -> bool {
+        let face = self.faces[k];
+        let (force, centre) = (DVec2::new(load.x, load.y), face.centre());
+        if force.length() > mu * face.load {
+            return false;
+        }
+        let moment = load.z - centre.perp_dot(force);
+        // Made up of a slide and of a turn about the middle of pressure.
+        let turn = face.support(&Vector3::new(centre.y, -centre.x, 1.0));
+        self.evaluations.set(self.evaluations.get() + 1);
+        let side = DVec2::new(turn.x, turn.y);
+        let turned = moment / (turn.z - centre.perp_dot(side));
+        let slid = force - turned * side;
+        if slid.length() / face.load + turned.abs() <= mu {
+            return true;
+        }
+        self.alone(k, load).is_some_and(|(alone, _)| alone <= mu)
+    }
+
+    fn rests(&self, rolling: &Rolling) -> bool {
+        self.bears(rolling.on, &rolling.answer.shares[rolling.on], rolling.answer.mu * AT_REST)
+    }
+
+    /// A candidate so near the tie that Newton's method finds nothing.
+    fn tied(&self, rolling: &Rolling) -> Option<Slipping> {
+        let answer = rolling.answer;
+        let (alone, _) = self.alone(rolling.on, &answer.shares[rolling.on])?;
+        let bounds = Bounds { lower: answer.mu, upper: answer.mu.max(alone) };
+        (alone <= TIED * answer.mu).then_some(Slipping { bounds, ..answer })
     }
 
     /// The body rolls on face `k`: the other face slides along the pad. The answer if `k` carries
-    /// the rest of the load at no more friction.
+    /// the rest of the load at no more friction ([`Self::rests`]).
     fn rolling(&self, space: &Space, k: usize, distance: f64, w: &Vector5<f64>) -> Option<Rolling> {
         let other = 1 - k;
         let mut zeta = Vector5::zeros();
@@ -336,7 +406,6 @@ impl Problem<'_, '_> {
         let e = along / speed;
         let sliding = mu * Vector3::new(face.load * e.x, face.load * e.y, face.first.perp_dot(e));
         let resting = Vector3::new(w[0], w[1], w[2]) - sliding;
-        let (alone, lifted) = self.alone(k, &resting)?;
         let mut shares = [sliding, resting];
         if k == 0 {
             shares.reverse();
@@ -346,10 +415,10 @@ impl Problem<'_, '_> {
             zeta,
             shares,
             rolls_on: Some(k),
-            bounds: Bounds { lower: mu, upper: mu.max(alone) },
+            bounds: Bounds { lower: mu, upper: mu },
             evaluations: 0,
         };
-        Some(Rolling { answer, alone, lifted })
+        Some(Rolling { answer, on: k })
     }
 
     /// The friction that face `k` alone needs for a load, and its motion.
@@ -384,7 +453,8 @@ impl Problem<'_, '_> {
             w.dot(zeta) / (self.normal * self.both(&zeta.component_div(&self.units)).value)
         };
         // The face at rest is moved as it would move by itself.
-        let (zeta, lifted) = (best.answer.zeta, best.lifted);
+        let (_, lifted) = self.alone(best.on, &best.answer.shares[best.on])?;
+        let zeta = best.answer.zeta;
         let size = |zeta: &Vector5<f64>| zeta.component_div(&self.units).norm();
         let ratio = size(&zeta) / size(&lifted);
         (0..25)
@@ -404,8 +474,6 @@ impl Problem<'_, '_> {
 #[derive(Debug, Clone, Copy)]
 struct Rolling {
     answer: Slipping,
-    /// Friction that the face at rest needs for its share.
-    alone: f64,
-    /// How that face would move for it.
-    lifted: Vector5<f64>,
+    /// The face at rest.
+    on: usize,
 }

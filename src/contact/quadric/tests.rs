@@ -1,0 +1,178 @@
+use super::*;
+
+fn rectangle(half: DVec2) -> Ring {
+    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+        .map(|(x, y)| half * DVec2::new(x, y))
+        .to_vec()
+}
+
+fn shapes() -> Vec<(Vec<Ring>, Quadratic)> {
+    let square = vec![rectangle(DVec2::new(2.0, 1.5))];
+    let mut hollow = square.clone();
+    hollow.push(rectangle(DVec2::new(0.3, 0.2)).into_iter().rev().collect());
+    let kinds = [
+        // Cylinder with and without tilt, parted; sphere; barrel cut by the ends; planes; bore.
+        (1.0, (0.0, 0.0), (0.0, -4.0)),
+        (1.0, (0.2, 0.1), (0.0, -4.0)),
+        (0.3, (0.4, 0.0), (0.0, -4.0)),
+        (0.5, (0.1, -0.2), (-1.5, -1.5)),
+        (1.0, (0.1, 0.2), (-0.2, -3.0)),
+        (1.0, (0.1, 0.2), (-3.0, -0.1)),
+        (1.0, (0.2, -0.1), (0.0, 0.0)),
+        (0.5, (0.6, -0.2), (0.0, 0.0)),
+        (-0.5, (0.1, 0.05), (0.0, 2.0)),
+    ];
+    let quadratic = |(c, g, l): (f64, (f64, f64), (f64, f64))| Quadratic {
+        c,
+        g: DVec2::from(g),
+        l: DVec2::from(l),
+    };
+    kinds
+        .into_iter()
+        .flat_map(|kind| [(square.clone(), quadratic(kind)), (hollow.clone(), quadratic(kind))])
+        .collect()
+}
+
+/// The integrals as they are defined: lines of Gauss points between all places where something
+/// happens on the line.
+fn by_lines(rings: &[Ring], u: &Quadratic, f: impl Fn(DVec2) -> f64) -> f64 {
+    let mut total = 0.0;
+    let n = 3000;
+    for i in 0..n {
+        let x = -2.0 + 4.0 * (f64::from(i) + 0.5) / f64::from(n);
+        let mut cuts = vec![-1.5, 1.5, -0.2, 0.2];
+        let at = |y: f64| u.value(DVec2::new(x, y));
+        let bend = 0.5 * u.l.y;
+        cuts.extend(roots(at(0.0), u.g.y, bend).into_iter().flatten());
+        cuts.retain(|y| y.abs() <= 1.5);
+        cuts.sort_by(f64::total_cmp);
+        for pair in cuts.windows(2) {
+            let middle = DVec2::new(x, 0.5 * (pair[0] + pair[1]));
+            if !contains(rings, middle) || u.value(middle) <= 0.0 {
+                continue;
+            }
+            for &(t, w) in &RULES[12] {
+                let y = DVec2::new(x, pair[0] + t * (pair[1] - pair[0]));
+                total += w * (pair[1] - pair[0]) * f(y) * u.value(y);
+            }
+        }
+    }
+    total * 4.0 / f64::from(n)
+}
+
+#[test]
+fn areas_and_dissipations_agree_with_lines_of_points() {
+    for (rings, u) in shapes() {
+        let region = Region::new(&rings, u);
+        let (_, load) = region.area_and_load();
+        let wanted = by_lines(&rings, &u, |_| 1.0);
+        assert!((load / wanted - 1.0).abs() < 3e-5, "{u:?} {load} {wanted}");
+        for twist in [[0.3, 0.2, 1.0], [1.0, -2.0, 0.3], [0.0, 0.1, -1.0], [1.0, 0.5, 0.0]] {
+            let got = region.dissipation(twist).value;
+            let [u1, u2, omega] = twist;
+            let speed = |x: DVec2| DVec2::new(u1 - omega * x.y, u2 + omega * x.x).length();
+            let wanted = by_lines(&rings, &u, speed);
+            assert!((got / wanted - 1.0).abs() < 3e-5, "{u:?} {twist:?} {got} {wanted}");
+        }
+    }
+}
+
+/// Both ways to integrate agree where both apply, and the derivatives are those of the value.
+#[test]
+fn both_ways_agree_and_the_derivatives_are_those_of_the_value() {
+    for (rings, u) in shapes() {
+        let region = Region::new(&rings, u);
+        for i in 0..40 {
+            let angle = 0.7 * f64::from(i);
+            let c = region.middle
+                + region.half * (0.1 + 0.05 * f64::from(i)) * DVec2::from_angle(angle);
+            let twist = [c.y, -c.x, 1.0].map(|x| if i % 2 == 0 { x } else { -x });
+            let got = region.dissipation(twist);
+            // Points of the area serve at a slip centre inside too, on many panels.
+            let (mut points, mut edge) = (Default::default(), EdgeSums::default());
+            for element in &region.elements {
+                let whole = [[0.0, 1.0]; 2];
+                region.area_panel::<true>(element, twist, c, whole, 0, &mut points);
+                region.edge_panel::<true>(element, c, [0.0, 1.0], 0, &mut edge);
+            }
+            let (edges, by_edges) = edge.assemble(c, twist[2]);
+            let (points, by_points) = points;
+            for (a, b) in by_points.iter().flatten().zip(by_edges.iter().flatten()) {
+                assert!((a - b).abs() < 1e-9, "{u:?} {twist:?} {by_points:?} {by_edges:?}");
+            }
+            assert!(
+                (points.value / edges.value - 1.0).abs() < 1e-11,
+                "{u:?} {twist:?} {points:?} {edges:?}"
+            );
+            let euler: f64 = (0..3).map(|k| got.gradient[k] * twist[k]).sum();
+            assert!((euler / got.value - 1.0).abs() < 1e-13, "{u:?} {twist:?} {got:?}");
+            let step = 1e-5;
+            for k in 0..3 {
+                let moved = |by: f64| {
+                    let mut twist = twist;
+                    twist[k] += by;
+                    region.dissipation(twist)
+                };
+                let (up, down) = (moved(step), moved(-step));
+                let slope = (up.value - down.value) / (2.0 * step);
+                assert!(
+                    (slope - got.gradient[k]).abs() < 1e-7 * got.value,
+                    "{u:?} {twist:?} {k}: {slope} {got:?}"
+                );
+                for j in 0..3 {
+                    let bend = (up.gradient[j] - down.gradient[j]) / (2.0 * step);
+                    assert!(
+                        (bend - got.hessian[j][k]).abs() < 1e-5 * got.value,
+                        "{u:?} {twist:?} {j}{k}: {bend} {got:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// The sphere's closed form: pressure `1 - r^2` on the unit disc, slip centre at a distance.
+#[test]
+fn the_sphere_agrees_with_its_closed_form() {
+    let u = Quadratic { c: 1.0, g: DVec2::ZERO, l: DVec2::splat(-2.0) };
+    let region = Region::new(&[rectangle(DVec2::splat(3.0))], u);
+    let (area, load) = region.area_and_load();
+    let half = std::f64::consts::FRAC_PI_2;
+    assert!((load / half - 1.0).abs() < 1e-14 && (area / half - 2.0).abs() < 1e-7);
+    for (k, wanted) in [
+        (0.0, 4.0 * std::f64::consts::PI / 15.0),
+        (0.3, 0.930_427_403_020_475_5),
+        (0.6, 1.190_088_973_586_390_5),
+        (0.95, 1.636_037_182_195_247_7),
+        (1.0, 128.0 / 75.0),
+    ] {
+        let got = region.dissipation([0.0, -k, 1.0]).value;
+        assert!((got / wanted - 1.0).abs() < 1e-14, "{k}: {got} {wanted}");
+    }
+}
+
+/// The planar integrals of this library, for the special case of a plane.
+#[test]
+fn a_plane_agrees_with_the_planar_closed_forms() {
+    use crate::contact::{Field, Loops, Twist, friction};
+    use crate::model::Polygon;
+    let ring = rectangle(DVec2::new(2.0, 1.5));
+    let area = Loops::new(&[Polygon { outer: ring.clone(), holes: Vec::new() }]);
+    let p = [1.0, 0.3, -0.2];
+    let u = Quadratic { c: p[0], g: DVec2::new(p[1], p[2]), l: DVec2::ZERO };
+    let region = Region::new(&[ring], u);
+    for i in 0..60 {
+        let c = 0.1 * f64::from(i) * DVec2::from_angle(f64::from(i));
+        let twist = [c.y, -c.x, 1.0];
+        let wanted = friction(Field { area: &area, p }, Twist::about(c));
+        let gradient = wanted.gradient(p);
+        let got = region.dissipation(twist);
+        for j in 0..3 {
+            assert!((got.gradient[j] - gradient[j]).abs() < 1e-13 * 12.0 * (1.0 + c.length()));
+            for k in 0..3 {
+                let off = (got.hessian[j][k] - wanted.hessian[j][k]).abs();
+                assert!(off < 1e-12 * (1.0 + c.length_squared()) * 12.0, "{c:?} {off:e}");
+            }
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! Which of many loads on one contact can be the worst, for a small part of their solutions.
+//!
+//! Each load begins at the state of one solved before: the motion that moves it most, the tilt and
+//! compressions of the one pressed most like it. A few steps of Newton's method on all unknowns give
+//! its `mu_s`, or show, by how fast the steps shrink, that it stays below that of another load.
+
+use glam::DVec2;
+
+use super::equilibrium::Problem;
+use super::face::Pressed;
+use super::joint::{Found, Joint, Mode, Place, Reached};
+use super::space::{self, Kind};
+use super::{Case, Pads, slip, strong};
+use crate::model::Wrench;
+
+/// What is known of a load.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Compared {
+    /// It is held, and its `mu_s` is less than the value asked for.
+    Below,
+    /// It is held with this `mu_s`, but for rounding.
+    At(f64),
+    /// Nothing: it is to be solved.
+    Open,
+}
+
+/// Compares loads on one contact.
+pub struct Screen<'a> {
+    problem: Problem<'a>,
+    /// Squeezed without a load.
+    pressed: [Pressed<'a>; 2],
+    force: f64,
+    length: f64,
+    give: f64,
+    /// States found so far, with what tells how a load presses.
+    known: Vec<([f64; 3], Place)>,
+}
+
+/// States kept.
+const MOST: usize = 64;
+/// Share of the limit of a strong coupling from which on a load is solved.
+const WEAK: f64 = 0.8;
+/// Sine of the angle between two axes that are one.
+const SAME_AXIS: f64 = 1e-6;
+/// Share of the limit of a strong coupling up to which friction hardly moves the pressure, and the
+/// growth of a bound that covers what it does: its lever moves the middle of pressure by less than a
+/// twentieth of the contact's width.
+const HARDLY: f64 = 0.1;
+const GROWN: f64 = 2.0;
+
+impl Pads {
+    /// For the comparison of some loads; `None` where the part may settle or twist in a way that each
+    /// load decides by itself. Numbers must be finite and `force` positive.
+    pub fn screen(&self, distance: f64, force: f64, wrenches: &[Wrench]) -> Option<Screen<'_>> {
+        if self.faces.iter().any(|face| face.fields.is_empty()) {
+            return None;
+        }
+        let squeeze = |pull: f64| {
+            let one = self.faces[0].carry(force + 0.5 * pull, DVec2::ZERO, None)?;
+            Some([one, self.faces[1].carry(force - 0.5 * pull, DVec2::ZERO, None)?])
+        };
+        let free = |pressed: &[Pressed<'_>; 2]| {
+            let rotations = space::rotations([&pressed[0], &pressed[1]], distance);
+            let free = rotations.map(|rotation| match rotation.kind {
+                Kind::Free | Kind::Facets(_) => Some(true),
+                Kind::Held => Some(false),
+                Kind::Nearly(_) => None,
+            });
+            Some((rotations, [free[0]?, free[1]?]))
+        };
+        let pressed = squeeze(0.0)?;
+        let (rotations, is_free) = free(&pressed)?;
+        // The same rotations are free however much one pad is pulled off.
+        let pulls = wrenches.iter().map(|wrench| wrench.force.z).filter(|z| z.abs() < 2.0 * force);
+        let (low, high) = pulls.fold((0.0, 0.0), |(a, b): (f64, f64), z| (a.min(z), b.max(z)));
+        for pull in [low, high].into_iter().filter(|pull| pull.abs() > 1e-9 * force) {
+            let (others, other_free) = free(&squeeze(pull)?)?;
+            let same = (0..2).all(|i| {
+                let apart = rotations[i].axis.perp_dot(others[i].axis).abs();
+                is_free[i] == other_free[i] && (is_free[0] == is_free[1] || apart < SAME_AXIS)
+            });
+            if !same {
+                return None;
+            }
+        }
+        let faces = [&pressed[0], &pressed[1]];
+        let (length, normal) = (slip::length(faces), [force; 2]);
+        let wrench = &Wrench::default();
+        let case = Case {
+            faces: &self.faces,
+            pressed: faces,
+            distance,
+            normal,
+            wrench,
+            rotations,
+            search: true,
+        };
+        let problem = case.problem(is_free);
+        let give = pressed[0].compression().max(pressed[1].compression());
+        Some(Screen { problem, force, length, give, known: Vec::new(), pressed })
+    }
+}
+
+impl Screen<'_> {
+    /// About the `mu_s` of a load, for the order in which loads are compared.
+    pub fn estimate(&self, wrench: &Wrench) -> f64 {
+        let (force, moment) = (wrench.force.truncate(), wrench.moment.truncate());
+        let spins = self.problem.space.spins.iter();
+        let spun: f64 = spins.map(|e| e.dot(moment).powi(2)).sum();
+        let lever = 0.5 * self.problem.distance;
+        let turned = wrench.moment.z / self.length;
+        // The pad pressed less slips first.
+        let pressed = self.force - 0.5 * wrench.force.z.abs();
+        (force.length_squared() + turned * turned + spun / (lever * lever)).sqrt() / pressed
+    }
+
+    /// Compares the `mu_s` of a load with `value`; zero asks for its `mu_s`.
+    pub fn compare(&mut self, wrench: &Wrench, value: f64) -> Compared {
+        let normal = [self.force + 0.5 * wrench.force.z, self.force - 0.5 * wrench.force.z];
+        if normal.iter().any(|n| *n <= 0.0) {
+            return Compared::Open;
+        }
+        (self.problem.normal, self.problem.wrench) = (normal, *wrench);
+        let Some((compared, place, most)) = self.reach(value) else { return Compared::Open };
+        if strong(&self.problem, most / WEAK) {
+            return Compared::Open;
+        }
+        if self.known.len() < MOST {
+            self.known.push((self.presses(), place));
+        }
+        compared
+    }
+
+    /// What tells how a load presses.
+    fn presses(&self) -> [f64; 3] {
+        let moment = self.problem.wrench.moment.truncate() / self.length;
+        [self.problem.wrench.force.z, moment.x, moment.y]
+    }
+
+    fn reach(&self, value: f64) -> Option<(Compared, Place, f64)> {
+        let joint = Joint::new(&self.problem, self.length, self.give);
+        let start = self.start(&joint);
+        if let Some(answer) = self.rolls(&joint, &start) {
+            return Some(answer);
+        }
+        if start.mode == Mode::Slips
+            && let Some(reached) = joint.newton(&start, value)
+        {
+            return Some(told(reached));
+        }
+        // From the pressure alone.
+        let off = Place { mode: Mode::Off, ..start };
+        let Reached::Solution(still) = joint.newton(&off, 0.0)? else { return None };
+        let place = still.place;
+        let faces = still.pressed(self.problem.normal);
+        let faces = [&faces[0], &faces[1]];
+        let w = self.problem.along(faces, self.problem.moment_beyond(faces), DVec2::ZERO);
+        // So little friction hardly moves the pressure.
+        let enough = GROWN * slip::enough(&self.problem.space, faces, self.problem.distance, w)?;
+        if enough < value && !strong(&self.problem, enough / HARDLY) {
+            return Some((Compared::Below, place, enough));
+        }
+        let slip = slip::solve(&self.problem.space, faces, self.problem.distance, w, None)?;
+        let mode = slip.rolls_on.map_or(Mode::Slips, Mode::Rolls);
+        let place = Place { mode, motion: joint.motion(&slip, &w), ..place };
+        let reached = joint.newton(&place, value)?;
+        if mode == Mode::Slips { Some(told(reached)) } else { self.rests(reached) }
+    }
+
+    /// The state to begin at, from those of other loads.
+    fn start(&self, joint: &Joint<'_, '_>) -> Place {
+        let here = self.presses();
+        let apart = |other: &[f64; 3]| -> f64 {
+            other.iter().zip(&here).map(|(a, b)| (a - b) * (a - b)).sum()
+        };
+        let nearest = self.known.iter().min_by(|a, b| apart(&a.0).total_cmp(&apart(&b.0)));
+        let mut start = nearest
+            .map_or_else(|| Place::new([&self.pressed[0], &self.pressed[1]]), |(_, place)| *place);
+        let slips = self.known.iter().filter(|(_, place)| place.mode == Mode::Slips);
+        let moved = slips.map(|(_, place)| (joint.power(&place.motion), place.motion));
+        let most = moved.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+        start.mode = Mode::Off;
+        if let Some((power, motion)) = most.filter(|(power, _)| *power != 0.0) {
+            (start.mode, start.motion) = (Mode::Slips, motion * power.signum());
+        }
+        start
+    }
+
+    /// The body rolls on one face, if that is the answer.
+    fn rolls(&self, joint: &Joint<'_, '_>, start: &Place) -> Option<(Compared, Place, f64)> {
+        if self.problem.space.spins.is_empty() {
+            return None;
+        }
+        (0..2)
+            .filter(|&k| joint.may_roll(k))
+            .find_map(|k| self.rests(joint.newton(&Place { mode: Mode::Rolls(k), ..*start }, 0.0)?))
+    }
+
+    /// A body that rolls, if the face at rest bears what it must.
+    fn rests(&self, reached: Reached<'_>) -> Option<(Compared, Place, f64)> {
+        let Reached::Solution(found) = reached else { return None };
+        let Found { place, mu, resting, .. } = *found;
+        let Mode::Rolls(k) = place.mode else { return None };
+        let faces = found.pressed(self.problem.normal);
+        let rests = slip::rests([&faces[0], &faces[1]], k, &resting, mu);
+        rests.then_some((Compared::At(mu), place, mu))
+    }
+}
+
+fn told(reached: Reached<'_>) -> (Compared, Place, f64) {
+    match reached {
+        Reached::Solution(found) => (Compared::At(found.mu), found.place, found.mu),
+        Reached::Below(place, most) => (Compared::Below, place, most),
+    }
+}
