@@ -94,7 +94,28 @@ fn main() -> ExitCode {
 
 /// The command line, with help that states the defaults.
 fn command() -> clap::Command {
-    plan::with_defaults(Cli::command())
+    plan::with_defaults(Cli::command()).long_version(version())
+}
+
+/// Version, what this build has, and for which machine it was made.
+fn version() -> &'static str {
+    let features = [
+        ("gpu", cfg!(feature = "gpu")),
+        ("parquet", cfg!(feature = "parquet")),
+        ("hdf5", cfg!(feature = "hdf5")),
+        ("step", cfg!(feature = "step")),
+    ];
+    let list = |built: bool| {
+        let names = features.iter().filter(|(_, has)| *has == built).map(|(name, _)| *name);
+        Some(names.collect::<Vec<_>>().join(" ")).filter(|names| !names.is_empty())
+    };
+    let mut text = env!("CARGO_PKG_VERSION").to_owned();
+    text += &format!("\nfeatures: {}", list(true).unwrap_or_else(|| "none".to_owned()));
+    if let Some(names) = list(false) {
+        text += &format!("\nnot in this build: {names}");
+    }
+    text += &format!("\nfor: {} {}", std::env::consts::ARCH, std::env::consts::OS);
+    text.leak()
 }
 
 /// Parses the command line, or says what is wrong with it and ends.

@@ -267,3 +267,22 @@ fn what_is_missing_is_told_with_where_it_comes_from() {
         assert!(output.status.code() == Some(2) && told.contains(word), "{told}");
     }
 }
+
+#[test]
+fn the_version_names_what_the_build_has() {
+    let said = |flag: &str| String::from_utf8(gripfast(&[flag]).stdout).unwrap();
+    let version = concat!("gripfast ", env!("CARGO_PKG_VERSION"));
+    assert_eq!(said("-V").trim_end(), version);
+    let long = said("--version");
+    assert!(long.starts_with(version), "{long}");
+    for (name, has) in [
+        ("gpu", cfg!(feature = "gpu")),
+        ("parquet", cfg!(feature = "parquet")),
+        ("hdf5", cfg!(feature = "hdf5")),
+        ("step", cfg!(feature = "step")),
+    ] {
+        let line = long.lines().find(|line| line.split(' ').any(|word| word == name));
+        let begin = if has { "features: " } else { "not in this build: " };
+        assert!(line.is_some_and(|line| line.starts_with(begin)), "{name}: {long}");
+    }
+}
