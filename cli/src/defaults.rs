@@ -135,7 +135,7 @@ mod tests {
         use clap::Parser;
         for line in [
             "gripfast plan x -g a --mass 1kg --mass 2kg",
-            "gripfast plan x -g a --mass 1kg --force 1N --force 2N",
+            "gripfast plan x -g a --mass 1kg --spacing 1mm --spacing 2mm",
             "gripfast export g.json -o a.csv -o b.csv",
         ] {
             let error = super::super::Cli::try_parse_from(line.split(' ')).unwrap_err();

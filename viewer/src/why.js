@@ -81,6 +81,9 @@ export function reason(name, report) {
       const [axis, most] = (of ?? '').split('_');
       return [`Moment about ${axis} over the limit`, `A load turns the part about ${axis} at the pads with more than the ${most}\u00a0N\u00b7m that the gripper file states.`, 'Places nearer to the centre of mass (--max-offset), or a stronger gripper.'];
     },
+    over_pressure: () => ['Pressure over the limit', `The squeeze alone would press a face with more than the ${(of ?? '').replaceAll('_', '\u00a0')} asked for.`, 'A smaller --force, larger or softer pads, or a larger --max-pressure.'],
+    face_pair_leans_too_much: () => ['Faces lean too much', 'The two faces are not parallel, and lean by more than the layers of the pads take up.', 'Softer or thicker pads (pad.stiffness in the gripper file), or pads that align themselves.'],
+    bore_too_narrow_for_pads: () => ['Bore too narrow', 'The pads are wider than the bore, so that their edges would touch first.', 'A gripper with narrower outer pads.'],
     not_chosen: () => ['Not among the ids asked for', '', 'More of them: --ids.'],
     duplicate: () => ['Same as another by symmetry', 'Another grip of the list stands for it.', ''],
     outranked: () => ['Behind the best ones kept', 'Bounds put it behind the grips that are listed.', ''],

@@ -150,6 +150,8 @@ const faint = (page) => page.evaluate(() => {
 });
 
 async function legible(page, where) {
+  // Grounds fade from one colour to the next.
+  await page.evaluate(() => Promise.allSettled(document.getAnimations().map((animation) => animation.finished)));
   const lying = await overlaps(page);
   check(`no text lies over another ${where}`, lying.length === 0, lying.slice(0, 5).join('; '));
   const pale = await faint(page);

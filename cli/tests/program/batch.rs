@@ -122,7 +122,7 @@ fn one_bad_part_stops_nothing_and_every_job_says_what_became_of_it() {
                 assert!(["format", "geometry"].contains(&kind), "{id}: {error}");
             }
             "empty" => {
-                assert!(entry["reason"].as_str().unwrap().contains("planar faces"), "{entry}");
+                assert!(entry["reason"].as_str().unwrap().contains("opposite faces"), "{entry}");
                 assert_eq!(entry["health"]["watertight"], true);
             }
             _ => {

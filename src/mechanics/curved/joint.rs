@@ -212,7 +212,7 @@ impl<'p, 'a> Joint<'p, 'a> {
         let directions = &self.tilts[..n];
         let trials =
             [0, 1].map(|k| self.problem.faces[k].trial(x[5 + k] * self.give, tilt, directions));
-        if trials.iter().any(|trial| !(trial.carried[0] > 0.0)) {
+        if trials.iter().any(|trial| trial.carried[0].is_nan() || trial.carried[0] <= 0.0) {
             return None;
         }
         let none = Carried::zeros();
