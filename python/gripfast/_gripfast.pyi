@@ -15,6 +15,7 @@ __version__: str
 parquet: bool
 
 __all__ = [
+    "assess",
     "__version__",
     "parquet",
     "Part",
