@@ -53,7 +53,7 @@ use crate::model::Negative;
 use crate::part::{MassProperties, Part};
 use crate::propose::{Explanation, ProposeOptions, Proposer};
 use crate::rank;
-use crate::request::{Polish, Request};
+use crate::request::{Choice, Polish, Request};
 use crate::results::{GripSet, LoadCase, PartSummary, Provenance, RankedGrip, Resolved, Summary};
 use crate::units::{Force, Length};
 use noise::Noise;
@@ -247,7 +247,10 @@ impl Plan {
         }
         let scoring = &self.request.scoring;
         let selection = select(scoring.backend, scoring.adapter.as_deref())?;
-        observer.note(&format!("backend {}", selection.reason));
+        // Of a machine without a graphics processor there is nothing to say.
+        if scoring.backend != Choice::Auto || !matches!(selection.backend, Backend::Cpu) {
+            observer.note(&format!("backend {}", selection.reason));
+        }
         let assessor = self.assessor(&selection.backend);
         let mut proposer = Proposer::new(&self.part, &self.gripper, &self.propose)?;
         let output = self.request.output.output.as_deref();
