@@ -142,9 +142,7 @@ impl Facets {
         // widens tolerances that are narrow either way.
         above + below > 3.2e-3 * flat && above.min(below) > 2e-4 * flat
     }
-}
 
-impl Facets {
     /// Area of flat regions of much the same size that `within` \[m\] would join, by the way in which
     /// they are folded: a plane of two triangles whose corners lie off it falls into halves, which
     /// no part has that bend both ways.

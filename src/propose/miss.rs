@@ -7,8 +7,10 @@ use super::explain::clipped;
 use super::options::Rejection;
 use super::patch::{Scratch, Touch};
 use super::proposer::{Item, Prepared, Proposer};
+use super::stroke::Stroke;
 use super::work::{self, Pads};
 use crate::clash::Tree;
+use crate::geometry::polygon::{Bounds2, bounds};
 use crate::gripper::Jaws;
 use crate::model::{Frame, Miss, Negative};
 use crate::part::{PairKind, PlanarFace};
@@ -43,8 +45,7 @@ impl Proposer<'_> {
         let x1 = if upright { down.normalize() } else { face.part_from_face.rotation.x_axis };
         let inside = pair.kind == PairKind::Internal;
         let out = if inside { 0.5 } else { -0.5 };
-        let reach = if inside { 2.0 * self.gripper.outer_pad.unwrap_or(0.0) } else { 0.0 };
-        let [least, most] = self.gripper.stroke.map(|width| width + reach);
+        let beyond = Stroke::new(pair.kind, self.gripper, &self.options).beyond(pair.width);
         let pose = Negative {
             id: 0,
             part_from_grip: Frame {
@@ -58,7 +59,7 @@ impl Proposer<'_> {
             inside,
             reason: Rejection::Stroke.name(),
         };
-        Some(Miss::new(pose, Some((least - pair.width).max(pair.width - most)), None))
+        Some(Miss::new(pose, Some(beyond), None))
     }
 
     /// What the candidate of an item with one position lacks, and where a body meets what stops it.
@@ -155,16 +156,10 @@ impl Proposer<'_> {
 /// The middle of what two faces have in common, by their bounds, on the first one, part frame.
 fn middle(face: &PlanarFace, other: &PlanarFace) -> DVec3 {
     let seen = face.part_from_face.inverse().compose(&other.part_from_face);
-    let bounds = |points: &mut dyn Iterator<Item = DVec2>| {
-        points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), point| {
-            (low.min(point), high.max(point))
-        })
-    };
-    let points = |face: &PlanarFace| {
-        face.polygons.iter().flat_map(|polygon| polygon.outer.clone()).collect::<Vec<_>>()
-    };
-    let own = bounds(&mut points(face).into_iter());
-    let others = points(other).into_iter().map(|point| seen.point(point.extend(0.0)).truncate());
-    let (low, high) = bounds(&mut others.into_iter());
-    face.part_from_face.point(((own.0.max(low) + own.1.min(high)) / 2.0).extend(0.0))
+    let own = bounds(&face.polygons);
+    let points = other.polygons.iter().flat_map(|polygon| &polygon.outer);
+    let others: Vec<DVec2> = points.map(|point| seen.point(point.extend(0.0)).truncate()).collect();
+    let others = Bounds2::of(&others);
+    let common = Bounds2 { min: own.min.max(others.min), max: own.max.min(others.max) };
+    face.part_from_face.point(common.centre().extend(0.0))
 }

@@ -18,6 +18,7 @@ mod patch;
 mod proposer;
 mod sample;
 mod site;
+mod stroke;
 mod work;
 
 pub use displace::Displacement;

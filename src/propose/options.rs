@@ -111,6 +111,11 @@ fn checksum<S: Serializer>(
 }
 
 impl ProposeOptions {
+    /// The force of one jaw \[N\]: the gripper's largest where none is stated.
+    pub(super) fn force_on(&self, gripper: &Gripper) -> f64 {
+        self.force.unwrap_or(gripper.force[1])
+    }
+
     /// Those of a request, with the scene that it names.
     ///
     /// # Errors

@@ -15,6 +15,7 @@ use super::environment::{Environment, Way};
 use super::options::{ProposeOptions, Rejection};
 use super::patch::PatchIndex;
 use super::site::{self, Places, Site, Sites};
+use super::stroke::Stroke;
 use super::work;
 use crate::clash::{Sweep, Topology, Tree, sweeps};
 use crate::error::{Error, Result};
@@ -30,8 +31,6 @@ const ITEM: usize = 2048;
 /// finely tessellated outlines, chunks have fewer candidates.
 const MOST_CORNERS: usize = 4_000_000;
 
-/// Rounding of a width against the stroke \[m\].
-const STROKE: f64 = 1e-9;
 /// Widths of face pairs outside the stroke that are told apart \[m\], and how many are kept.
 const SAME_WIDTH: f64 = 1e-5;
 const MOST_WIDTHS: usize = 5;
@@ -96,7 +95,7 @@ impl Tally {
                 angles.join(", "),
                 gripper.name,
                 site::steepest(gripper, options).to_degrees(),
-                options.force.unwrap_or(gripper.force[1])
+                options.force_on(gripper)
             ));
         }
         if count(Rejection::PadTooWide) > 0 {
@@ -125,12 +124,12 @@ impl Tally {
         remarks
     }
 
-    fn note_width(&mut self, width: f64, [least, most]: [f64; 2]) {
+    fn note_width(&mut self, width: f64, stroke: &Stroke) {
         if self.widths_outside.iter().any(|known| (known - width).abs() < SAME_WIDTH) {
             return;
         }
-        let beyond = |width: f64| (least - width).max(width - most);
-        let place = self.widths_outside.partition_point(|known| beyond(*known) <= beyond(width));
+        let beyond = stroke.beyond(width);
+        let place = self.widths_outside.partition_point(|known| stroke.beyond(*known) <= beyond);
         self.widths_outside.insert(place, width);
         self.widths_outside.truncate(MOST_WIDTHS);
     }
@@ -229,30 +228,28 @@ impl<'a> Proposer<'a> {
         let (chosen_faces, outside) = (chosen.as_deref(), &mut None);
         let mut choice =
             Choice { chosen: chosen_faces, pairs: &mut pairs, tally: &mut tally, outside };
-        let [least, most] = gripper.stroke;
+        let stroke = |kind| Stroke::new(kind, gripper, options);
         if options.outside {
-            let opened = [least, most - 2.0 * options.min_opening];
-            choice.take(part.pairs(0.0, f64::INFINITY), gripper.stroke, opened);
+            choice.take(part.pairs(0.0, f64::INFINITY), &stroke(PairKind::External));
         }
         if options.inside {
-            let Some(outer) = gripper.outer_pad else {
+            if gripper.outer_pad.is_none() {
                 let remedy = "state pad.outer_face in the gripper file: the distance from the pad face to the finger's outer gripping face";
                 return Err(Error::input(
                     &gripper.name,
                     "inside grips need outer pads, and this gripper states none",
                     remedy,
                 ));
-            };
-            let reach = gripper.stroke.map(|width| width + 2.0 * outer);
-            let opened = [reach[0] + 2.0 * options.min_opening, reach[1]];
-            choice.take(part.internal_pairs(0.0, f64::INFINITY), reach, opened);
+            }
+            choice.take(part.internal_pairs(0.0, f64::INFINITY), &stroke(PairKind::Internal));
         }
         let outside = choice.outside.take();
         let environment = Environment::new(options);
         let Sites { sites, directions, plane, round } =
             site::sites(part, gripper, options, &environment, &pairs, chosen.as_deref())?;
         tally.pairs = pairs.len() as u64 + round.pairs;
-        round.widths.iter().for_each(|&width| tally.note_width(width, gripper.stroke));
+        let outer = stroke(PairKind::External);
+        round.widths.iter().for_each(|&width| tally.note_width(width, &outer));
         tally.leaning = round.leans;
         tally.leaning.sort_by(f64::total_cmp);
         tally.leaning.dedup_by(|a, b| (*a - *b).abs() < SAME_LEAN);
@@ -538,21 +535,19 @@ struct Choice<'a> {
 }
 
 impl Choice<'_> {
-    /// Takes the pairs with a width in `opened`: `stroke` but for the least opening.
-    fn take(&mut self, all: Vec<FacePair>, stroke: [f64; 2], opened: [f64; 2]) {
-        let within =
-            |[least, most]: [f64; 2], width: f64| (least - STROKE..=most + STROKE).contains(&width);
+    /// Takes the pairs that the jaws reach.
+    fn take(&mut self, all: Vec<FacePair>, stroke: &Stroke) {
         for pair in all {
             let chosen = |face: u32| self.chosen.is_none_or(|chosen| chosen[face as usize]);
-            let reason = if !within(stroke, pair.width) {
-                self.tally.note_width(pair.width, stroke);
-                let beyond = |pair: &FacePair| (stroke[0] - pair.width).max(pair.width - stroke[1]);
-                if self.outside.as_ref().is_none_or(|known| beyond(&pair) < beyond(known)) {
-                    *self.outside = Some(pair);
+            let reason = if let Err(reason) = stroke.check(pair.width) {
+                if reason == Rejection::Stroke {
+                    self.tally.note_width(pair.width, stroke);
+                    let beyond = |pair: &FacePair| stroke.beyond(pair.width);
+                    if self.outside.as_ref().is_none_or(|known| beyond(&pair) < beyond(known)) {
+                        *self.outside = Some(pair);
+                    }
                 }
-                Rejection::Stroke
-            } else if !within(opened, pair.width) {
-                Rejection::OpeningTooSmall
+                reason
             } else if !chosen(pair.face_i) || !chosen(pair.face_ii) {
                 Rejection::FaceNotChosen
             } else {

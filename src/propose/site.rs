@@ -10,6 +10,7 @@ mod round;
 mod rows;
 mod shapes;
 mod special;
+mod tapers;
 
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};

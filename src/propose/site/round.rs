@@ -10,15 +10,17 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3};
 
 use super::relief::{LEVEL, Relief, Surveyor};
-use super::rows::upright;
 use super::shapes::{project, stretches};
+use super::tapers::upright;
 use super::{Base, Finder, SAME_PLANE, Site, axes, lie};
 use crate::error::Result;
 use crate::geometry::overlay;
 use crate::geometry::polygon::{self, Bounds2};
 use crate::geometry::sphere::directions;
+use crate::model::Piece;
 use crate::part::{CurvedFace, PairKind, Shape};
 use crate::propose::options::Rejection;
+use crate::propose::stroke::Stroke;
 
 /// Axes whose directions differ by less are one \[rad\].
 const SAME_AXIS: f64 = 3e-4;
@@ -33,8 +35,6 @@ const MOST_DIVISIONS: usize = 8;
 /// Share of the distance of two crests by which their radii may fall short of it: on one axis they
 /// are the same.
 const ON_ONE_AXIS: f64 = 2e-3;
-/// Rounding of a width against the stroke \[m\].
-pub(super) const STROKE: f64 = 1e-9;
 
 /// What came of the pairs of curved faces.
 #[derive(Debug, Default)]
@@ -48,10 +48,25 @@ pub(in crate::propose) struct Round {
     pub(in crate::propose) leans: Vec<f64>,
 }
 
+/// What came of pairs of faces: nothing, or the reason for which there is no site.
+#[derive(Default)]
+pub(super) struct Outcomes(BTreeMap<(u32, u32), Option<Rejection>>);
+
+impl Outcomes {
+    /// Of a pair in one closing direction: one with sites is enough.
+    pub(super) fn add(&mut self, a: u32, b: u32, outcome: Option<Rejection>) {
+        let found = outcome.is_none();
+        let known = self.0.entry((a.min(b), a.max(b))).or_insert(outcome);
+        if found {
+            *known = None;
+        }
+    }
+}
+
 impl Round {
     /// Adds what came of pairs.
-    pub(super) fn count(&mut self, pairs: BTreeMap<(u32, u32), Option<Rejection>>) {
-        for outcome in pairs.into_values() {
+    pub(super) fn count(&mut self, pairs: Outcomes) {
+        for outcome in pairs.0.into_values() {
             match outcome {
                 None => self.pairs += 1,
                 Some(reason) => {
@@ -81,7 +96,7 @@ impl Finder<'_> {
     /// The sites on curved faces.
     pub(super) fn round(&mut self) -> Result<(Vec<Site>, Round)> {
         let mut sites = Vec::new();
-        let mut seen: BTreeMap<(u32, u32), Option<Rejection>> = BTreeMap::new();
+        let mut seen = Outcomes::default();
         let mut widths = Vec::new();
         if !self.options.outside || self.round_faces().next().is_none() {
             return Ok((sites, Round::default()));
@@ -100,11 +115,7 @@ impl Finder<'_> {
                     if matches!(outcome, Some(Rejection::Stroke)) {
                         widths.push(top[0].height + bottom[0].height);
                     }
-                    // One of its directions is enough for a pair.
-                    let known = seen.entry((a.min(b), a.max(b))).or_insert_with(|| outcome.clone());
-                    if outcome.is_none() {
-                        *known = None;
-                    }
+                    seen.add(a, b, outcome);
                 }
             }
         }
@@ -120,6 +131,23 @@ impl Finder<'_> {
         let curved = self.part.curved.iter().map(|face| &face.triangles);
         plane.chain(curved).flatten().for_each(|&triangle| taken[triangle as usize] = true);
         (0..taken.len() as u32).filter(|&triangle| !taken[triangle as usize]).collect()
+    }
+
+    /// What faces each pad's plane in a closing direction: up to a gap of `reach`, and no higher
+    /// than `above` \[m\].
+    pub(super) fn survey(
+        &self,
+        loose: &[u32],
+        direction: usize,
+        heights: [f64; 2],
+        [reach, above]: [f64; 2],
+        region: Bounds2,
+    ) -> [Vec<Piece>; 2] {
+        let axes_from_part = axes(self.directions[direction]);
+        [(heights[0], 1.0), (heights[1], -1.0)].map(|(height, side)| {
+            let part = self.part;
+            Surveyor { part, loose, axes_from_part, height, side, reach, above, region }.pieces()
+        })
     }
 
     pub(super) fn may_touch(&self, id: u32) -> bool {
@@ -297,20 +325,15 @@ impl Finder<'_> {
         {
             return Ok(None);
         }
-        let [least, most] = self.gripper.stroke;
-        let opened = most - 2.0 * self.options.min_opening;
-        if !(least - STROKE..=most + STROKE).contains(&width) {
-            return Ok(Some(Some(Rejection::Stroke)));
-        }
-        if width > opened + STROKE {
-            return Ok(Some(Some(Rejection::OpeningTooSmall)));
+        let stroke = Stroke::new(PairKind::External, self.gripper, self.options);
+        if let Err(reason) = stroke.check(width) {
+            return Ok(Some(Some(reason)));
         }
         let radius = |level: &[Crest]| level.iter().map(|crest| crest.radius).fold(0.0, f64::max);
         if radius(top) + radius(bottom) < width * (1.0 - ON_ONE_AXIS) {
             return Ok(Some(Some(Rejection::RollsApart)));
         }
         let direction = self.direction(closing);
-        let axes_from_part = axes(self.directions[direction]);
         let common =
             Bounds2 { min: boxes[0].min.max(boxes[1].min), max: boxes[0].max.min(boxes[1].max) };
         let region = Bounds2 {
@@ -318,20 +341,8 @@ impl Finder<'_> {
             max: common.max.max(common.min) + 2.0 * reach,
         };
         let layer = self.gripper.layer();
-        let pieces = [0, 1].map(|side: usize| {
-            let surveyor = Surveyor {
-                part: self.part,
-                loose,
-                axes_from_part,
-                height: heights[side],
-                side: [1.0, -1.0][side],
-                reach: layer.reach(),
-                above: layer.reach(),
-                region,
-            };
-            surveyor.pieces()
-        });
-        let force = self.options.force.unwrap_or(self.gripper.force[1]);
+        let pieces = self.survey(loose, direction, heights, [layer.reach(); 2], region);
+        let force = self.options.force_on(self.gripper);
         let place = common.centre();
         let Some(relief) = Relief::new(pieces, layer, force, &self.gripper.pads(width), place)
         else {

@@ -1,70 +1,32 @@
-//! Sites on surfaces that lean against flat pads: opposite planes that are not parallel, outside
-//! cones, and bores, whose walls curve towards a pad.
+//! Sites on surfaces that lean against flat pads, see [`super::tapers`].
 //!
 //! How far apart such pads stand depends on where they touch. Places at which that is the same make
 //! a row along the surface, and each row is a site of its own, for the approach angles at which the
 //! pads reach as far.
 
-use std::collections::BTreeMap;
+use glam::DVec2;
 
-use glam::{DVec2, DVec3};
-use rustc_hash::FxHashSet;
-
-use super::relief::{Relief, Surveyor};
-use super::round::{Round, STROKE};
-use super::shapes::{project, to_site};
+use super::relief::Relief;
+use super::round::{Outcomes, Round};
+use super::shapes::to_site;
+use super::tapers::{STEEPEST, Surface, Taper, WIDEST};
 use super::{Finder, SAME_PLANE, Site, axes};
 use crate::error::Result;
 use crate::geometry::polygon::{self, Bounds2};
 use crate::geometry::{HalfPlane, clip_ring_half_plane, intersect_convex, overlay, support};
 use crate::gripper::{Gripper, Jaw, Layer};
 use crate::mechanics::curved::{Pads, Squeezed};
-use crate::model::{Frame, Gap, Patch, Piece, Ring, Surfaces};
-use crate::part::{ANTIPARALLEL, CurvedFace, PairKind, PlanarFace, Shape};
+use crate::model::{Frame, Patch, Piece, Ring, Surfaces};
+use crate::part::PairKind;
 use crate::propose::options::{ProposeOptions, Rejection};
+use crate::propose::stroke::Stroke;
 
-/// Angle of either surface to the pads up to which two are opposite each other \[rad\].
-const STEEPEST: f64 = 15.0 * std::f64::consts::PI / 180.0;
 /// Share of a layer by which it is compressed at most to take a lean: beyond it is no bed of springs.
 const LAYER_SHARE: f64 = 1.0 / 3.0;
-/// Half width of a pad over the radius of a bore up to which it may go in: as for the half width of
-/// a contact, the flat formula is 1.6 % off there.
-const WIDEST: f64 = 0.4;
-/// Pairs of planes looked at, the largest ones.
-const MOST_PAIRS: usize = 200;
 /// Reaches of a pad that differ by less are one \[m\].
 const SAME_REACH: f64 = 1e-9;
 /// A direction that lies this far out of the pads' plane has no angle in it (cosine).
 const ALONG: f64 = 1e-3;
-
-/// What leans.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Surface {
-    Plane,
-    Cone,
-    Bore,
-}
-
-/// Two surfaces opposite each other that do not lie in the pads' planes. Places are `(x, y)` along
-/// the rows and up the slope, to where a pad touches first.
-#[derive(Debug)]
-struct Taper {
-    kind: PairKind,
-    surface: Surface,
-    /// Index of the closing direction.
-    direction: usize,
-    sides: [Vec<u32>; 2],
-    /// Unit vector along `y` in the direction's axes.
-    uphill: DVec2,
-    /// Rise of side I along `y`; side II falls as much.
-    slope: f64,
-    /// Heights of both at `y = 0`.
-    heights: [f64; 2],
-    /// Where both are.
-    bounds: Bounds2,
-    /// How far the chords of a mesh stand out from the surface that they are meant for.
-    chords: f64,
-}
 
 /// Approach angles at which the pads reach as far along `y`, from the rows' direction \[rad\].
 struct Posture {
@@ -74,44 +36,6 @@ struct Posture {
     fingers: [f64; 2],
     /// Their outlines at the first angle.
     pads: [Ring; 2],
-}
-
-impl Taper {
-    /// Unit vector along the rows.
-    fn level(&self) -> DVec2 {
-        -self.uphill.perp()
-    }
-
-    fn heights_at(&self, y: f64) -> [f64; 2] {
-        let [one, two] = self.heights;
-        [one + self.slope * y, two - self.slope * y]
-    }
-
-    /// Gap of either side behind planes that touch it at `top` or, in a bore, at its crest, seen
-    /// from `y`.
-    fn gap(&self, y: f64, top: f64, lean: f64) -> Gap {
-        let [one, two] = self.heights_at(top);
-        let (radius, height) = (0.5 * (one - two).abs(), lean * self.slope * (top - y));
-        match self.surface {
-            Surface::Plane => Gap::Plane { height, slope: DVec2::new(0.0, -lean * self.slope) },
-            Surface::Cone => Gap::Cone {
-                radius,
-                slope: -lean * self.slope,
-                axis: DVec2::Y,
-                at: DVec2::ZERO,
-                height,
-            },
-            Surface::Bore if lean == 0.0 => Gap::default(),
-            Surface::Bore => {
-                Gap::Cylinder { radius: -radius, axis: DVec2::X, at: DVec2::ZERO, height: 0.0 }
-            }
-        }
-    }
-
-    /// Angle of either side to the pads \[rad\].
-    fn angle(&self) -> f64 {
-        self.slope.atan()
-    }
 }
 
 impl Finder<'_> {
@@ -129,7 +53,7 @@ impl Finder<'_> {
             return Ok(sites);
         }
         let loose = self.loose();
-        let mut seen: BTreeMap<(u32, u32), Option<Rejection>> = BTreeMap::new();
+        let mut seen = Outcomes::default();
         for taper in &tapers {
             let reason = self.rows(taper, &loose, &mut sites);
             match reason {
@@ -141,215 +65,10 @@ impl Finder<'_> {
                 _ => {}
             }
             let [a, b] = [0, 1].map(|side: usize| taper.sides[side][0]);
-            // One of its directions is enough for a pair.
-            let known = seen.entry((a.min(b), a.max(b))).or_insert_with(|| reason.clone());
-            if reason.is_none() {
-                *known = None;
-            }
+            seen.add(a, b, reason);
         }
         round.count(seen);
         Ok(sites)
-    }
-
-    /// Pairs of planes that are opposite each other and not parallel.
-    fn drafted(&mut self) -> Vec<Taper> {
-        // Facets of what may be round are none.
-        let round: FxHashSet<u32> =
-            self.part.curved.iter().flat_map(|face| &face.triangles).copied().collect();
-        let is_facet = |face: &PlanarFace| face.triangles.iter().all(|one| round.contains(one));
-        let faces: Vec<&PlanarFace> = self
-            .part
-            .faces
-            .iter()
-            .filter(|face| face.reachable && self.may_touch(face.id) && !is_facet(face))
-            .collect();
-        let (most, least) = (ANTIPARALLEL.cos(), (2.0 * STEEPEST).cos());
-        let mut groups: BTreeMap<(usize, usize), Vec<[&PlanarFace; 2]>> = BTreeMap::new();
-        for (index, a) in faces.iter().enumerate() {
-            for b in &faces[index + 1..] {
-                if (least..most).contains(&-a.normal.dot(b.normal)) {
-                    let [one, two] = [a, b].map(|face| self.planes.of[face.id as usize]);
-                    groups.entry((one.min(two), one.max(two))).or_default().push([a, b]);
-                }
-            }
-        }
-        let mut found: Vec<(f64, Taper)> =
-            groups.values().filter_map(|pairs| self.wedge(pairs)).collect();
-        found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.sides.cmp(&b.1.sides)));
-        found.into_iter().take(MOST_PAIRS).map(|(_, taper)| taper).collect()
-    }
-
-    /// Pairs in two planes as one, and the area in which they are opposite each other [m^2].
-    fn wedge(&mut self, pairs: &[[&PlanarFace; 2]]) -> Option<(f64, Taper)> {
-        let [a, b] = pairs[0];
-        let closing = upright((a.normal - b.normal).normalize());
-        let mut sides: [Vec<u32>; 2] = Default::default();
-        for face in pairs.iter().flatten() {
-            sides[usize::from(face.normal.dot(closing) < 0.0)].push(face.id);
-        }
-        for side in &mut sides {
-            side.sort_unstable();
-            side.dedup();
-        }
-        let axes_from_part = axes(closing);
-        let faces = [0, 1].map(|side: usize| {
-            let faces = sides[side].iter().map(|&id| &self.part.faces[id as usize]);
-            project(faces, &axes_from_part)
-        });
-        let overlap = overlay::intersect(&faces[0], &faces[1]);
-        let area = polygon::patch_area(&overlap);
-        if area <= 1e-9 * self.size * self.size {
-            return None;
-        }
-        let plane = |side: usize| {
-            let face = &self.part.faces[sides[side][0] as usize];
-            (axes_from_part * face.normal, face.offset)
-        };
-        let [(one, offset_i), (two, offset_ii)] = [plane(0), plane(1)];
-        let slope = one.truncate() / one.z;
-        let (uphill, slope) = (-slope.normalize(), slope.length());
-        let mut taper = Taper {
-            kind: PairKind::External,
-            surface: Surface::Plane,
-            direction: 0,
-            sides,
-            uphill,
-            slope,
-            heights: [offset_i / one.z, offset_ii / two.z],
-            bounds: Bounds2::EMPTY,
-            chords: 0.0,
-        };
-        let level = taper.level();
-        let along = |point: &DVec2| DVec2::new(level.dot(*point), uphill.dot(*point));
-        let corners: Vec<DVec2> =
-            overlap.iter().flat_map(polygon::rings).flatten().map(along).collect();
-        taper.bounds = Bounds2::of(&corners);
-        let [above, below] = taper.heights_at(along(&polygon::patch_moments(&overlap).centroid).y);
-        let wanted = if above > below { self.options.outside } else { self.options.inside };
-        if above < below {
-            taper.kind = PairKind::Internal;
-        }
-        if !wanted {
-            return None;
-        }
-        taper.direction = self.direction(closing);
-        Some((area, taper))
-    }
-
-    /// Outside cones, in directions all round.
-    fn cones(&mut self, tapers: &mut Vec<Taper>) {
-        let part = self.part;
-        let ids: Vec<u32> = self.round_faces().map(|face| face.id).collect();
-        for face in ids.into_iter().filter_map(|id| part.curved_face(id)) {
-            let Shape::Cone { apex, axis, half_angle, along } = face.shape else { continue };
-            if half_angle >= STEEPEST {
-                continue;
-            }
-            for closing in self.closings_about(axis) {
-                let met = [1.0, -1.0].map(|sign| self.has_line(face, apex, axis, sign * closing));
-                if met != [true; 2] {
-                    continue;
-                }
-                let direction = self.direction(closing);
-                let axes_from_part = axes(self.directions[direction]);
-                let apex = axes_from_part * apex;
-                let uphill = (axes_from_part * axis).truncate().normalize();
-                let (slope, y) = (half_angle.tan(), uphill.dot(apex.truncate()));
-                let x = (-uphill.perp()).dot(apex.truncate());
-                let [least, most] = along.map(|along| DVec2::new(x, y + along));
-                tapers.push(Taper {
-                    kind: PairKind::External,
-                    surface: Surface::Cone,
-                    direction,
-                    sides: [vec![face.id], vec![face.id]],
-                    uphill,
-                    slope,
-                    heights: [apex.z - slope * y, apex.z + slope * y],
-                    bounds: Bounds2 { min: least, max: most },
-                    chords: 0.0,
-                });
-            }
-        }
-    }
-
-    /// Bores from inside, in directions all round.
-    fn bores(&mut self, tapers: &mut Vec<Taper>) {
-        let mut bores: Vec<Vec<&CurvedFace>> = Vec::new();
-        for face in &self.part.curved {
-            let is_bore = matches!(face.shape, Shape::Cylinder { .. }) && !face.outside;
-            if !is_bore || !face.reachable || !self.may_touch(face.id) {
-                continue;
-            }
-            match bores.iter_mut().find(|bore| bore[0].is_same_surface(face)) {
-                Some(bore) => bore.push(face),
-                None => bores.push(vec![face]),
-            }
-        }
-        for bore in bores {
-            let Shape::Cylinder { axis, radius, .. } = bore[0].shape else { continue };
-            let ends: Vec<f64> = bore
-                .iter()
-                .filter_map(|face| match face.shape {
-                    Shape::Cylinder { axis: own, along, .. } => {
-                        Some(along.map(|along| axis.along(own.origin + own.direction * along)))
-                    }
-                    _ => None,
-                })
-                .flatten()
-                .collect();
-            let [low, high] = [f64::min, f64::max]
-                .map(|pick: fn(f64, f64) -> f64| ends.iter().copied().reduce(pick).unwrap_or(0.0));
-            for closing in self.closings_about(axis.direction) {
-                let side = |sign: f64| -> Vec<u32> {
-                    let towards = sign * closing;
-                    let faces = bore.iter();
-                    let faces = faces
-                        .filter(|face| self.has_line(face, axis.origin, axis.direction, towards));
-                    faces.map(|face| face.id).collect()
-                };
-                // Jaw I pushes against the wall that faces the closing direction.
-                let sides = [side(-1.0), side(1.0)];
-                if sides.iter().any(Vec::is_empty) {
-                    continue;
-                }
-                let direction = self.direction(closing);
-                let axes_from_part = axes(self.directions[direction]);
-                let level = (axes_from_part * axis.direction).truncate().normalize();
-                let centre = axes_from_part * axis.origin;
-                let middle =
-                    DVec2::new(level.dot(centre.truncate()), level.perp_dot(centre.truncate()));
-                let wall = WIDEST * radius;
-                let facets =
-                    bore.iter().filter_map(|face| face.facets).fold(f64::INFINITY, f64::min);
-                tapers.push(Taper {
-                    kind: PairKind::Internal,
-                    surface: Surface::Bore,
-                    direction,
-                    sides,
-                    uphill: level.perp(),
-                    slope: 0.0,
-                    heights: [centre.z - radius, centre.z + radius],
-                    bounds: Bounds2 {
-                        min: middle + DVec2::new(low, -wall),
-                        max: middle + DVec2::new(high, wall),
-                    },
-                    chords: radius * (1.0 - (std::f64::consts::PI / facets).cos()),
-                });
-            }
-        }
-    }
-
-    /// Whether a face about an axis has the line of its surface that lies `towards` that side.
-    fn has_line(&self, face: &CurvedFace, origin: DVec3, axis: DVec3, towards: DVec3) -> bool {
-        let across = axis.cross(towards);
-        face.triangles.iter().any(|&triangle| {
-            let corners = self.part.mesh.corners(triangle).map(|corner| corner - origin);
-            let slack = 1e-3 * corners[0].reject_from(axis).length();
-            let along = corners.map(|corner| corner.dot(across));
-            corners.iter().all(|corner| corner.dot(towards) > 0.0)
-                && along.iter().any(|y| *y >= -slack)
-                && along.iter().any(|y| *y <= slack)
-        })
     }
 
     /// Adds the rows of places on two surfaces; the reason where there are none.
@@ -478,12 +197,11 @@ impl Finder<'_> {
             }
             _ => [0.0, taper.slope * (posture.fingers[1] - above).max(0.0)],
         };
-        self.within_stroke(taper.kind, width)?;
+        Stroke::new(taper.kind, self.gripper, self.options).check(width)?;
         let layer = self.gripper.layer();
         // The layers give as much as that beside the pads too.
         let off = off.min(sag + LAYER_SHARE * layer.reach()) + taper.chords;
         let Some(deltas) = self.takes(taper, posture, (y, top), layer)? else { return Ok(None) };
-        let axes_from_part = axes(self.directions[taper.direction]);
         let level = taper.level();
         let reach = self.gripper.pad_reach();
         let window = |low: DVec2, high: DVec2| -> Ring {
@@ -495,20 +213,10 @@ impl Finder<'_> {
             DVec2::new(min.x - 2.0 * reach, y - 2.0 * reach),
             DVec2::new(max.x + 2.0 * reach, y + 2.0 * reach),
         );
-        let pieces = [0, 1].map(|side: usize| {
-            let surveyor = Surveyor {
-                part: self.part,
-                loose,
-                axes_from_part,
-                height: heights[side],
-                side: [1.0, -1.0][side],
-                reach: layer.reach() + sag,
-                above: layer.reach() + sag + 4.0 * reach * taper.slope,
-                region: Bounds2::of(&around),
-            };
-            surveyor.pieces()
-        });
-        let relief = Relief::pressed_by(pieces, layer, self.force(), deltas);
+        let depth = layer.reach() + sag;
+        let depths = [depth, depth + 4.0 * reach * taper.slope];
+        let pieces = self.survey(loose, taper.direction, heights, depths, Bounds2::of(&around));
+        let relief = Relief::pressed_by(pieces, layer, self.options.force_on(self.gripper), deltas);
         let high = if taper.surface == Surface::Bore { y + above } else { top };
         let under =
             window(DVec2::new(min.x - self.size, y - below), DVec2::new(max.x + self.size, high));
@@ -567,30 +275,6 @@ impl Finder<'_> {
         }
     }
 
-    fn force(&self) -> f64 {
-        self.options.force.unwrap_or(self.gripper.force[1])
-    }
-
-    fn within_stroke(&self, kind: PairKind, width: f64) -> std::result::Result<(), Rejection> {
-        let more = match kind {
-            PairKind::External => 0.0,
-            PairKind::Internal => 2.0 * self.gripper.outer_pad.unwrap_or(0.0),
-        };
-        let [least, most] = self.gripper.stroke.map(|gap| gap + more);
-        let open = 2.0 * self.options.min_opening;
-        let [low, high] = match kind {
-            PairKind::External => [least, most - open],
-            PairKind::Internal => [least + open, most],
-        };
-        if !(least - STROKE..=most + STROKE).contains(&width) {
-            Err(Rejection::Stroke)
-        } else if !(low - STROKE..=high + STROKE).contains(&width) {
-            Err(Rejection::OpeningTooSmall)
-        } else {
-            Ok(())
-        }
-    }
-
     /// The layers' compressions under pads of a posture at `y` that touch at `top`, where they take
     /// the lean; none where the pads touch nothing.
     fn takes(
@@ -613,7 +297,7 @@ impl Finder<'_> {
             let [face_i, face_ii] = posture.pads.each_ref().map(under);
             let surfaces =
                 Surfaces { face_i, face_ii, stiffness: [layer.stiffness; 2], layer: None };
-            Pads::new(&surfaces).ok()?.squeezed(self.force())
+            Pads::new(&surfaces).ok()?.squeezed(self.options.force_on(self.gripper))
         };
         let Some(found) = squeezed(1.0) else { return Ok(None) };
         let greatest = |faces: &[Squeezed; 2]| {
@@ -628,11 +312,6 @@ impl Finder<'_> {
         }
         Ok(Some(found.map(|face| face.delta)))
     }
-}
-
-/// Of two opposite directions the one with its greatest component positive.
-pub(super) fn upright(direction: DVec3) -> DVec3 {
-    if direction[direction.abs().max_position()] < 0.0 { -direction } else { direction }
 }
 
 /// Places a step apart about the middle of a stretch, up to `beyond` its ends, and the one nearest
@@ -653,7 +332,7 @@ fn steps([low, high]: [f64; 2], beyond: f64, step: f64, also: f64) -> Vec<f64> {
 /// compressed by no more than a third, or touch all over.
 pub(in crate::propose) fn steepest(gripper: &Gripper, options: &ProposeOptions) -> f64 {
     let layer = gripper.layer();
-    let force = options.force.unwrap_or(gripper.force[1]);
+    let force = options.force_on(gripper);
     let [one, two] = gripper.pad_sizes();
     let size = one.min(two);
     let even = force / (layer.stiffness * size.x * size.y);
