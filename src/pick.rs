@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use crate::clash::{Cell, Course, Room, Volumes};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gripper::Gripper;
 use crate::model::{Frame, Grip};
 use crate::results::{GripSet, RankedGrip, Verdict};
@@ -49,13 +49,7 @@ impl<'a> Picker<'a> {
     /// # Errors
     /// When the gripper in `set` cannot be read.
     pub fn new(set: &'a GripSet, scene: &Scene) -> Result<Self> {
-        let gripper: Gripper = serde_json::from_value(set.gripper.clone()).map_err(|error| {
-            Error::input(
-                "gripper in the result file",
-                format!("cannot be read: {error}"),
-                "write the result again with `gripfast plan`",
-            )
-        })?;
+        let gripper = set.read_gripper()?;
         let mut picker = Self {
             set,
             allow_slip: false,

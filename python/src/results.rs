@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use gripfast::error::Error;
 use gripfast::export::{self, Convention, Dialect, Format, Joint, Options, Origin, Values};
 use gripfast::geometry::patch_area;
-use gripfast::gripper;
 use gripfast::model::{Patch, Wrench};
 use gripfast::pick::Picker;
 use gripfast::plan::Outcome;
@@ -123,11 +122,7 @@ impl Result {
             Some(name) => {
                 let convention = Convention::parse("convention", name).or_raise()?;
                 let origin = Origin::parse("origin", origin).or_raise()?;
-                let gripper: gripper::Gripper = serde_json::from_value(self.set.gripper.clone())
-                    .map_err(|error| {
-                        Error::format("gripper", error.to_string(), "make the result again")
-                    })
-                    .or_raise()?;
+                let gripper = self.set.read_gripper().or_raise()?;
                 let frame =
                     export::grip_from_tool(convention, origin, Some(&gripper)).or_raise()?;
                 Some((frame, matches!(origin, Origin::Stated(_)).then_some(gripper)))

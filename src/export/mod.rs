@@ -235,20 +235,14 @@ struct View<'a> {
 impl<'a> View<'a> {
     fn new(set: &'a GripSet, format: Format, options: &'a Options) -> Result<Self> {
         let convention = options.convention.unwrap_or_else(|| format.convention());
-        let gripper = serde_json::from_value::<Gripper>(set.gripper.clone());
+        let gripper = set.read_gripper();
         let origin = options.origin.unwrap_or_else(|| format.origin(gripper.as_ref().ok()));
         let grip_from_tool = tool::grip_from_tool(convention, origin, gripper.as_ref().ok())?;
         // What the format cannot do without.
-        if matches!(format, Format::GraspNet | Format::Glb)
-            && let Err(error) = &gripper
-        {
-            return Err(Error::input(
-                "gripper in the result file",
-                format!("cannot be read: {error}"),
-                "write the result again with `gripfast plan`",
-            ));
-        }
-        let gripper = gripper.ok();
+        let gripper = match gripper {
+            Err(error) if matches!(format, Format::GraspNet | Format::Glb) => return Err(error),
+            gripper => gripper.ok(),
+        };
         let unknown = |gripper: &Gripper| gripper.travel.joint(0.0, gripper.stroke).is_none();
         let by_motion = options.joints.iter().find(|joint| joint.by_motion);
         if let Some(joint) = by_motion

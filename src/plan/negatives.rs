@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec3;
+
 use super::Plan;
-use crate::error::{Error, Result};
-use crate::gripper::Gripper;
+use super::outside::of_run;
+use crate::error::Result;
 use crate::model::{Miss, Negative};
 use crate::part::Part;
-use crate::propose::{ProposeOptions, Proposer};
+use crate::propose::Proposer;
 use crate::results::GripSet;
 
 /// Rejected candidates of each reason that a page shows, at most.
@@ -31,10 +33,8 @@ impl Plan {
             return Vec::new();
         }
         let mut misses = proposer.misses(SHOWN);
-        misses.extend(lost.values().flat_map(|list| list.iter().take(SHOWN)).map(|pose| {
-            let away = pose.part_from_grip.origin.distance(self.mass.centre_of_mass);
-            Miss::new(pose.clone(), Some(away), None)
-        }));
+        let lost = lost.values().flat_map(|list| list.iter().take(SHOWN));
+        misses.extend(lost.map(|pose| lost_grip(pose, self.mass.centre_of_mass)));
         misses
     }
 
@@ -67,19 +67,18 @@ impl Plan {
 /// When the set's gripper is none, or the run's options do not fit the part, or name a scene that
 /// cannot be read.
 pub fn near_misses(set: &GripSet, part: &Part) -> Result<Vec<Miss>> {
-    let gripper: Gripper = serde_json::from_value(set.gripper.clone()).map_err(|error| {
-        Error::input("result file", format!("gripper: {error}"), "make the file again")
-    })?;
-    let mut options = ProposeOptions::read(&set.provenance.request.candidates)?;
-    options.force = Some(set.provenance.resolved.force.0).filter(|force| *force > 0.0);
-    let mut misses = Proposer::new(part, &gripper, &options)?.misses(SHOWN);
+    let (part, gripper, options) = of_run(set, part)?;
+    let mut misses = Proposer::new(&part, &gripper, &options)?.misses(SHOWN);
     let proposed: Vec<String> = misses.iter().map(|miss| miss.pose.reason.clone()).collect();
     let others = set.negatives.iter().filter(|pose| !proposed.contains(&pose.reason));
-    misses.extend(others.map(|pose| {
-        let away = pose.part_from_grip.origin.distance(set.part.mass.centre_of_mass);
-        Miss::new(pose.clone(), Some(away), None)
-    }));
+    misses.extend(others.map(|pose| lost_grip(pose, set.part.mass.centre_of_mass)));
     Ok(misses)
+}
+
+/// A grip that does not hold.
+fn lost_grip(pose: &Negative, centre_of_mass: DVec3) -> Miss {
+    let away = pose.part_from_grip.origin.distance(centre_of_mass);
+    Miss::new(pose.clone(), Some(away), None)
 }
 
 /// The first ones of each list, `count` in all, as evenly as the lengths of the lists allow.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::search::Search;
 use super::{Assessor, Plan, output};
 use crate::backend::select;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::export::tool_in_grip;
 use crate::gripper::Gripper;
 use crate::model::{Frame, Grip};
@@ -290,20 +290,23 @@ impl Plan {
     }
 }
 
+/// Part, gripper and options as the run that made a set had them.
+pub(super) fn of_run(set: &GripSet, part: &Part) -> Result<(Part, Gripper, ProposeOptions)> {
+    let Provenance { request, resolved, .. } = &set.provenance;
+    let mut options = ProposeOptions::read(&request.candidates)?;
+    options.force = Some(resolved.force.0).filter(|force| *force > 0.0);
+    let mut part = part.clone();
+    part.set_centre_of_mass(set.part.mass.centre_of_mass);
+    Ok((part, set.read_gripper()?, options))
+}
+
 /// Every test of a grip of a result, with the options of its run.
 ///
 /// # Errors
 /// When the gripper of the result or the scene of its request cannot be read; as
 /// [`Proposer::new`].
 pub fn explain(set: &GripSet, ranked: &RankedGrip, part: &Part) -> Result<Explanation> {
-    let gripper: Gripper = serde_json::from_value(set.gripper.clone()).map_err(|error| {
-        Error::format("gripper", format!("in the result: {error}"), "make the result again")
-    })?;
-    let Provenance { request, resolved, .. } = &set.provenance;
-    let mut options = ProposeOptions::read(&request.candidates)?;
-    options.force = Some(resolved.force.0).filter(|force| *force > 0.0);
-    let mut part = part.clone();
-    part.set_centre_of_mass(set.part.mass.centre_of_mass);
+    let (part, gripper, options) = of_run(set, part)?;
     let grip = &ranked.grip;
     Proposer::new(&part, &gripper, &options)?.explain_pose(
         grip.face_i,

@@ -47,7 +47,7 @@ impl Filter {
                 .with_options(&["ids"]));
             }
         }
-        let gripper = self.min_pad_share.map(|_| gripper(set)).transpose()?;
+        let gripper = self.min_pad_share.map(|_| set.read_gripper()).transpose()?;
         let pads = self.pads.unwrap_or_else(|| set.pads());
         if self.holding && pads.value.is_none() {
             return Err(Error::input(
@@ -88,15 +88,4 @@ impl Filter {
             && self.approach.as_ref().is_none_or(within)
             && gripper.is_none_or(touches)
     }
-}
-
-/// The gripper that a result states.
-fn gripper(set: &GripSet) -> Result<Gripper> {
-    serde_json::from_value(set.gripper.clone()).map_err(|error| {
-        Error::input(
-            "gripper in the result file",
-            format!("is none: {error}"),
-            "write the result again with `gripfast plan`",
-        )
-    })
 }

@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 use super::payload::Columns;
 use crate::load::wrench_in_grip;
 use crate::mechanics::{Options, Pads, curved, solve_pads};
-use crate::model::{Face, Score, Slip, Surfaces, Wrench};
+use crate::model::{Face, Pressure, Slip, Surfaces, Wrench};
 use crate::results::{GripSet, RankedGrip};
 
 /// Grips on surfaces that are not plane whose worst load is solved again for its tilt, which the
@@ -35,9 +35,9 @@ impl Pressed {
     /// Nothing is known.
     const UNKNOWN: Self = Self { pressure: [f64::NAN; 4], slip: slip(None) };
 
-    fn plane(score: &Score) -> Self {
-        let planes = score.pressure.map(|p| [p.a_i0, p.a_ii0, p.a1, p.a2]);
-        Self { pressure: planes.unwrap_or([f64::NAN; 4]), slip: slip(score.slip) }
+    fn plane(pressure: Option<Pressure>, motion: Option<Slip>) -> Self {
+        let planes = pressure.map(|p| [p.a_i0, p.a_ii0, p.a1, p.a2]);
+        Self { pressure: planes.unwrap_or([f64::NAN; 4]), slip: slip(motion) }
     }
 
     fn curved(answer: &curved::Answer) -> Self {
@@ -100,11 +100,7 @@ pub(super) fn worst(set: &GripSet, grips: &[RankedGrip]) -> Vec<Pressed> {
         Some(pads) if index < CURVED_GRIPS => {
             Pressed::curved(&pads.solve(ranked.grip.distance(), force, &ranked.worst.wrench))
         }
-        _ => {
-            let planes = ranked.worst.pressure.map(|p| [p.a_i0, p.a_ii0, p.a1, p.a2]);
-            let pressure = planes.unwrap_or(Pressed::UNKNOWN.pressure);
-            Pressed { pressure, slip: slip(ranked.worst.slip) }
-        }
+        _ => Pressed::plane(ranked.worst.pressure, ranked.worst.slip),
     };
     grips.par_iter().enumerate().map(state).collect()
 }
@@ -132,7 +128,8 @@ pub(super) fn by_load(columns: &mut Columns, set: &GripSet, grips: &[RankedGrip]
         let state = |wrench: &Wrench| match (ready.of(ranked), &pads) {
             (Some(pads), _) => Pressed::curved(&pads.solve(distance, force, wrench)),
             (None, Some(pads)) => {
-                Pressed::plane(&solve_pads(pads, distance, force, wrench, &options))
+                let score = solve_pads(pads, distance, force, wrench, &options);
+                Pressed::plane(score.pressure, score.slip)
             }
             (None, None) => Pressed::UNKNOWN,
         };

@@ -1,9 +1,10 @@
-//! The part that a result is about.
+//! The part and the gripper that a result is about.
 
 use std::path::{Path, PathBuf};
 
 use super::GripSet;
 use crate::error::{Error, Result};
+use crate::gripper::Gripper;
 use crate::part::{Part, ReadOptions};
 use crate::units::Unit;
 
@@ -11,6 +12,20 @@ use crate::units::Unit;
 const SAME_BOX: f64 = 1e-6;
 
 impl GripSet {
+    /// The gripper of the set.
+    ///
+    /// # Errors
+    /// When the set holds none.
+    pub fn read_gripper(&self) -> Result<Gripper> {
+        serde_json::from_value(self.gripper.clone()).map_err(|error| {
+            Error::input(
+                "gripper in the result file",
+                format!("cannot be read: {error}"),
+                "write the result again with `gripfast plan`",
+            )
+        })
+    }
+
     /// Where the part's file is: where the set names it, or else beside `result`, the file of the
     /// set; `None` where neither exists.
     pub fn part_file(&self, result: &Path) -> Option<PathBuf> {
