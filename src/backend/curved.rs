@@ -117,15 +117,17 @@ impl CurvedProblem<'_> {
         value: f64,
         seen: &mut Seen,
     ) -> Option<f64> {
-        seen.compared += 1;
         match screen.compare(&self.wrenches[load], value) {
-            Compared::Below => Some(0.0),
+            Compared::Below => {
+                seen.compared += 1;
+                Some(0.0)
+            }
             Compared::At(mu) => {
+                seen.compared += 1;
                 seen.near.push((load, mu));
                 Some(mu)
             }
             Compared::Open => {
-                seen.compared -= 1;
                 let score = self.solve(load);
                 seen.solved.push((load, score));
                 usable(&score)

@@ -23,6 +23,8 @@ pub(super) struct Variant {
     pad_friction: Option<f64>,
     /// What tells it from the others, for the names of files.
     tag: String,
+    /// The same beside the gripper's name.
+    label: String,
 }
 
 /// Every gripper with every force and every friction of the pads.
@@ -48,9 +50,15 @@ pub(super) fn variants(
             let name = Path::new(gripper).file_name().unwrap_or_default().to_string_lossy();
             words.push(name.strip_suffix(".toml").unwrap_or(&name).to_owned());
         }
-        words.extend(force.filter(|_| forces.len() > 1).map(|force| format!("{}N", force.0)));
-        let friction = pad_friction.filter(|_| frictions.len() > 1);
-        words.extend(friction.map(|friction| format!("mu{friction}")));
+        let mut label = String::new();
+        if let Some(force) = force.filter(|_| forces.len() > 1) {
+            words.push(format!("{}N", force.0));
+            label += &format!(", {} N", force.0);
+        }
+        if let Some(friction) = pad_friction.filter(|_| frictions.len() > 1) {
+            words.push(format!("mu{friction}"));
+            label += &format!(", pads {friction}");
+        }
         let tag = words.join("-");
         if variants.iter().any(|variant| variant.tag == tag) {
             let flag = match (grippers.len(), forces.len()) {
@@ -62,7 +70,7 @@ pub(super) fn variants(
                 "give each gripper, force and friction once, files under names of their own";
             return Err(Error::input(flag, format!("'{tag}' is given twice"), remedy));
         }
-        variants.push(Variant { gripper: gripper.cloned(), force, pad_friction, tag });
+        variants.push(Variant { gripper: gripper.cloned(), force, pad_friction, tag, label });
     }
     Ok(variants)
 }
@@ -98,15 +106,7 @@ pub(super) fn run(request: &Request, variants: &[Variant]) -> anyhow::Result<Exi
         }
         let outcome = plan.run(&mut watch, &interrupt.stop);
         watch.end();
-        let several =
-            |one: fn(&Variant) -> String| variants.iter().any(|other| one(other) != one(variant));
-        let mut name = plan.gripper().name.clone();
-        if several(|variant| format!("{:?}", variant.force)) {
-            name += &format!(", {} N", variant.force.unwrap_or_default().0);
-        }
-        if several(|variant| format!("{:?}", variant.pad_friction)) {
-            name += &format!(", pads {}", variant.pad_friction.unwrap_or_default());
-        }
+        let name = format!("{}{}", plan.gripper().name, variant.label);
         outcomes.push(Compared { name, plan, outcome: outcome? });
         if interrupt.code().is_some() {
             break;

@@ -53,8 +53,6 @@ impl State<'_> {
 const SOLVED: f64 = 1e-9;
 /// Residual at which Newton's method is content; its last step has mostly gone far beyond.
 const ENOUGH: f64 = 1e-13;
-/// Residual at which a state from all derivatives is left as it is.
-const NEAR: f64 = 1e-13;
 /// Newton steps at most.
 const STEPS: u32 = 40;
 /// Step of the difference quotients, in units of the tilt.
@@ -255,7 +253,7 @@ impl<'a> Problem<'a> {
         let faces = found.pressed(self.normal);
         let near = State { angles, faces, slip, residual: Vec::new() };
         let state = self.at(&near.angles, 1.0, Some(&near))?;
-        if state.error() <= NEAR { Some(state) } else { self.newton(state, 1.0) }
+        if state.error() <= ENOUGH { Some(state) } else { self.newton(state, 1.0) }
     }
 
     /// The state on the branch from `d = 0`: friction's lever grows from nothing.

@@ -156,14 +156,17 @@ impl<'p, 'a> Joint<'p, 'a> {
         let lever = |c: &Carried| DVec2::new(c[1] - half * c[3], c[2] - half * c[4]);
         let pressed = lever(one) - lever(two);
         let moment = DVec2::new(-pressed.y, pressed.x);
-        let mut w = Vector5::new(-one[3] - two[3], -one[4] - two[4], one[5] + two[5], 0.0, 0.0);
+        let slide = Vector3::new(-one[3] - two[3], -one[4] - two[4], one[5] + two[5]);
+        (self.along(slide, moment), moment)
+    }
+
+    /// What a load means along the motions, in units: its force and turn along the pads, and its
+    /// moment in their plane.
+    fn along(&self, slide: Vector3<f64>, moment: DVec2) -> Vector5<f64> {
+        let mut w = Vector5::new(slide.x, slide.y, slide.z, 0.0, 0.0);
         for (i, e) in self.problem.space.spins.iter().enumerate() {
             w[3 + i] = e.dot(moment);
         }
-        (self.in_units(&w), moment)
-    }
-
-    fn in_units(&self, w: &Vector5<f64>) -> Vector5<f64> {
         w.component_mul(&self.units) / self.normal
     }
 
@@ -172,11 +175,7 @@ impl<'p, 'a> Joint<'p, 'a> {
         let wrench = &self.problem.wrench;
         let (f, m) = (wrench.force, wrench.moment);
         let moment = DVec2::new(m.x, m.y);
-        let mut w = Vector5::new(f.x, f.y, m.z, 0.0, 0.0);
-        for (i, e) in self.problem.space.spins.iter().enumerate() {
-            w[3 + i] = e.dot(moment);
-        }
-        (self.in_units(&w), moment)
+        (self.along(Vector3::new(f.x, f.y, m.z), moment), moment)
     }
 
     /// The power of the load from outside over the normal forces, for a motion of a [`Place`].
