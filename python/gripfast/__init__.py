@@ -22,19 +22,6 @@ if _sys.platform == "linux" and "XDG_RUNTIME_DIR" not in _os.environ:
     _os.environ.setdefault("NODEVICE_SELECT", "1")
 
 from ._batch import Batch, Job, Report, Store, run_job
-from ._core import (
-    Assessment,
-    Gripper,
-    Loads,
-    Page,
-    Part,
-    Request,
-    Result,
-    assess,
-    plan,
-    read,
-    score,
-)
 from ._errors import (
     BusyError,
     CancelledError,
@@ -51,6 +38,9 @@ from ._errors import (
     UnsupportedError,
 )
 from ._gripfast import __version__
+from ._inputs import Gripper, Loads, Part, Request
+from ._result import Assessment, Page, Result
+from ._run import assess, plan, read, score
 
 __all__ = [
     "Assessment",

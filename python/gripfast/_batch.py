@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from . import _gripfast
-from ._core import Part, Path, Request, _Listener, _object, _plain
+from ._inputs import Part, Path, Request, _object, _plain
+from ._run import _Listener
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,8 @@ import ray
 
 from . import _gripfast
 from ._batch import Batch, Job, Report, Store
-from ._core import Path, _Listener
+from ._inputs import Path
+from ._run import _Listener
 
 #: Tasks handed out beyond those that run, for each processor of the cluster: enough that no machine
 #: waits, few enough that the memory stays small.

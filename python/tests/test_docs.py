@@ -13,7 +13,7 @@ import pytest
 from conftest import ROOT
 
 import gripfast
-import gripfast._core
+import gripfast._run
 
 BLOCK = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
@@ -53,7 +53,7 @@ def test_the_readme_s_five_lines_run(folder):
     assert done.stdout.startswith("[0.0") and (folder / "bracket.html").exists()
 
 
-@pytest.mark.parametrize("module", [gripfast, gripfast._core])
+@pytest.mark.parametrize("module", [gripfast, gripfast._run])
 def test_the_examples_of_the_documentation_run(module):
     found = doctest.testmod(module)
     assert found.attempted > 0 and found.failed == 0
