@@ -39,7 +39,8 @@ pub fn force_needed(
     }
     let most = MOST * size.max(start);
     // `low` is too little, `high` enough.
-    let (mut low, mut high): (Option<(f64, f64)>, Option<(f64, f64)>) = (None, None);
+    let mut low: Option<(f64, f64)> = None;
+    let mut high: Option<(f64, f64)> = None;
     let mut force = start;
     for _ in 0..STEPS {
         let here = excess(force);
