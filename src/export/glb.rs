@@ -1,49 +1,106 @@
 //! Binary glTF 2.0: the part with grippers in place.
 //!
 //! Metres, in the axes of the part frame (no turn to glTF's y-up: a pose read from the file is a
-//! pose on the part).
+//! pose on the part). glTF's numbers are in single precision; `extras.pose` of a grip's node has
+//! its pose in double.
 
 use std::io::Write;
 
 use glam::{DQuat, DVec2, DVec3};
-use serde_json::{Value, json};
+use gltf::json::validation::{Checked, USize64};
+use gltf::json::{self, Index, accessor, buffer, material, mesh, scene};
+use serde_json::value::RawValue;
 
 use super::View;
 use crate::gripper::{Body, Jaw, Shape};
 use crate::model::{Frame, Ring};
 use crate::part::Mesh;
+use crate::results::RankedGrip;
 
 /// Sides of a drawn cylinder.
 const SIDES: u32 = 32;
 /// Thickness of a drawn pad \[m\].
 const PAD_THICKNESS: f64 = 1e-3;
 
-/// Indices into the list of materials in [`write`].
-const PART: usize = 0;
-const BEST: usize = 1;
-const OTHER: usize = 2;
-const PAD: usize = 3;
+/// A colour of the scene.
+#[derive(Clone, Copy)]
+enum Colour {
+    Part,
+    Best,
+    Other,
+    Pad,
+}
+
+impl Colour {
+    /// All, in the order of the list of materials.
+    const ALL: [Self; 4] = [Self::Part, Self::Best, Self::Other, Self::Pad];
+
+    fn material(self) -> json::Material {
+        let (name, colour) = match self {
+            Self::Part => ("part", [0.62, 0.66, 0.70, 1.0]),
+            Self::Best => ("best grip", [0.10, 0.60, 0.30, 1.0]),
+            Self::Other => ("grip", [0.20, 0.45, 0.80, 0.25]),
+            Self::Pad => ("pad", [0.95, 0.55, 0.10, 1.0]),
+        };
+        let blended = colour[3] < 1.0;
+        json::Material {
+            name: Some(name.to_owned()),
+            double_sided: true,
+            alpha_mode: Checked::Valid(if blended {
+                material::AlphaMode::Blend
+            } else {
+                material::AlphaMode::Opaque
+            }),
+            pbr_metallic_roughness: material::PbrMetallicRoughness {
+                base_color_factor: material::PbrBaseColorFactor(colour),
+                metallic_factor: material::StrengthFactor(0.1),
+                roughness_factor: material::StrengthFactor(0.7),
+                ..Default::default()
+            },
+            ..Default::default()
+        }
+    }
+}
 
 /// The growing file.
-#[derive(Default)]
 struct Scene {
+    root: json::Root,
+    buffer: Index<json::Buffer>,
     bytes: Vec<u8>,
-    views: Vec<Value>,
-    accessors: Vec<Value>,
-    meshes: Vec<Value>,
-    nodes: Vec<Value>,
 }
 
 impl Scene {
-    /// Adds triangles and returns the number of the mesh. Positions are f32 as glTF has no others;
-    /// offsets of large parts are not taken off, so 1 m keeps 0.1 um.
+    fn new() -> Self {
+        let mut root = json::Root::default();
+        root.asset.generator = Some(format!("gripfast {}", env!("CARGO_PKG_VERSION")));
+        root.materials = Colour::ALL.map(Colour::material).into();
+        let buffer = Index::new(0);
+        Self { root, buffer, bytes: Vec::new() }
+    }
+
+    /// A piece of the buffer, from this byte to its end.
+    fn view(&mut self, start: usize, target: buffer::Target) -> Index<buffer::View> {
+        self.root.push(buffer::View {
+            buffer: self.buffer,
+            byte_length: USize64::from(self.bytes.len() - start),
+            byte_offset: Some(USize64::from(start)),
+            byte_stride: None,
+            name: None,
+            target: Some(Checked::Valid(target)),
+            extensions: None,
+            extras: None,
+        })
+    }
+
+    /// Adds triangles. Positions are f32 as glTF has no others; offsets of large parts are not
+    /// taken off, so 1 m keeps 0.1 um.
     fn mesh(
         &mut self,
         name: &str,
         vertices: &[DVec3],
         triangles: &[[u32; 3]],
-        material: usize,
-    ) -> usize {
+        colour: Colour,
+    ) -> Index<json::Mesh> {
         let start = self.bytes.len();
         let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for vertex in vertices {
@@ -52,30 +109,139 @@ impl Scene {
                 self.bytes.extend(value.to_le_bytes());
             }
         }
-        let middle = self.bytes.len();
+        let points = self.view(start, buffer::Target::ArrayBuffer);
+        let start = self.bytes.len();
         self.bytes.extend(triangles.iter().flatten().flat_map(|index| index.to_le_bytes()));
-        // 34962: vertices, 34963: indices; 5126: f32, 5125: u32 (glTF 2.0, section 3.6).
-        self.views.push(json!({"buffer": 0, "byteOffset": start, "byteLength": middle - start, "target": 34962}));
-        self.views.push(json!({"buffer": 0, "byteOffset": middle, "byteLength": self.bytes.len() - middle, "target": 34963}));
-        let view = self.views.len();
-        self.accessors.push(json!({"bufferView": view - 2, "componentType": 5126, "count": vertices.len(), "type": "VEC3", "min": low, "max": high}));
-        self.accessors.push(json!({"bufferView": view - 1, "componentType": 5125, "count": triangles.len() * 3, "type": "SCALAR"}));
-        let accessor = self.accessors.len();
-        self.meshes.push(json!({"name": name, "primitives": [{"attributes": {"POSITION": accessor - 2}, "indices": accessor - 1, "material": material}]}));
-        self.meshes.len() - 1
+        let corners = self.view(start, buffer::Target::ElementArrayBuffer);
+        let list = |view, count, component, kind| json::Accessor {
+            buffer_view: Some(view),
+            byte_offset: None,
+            count: USize64::from(count),
+            component_type: Checked::Valid(accessor::GenericComponentType(component)),
+            type_: Checked::Valid(kind),
+            min: None,
+            max: None,
+            name: None,
+            normalized: false,
+            sparse: None,
+            extensions: None,
+            extras: None,
+        };
+        let points = self.root.push(json::Accessor {
+            min: Some(low.to_vec().into()),
+            max: Some(high.to_vec().into()),
+            ..list(points, vertices.len(), accessor::ComponentType::F32, accessor::Type::Vec3)
+        });
+        let corners = self.root.push(list(
+            corners,
+            3 * triangles.len(),
+            accessor::ComponentType::U32,
+            accessor::Type::Scalar,
+        ));
+        self.root.push(json::Mesh {
+            name: Some(name.to_owned()),
+            primitives: vec![mesh::Primitive {
+                attributes: [(Checked::Valid(mesh::Semantic::Positions), points)].into(),
+                indices: Some(corners),
+                material: Some(Index::new(colour as u32)),
+                mode: Checked::Valid(mesh::Mode::Triangles),
+                targets: None,
+                extensions: None,
+                extras: None,
+            }],
+            weights: None,
+            extensions: None,
+            extras: None,
+        })
     }
+}
 
-    fn node(&mut self, node: Value) -> usize {
-        self.nodes.push(node);
-        self.nodes.len() - 1
-    }
+/// A node in this place.
+fn node(name: String, at: &Frame) -> json::Node {
+    json::Node { name: Some(name), matrix: Some(columns(at)), ..Default::default() }
 }
 
 /// A drawn body: its mesh for the best grip and for the others, and its place in the grip frame.
 struct Drawn {
     name: String,
-    meshes: [usize; 2],
+    meshes: [Index<json::Mesh>; 2],
     frame: Frame,
+}
+
+/// A gripper's bodies, in the frames of its jaws, which are half a turn apart, and of its palm.
+struct Bodies {
+    fingers: [Vec<Drawn>; 2],
+    palm: Vec<Drawn>,
+    pads: [Option<Index<json::Mesh>>; 2],
+}
+
+impl Bodies {
+    fn of(view: &View<'_>, scene: &mut Scene) -> Self {
+        let Some(gripper) = &view.gripper else {
+            return Self { fingers: [Vec::new(), Vec::new()], palm: Vec::new(), pads: [None; 2] };
+        };
+        let mut pad = |ring: &Ring| {
+            let (vertices, triangles) = prism(ring);
+            (!triangles.is_empty()).then(|| scene.mesh("pad", &vertices, &triangles, Colour::Pad))
+        };
+        let first = pad(&gripper.pad);
+        let second = gripper
+            .pad_ii
+            .as_ref()
+            .map_or(first, |ring| pad(&ring.iter().rev().map(|p| DVec2::new(p.x, -p.y)).collect()));
+        Self {
+            fingers: Jaw::BOTH.map(|jaw| draw(scene, gripper.bodies(jaw))),
+            palm: draw(scene, &gripper.palm),
+            pads: [first, second],
+        }
+    }
+
+    /// The gripper of one grip: its node. `variant`: which of the colours.
+    fn place(
+        &self,
+        view: &View<'_>,
+        scene: &mut Scene,
+        grip: &RankedGrip,
+        variant: usize,
+    ) -> Index<json::Node> {
+        // Readers tell nodes apart by their names.
+        let id = format!("grip_{}", grip.grip.id);
+        let gap = view.gap(grip);
+        let gripper = view.gripper.as_ref();
+        let put = |scene: &mut Scene, bodies: &[Drawn], jaw: &str, at: &Frame| -> Vec<_> {
+            let node = |body: &Drawn| json::Node {
+                mesh: Some(body.meshes[variant]),
+                ..node(format!("{id}/{jaw}{}", body.name), &at.compose(&body.frame))
+            };
+            bodies.iter().map(|body| scene.root.push(node(body))).collect()
+        };
+        let at = gripper.map_or(Frame::IDENTITY, |gripper| gripper.palm_place(gap));
+        let mut jaws = put(scene, &self.palm, "", &at);
+        for (index, (jaw, name)) in Jaw::BOTH.into_iter().zip(["jaw_i", "jaw_ii"]).enumerate() {
+            let mut children =
+                put(scene, &self.fingers[index], &format!("{name}/"), &Frame::IDENTITY);
+            children.extend(self.pads[index].map(|pad| {
+                scene.root.push(json::Node {
+                    mesh: Some(pad),
+                    name: Some(format!("{id}/{name}/pad")),
+                    ..Default::default()
+                })
+            }));
+            let at = gripper.map_or(jaw.at(gap / 2.0), |gripper| gripper.jaw_at(jaw, gap, 0.0));
+            let rotation = DQuat::from_mat3(&at.rotation).as_quat().to_array();
+            jaws.push(scene.root.push(json::Node {
+                name: Some(format!("{id}/{name}")),
+                translation: Some(at.origin.as_vec3().to_array()),
+                rotation: Some(scene::UnitQuaternion(rotation)),
+                children: (!children.is_empty()).then_some(children),
+                ..Default::default()
+            }));
+        }
+        scene.root.push(json::Node {
+            children: Some(jaws),
+            ..node(format!("{id}/gripper"), &view.grip_from_tool(grip).inverse())
+        })
+    }
 }
 
 pub(super) fn write(
@@ -83,112 +249,65 @@ pub(super) fn write(
     writer: &mut impl Write,
     part: Option<&Mesh>,
 ) -> std::io::Result<()> {
-    let mut scene = Scene::default();
-    let mut roots = Vec::new();
+    let mut scene = Scene::new();
+    let mut nodes = Vec::new();
     if let Some(part) = part.filter(|part| !part.triangles.is_empty()) {
-        let mesh = scene.mesh("part", &part.vertices, &part.triangles, PART);
-        roots.push(scene.node(json!({"name": "part", "mesh": mesh})));
+        let mesh = scene.mesh("part", &part.vertices, &part.triangles, Colour::Part);
+        nodes.push(scene.root.push(json::Node {
+            name: Some("part".to_owned()),
+            mesh: Some(mesh),
+            ..Default::default()
+        }));
     }
-    let (fingers, palm, pads) = match &view.gripper {
-        None => ([Vec::new(), Vec::new()], Vec::new(), [None; 2]),
-        Some(gripper) => {
-            // In the frames of the jaws, which are half a turn apart.
-            let mut pad = |ring: &Ring| {
-                let (vertices, triangles) = prism(ring);
-                (!triangles.is_empty()).then(|| scene.mesh("pad", &vertices, &triangles, PAD))
-            };
-            let first = pad(&gripper.pad);
-            let pads = [
-                first,
-                gripper.pad_ii.as_ref().map_or(first, |ring| {
-                    pad(&ring.iter().rev().map(|p| DVec2::new(p.x, -p.y)).collect())
-                }),
-            ];
-            let fingers = Jaw::BOTH.map(|jaw| draw(&mut scene, gripper.bodies(jaw)));
-            (fingers, draw(&mut scene, &gripper.palm), pads)
-        }
-    };
+    let bodies = Bodies::of(view, &mut scene);
     for (index, grip) in view.grips().iter().enumerate() {
-        let variant = usize::from(index > 0);
-        // Readers tell nodes apart by their names.
-        let id = format!("grip_{}", grip.grip.id);
-        let place = |scene: &mut Scene, bodies: &[Drawn], jaw: &str, at: &Frame| -> Vec<usize> {
-            let node = |body: &Drawn| json!({"name": format!("{id}/{jaw}{}", body.name), "mesh": body.meshes[variant], "matrix": columns(&at.compose(&body.frame))});
-            bodies.iter().map(|body| scene.node(node(body))).collect()
-        };
-        let palm_place = view
-            .gripper
-            .as_ref()
-            .map_or(Frame::IDENTITY, |gripper| gripper.palm_place(view.gap(grip)));
-        let mut jaws = place(&mut scene, &palm, "", &palm_place);
-        for (index, (jaw, name)) in Jaw::BOTH.into_iter().zip(["jaw_i", "jaw_ii"]).enumerate() {
-            let mut children =
-                place(&mut scene, &fingers[index], &format!("{name}/"), &Frame::IDENTITY);
-            children.extend(
-                pads[index].map(|pad| {
-                    scene.node(json!({"name": format!("{id}/{name}/pad"), "mesh": pad}))
-                }),
-            );
-            let gap = view.gap(grip);
-            let place = view
-                .gripper
-                .as_ref()
-                .map_or(jaw.at(gap / 2.0), |gripper| gripper.jaw_at(jaw, gap, 0.0));
-            let rotation = DQuat::from_mat3(&place.rotation).to_array();
-            let mut jaw = json!({"name": format!("{id}/{name}"), "translation": place.origin, "rotation": rotation});
-            if !children.is_empty() {
-                jaw["children"] = json!(children);
-            }
-            jaws.push(scene.node(jaw));
-        }
-        let gripper = scene.node(json!({"name": format!("{id}/gripper"), "matrix": columns(&view.grip_from_tool(grip).inverse()), "children": jaws}));
-        roots.push(scene.node(json!({
-            "name": id,
-            "matrix": columns(&view.pose(grip)),
-            "children": [gripper],
-            "extras": {"rank": grip.rank, "id": grip.grip.id, "width_m": grip.grip.width, "mu_s": grip.worst.mu_s, "score": grip.score, "verdict": view.verdict(grip).name(), "tool_frame": view.tool_frame()},
-        })));
+        let gripper = bodies.place(view, &mut scene, grip, usize::from(index > 0));
+        let pose = view.pose(grip);
+        let about = serde_json::json!({
+            "rank": grip.rank,
+            "id": grip.grip.id,
+            "width_m": grip.grip.width,
+            "mu_s": grip.worst.mu_s,
+            "score": grip.score,
+            "verdict": view.verdict(grip).name(),
+            "tool_frame": view.tool_frame(),
+            "pose": super::matrix(&pose),
+        });
+        nodes.push(scene.root.push(json::Node {
+            children: Some(vec![gripper]),
+            extras: extras(&about)?,
+            ..node(format!("grip_{}", grip.grip.id), &pose)
+        }));
     }
-    let material = |name: &str, colour: [f64; 4]| {
-        let mode = if colour[3] < 1.0 { "BLEND" } else { "OPAQUE" };
-        json!({"name": name, "doubleSided": true, "alphaMode": mode,
-            "pbrMetallicRoughness": {"baseColorFactor": colour, "metallicFactor": 0.1, "roughnessFactor": 0.7}})
+    let about = serde_json::json!({"warnings": view.set.provenance.warnings});
+    let scenes = json::Scene {
+        name: Some("grips".to_owned()),
+        nodes,
+        extras: extras(&about)?,
+        extensions: None,
     };
-    let mut document = json!({
-        "asset": {"version": "2.0", "generator": format!("gripfast {}", env!("CARGO_PKG_VERSION"))},
-        "scene": 0,
-        "scenes": [{"name": "grips", "extras": {"warnings": view.set.provenance.warnings}}],
-        "materials": [
-            material("part", [0.62, 0.66, 0.70, 1.0]),
-            material("best grip", [0.10, 0.60, 0.30, 1.0]),
-            material("grip", [0.20, 0.45, 0.80, 0.25]),
-            material("pad", [0.95, 0.55, 0.10, 1.0]),
-        ],
-    });
-    // glTF forbids empty lists.
-    let length = scene.bytes.len();
-    for (name, list) in [
-        ("nodes", scene.nodes),
-        ("meshes", scene.meshes),
-        ("accessors", scene.accessors),
-        ("bufferViews", scene.views),
-    ] {
-        if !list.is_empty() {
-            document[name] = Value::Array(list);
-        }
+    scene.root.scene = Some(scene.root.push(scenes));
+    if !scene.bytes.is_empty() {
+        scene.root.push(json::Buffer {
+            byte_length: USize64::from(scene.bytes.len()),
+            name: None,
+            uri: None,
+            extensions: None,
+            extras: None,
+        });
     }
-    if !roots.is_empty() {
-        document["scenes"][0]["nodes"] = json!(roots);
-    }
-    if length > 0 {
-        document["buffers"] = json!([{"byteLength": length}]);
-    }
-    container(writer, &document, scene.bytes)
+    container(writer, &scene.root, scene.bytes)
 }
 
-/// The file. The document is JSON, not the types of `gltf::json`: these keep matrices in single
-/// precision, and a pose read from the file shall be that of the result file.
-fn container(writer: &mut impl Write, document: &Value, binary: Vec<u8>) -> std::io::Result<()> {
+fn extras(value: &serde_json::Value) -> std::io::Result<Option<Box<RawValue>>> {
+    Ok(Some(serde_json::value::to_raw_value(value)?))
+}
+
+fn container(
+    writer: &mut impl Write,
+    document: &json::Root,
+    binary: Vec<u8>,
+) -> std::io::Result<()> {
     let text = serde_json::to_vec(document)?;
     // Headers and padding (glTF 2.0, section 4.4) take 32 bytes at most; the library does not look
     // for an overflow.
@@ -206,10 +325,10 @@ fn container(writer: &mut impl Write, document: &Value, binary: Vec<u8>) -> std:
     file.to_writer(writer).map_err(std::io::Error::other)
 }
 
-/// A 4x4 matrix in glTF's order, column by column.
-fn columns(frame: &Frame) -> [f64; 16] {
+/// A 4x4 matrix in glTF's order, column by column, in its single precision.
+fn columns(frame: &Frame) -> [f32; 16] {
     let rows = super::matrix(frame);
-    std::array::from_fn(|index| rows[index % 4][index / 4])
+    std::array::from_fn(|index| rows[index % 4][index / 4] as f32)
 }
 
 fn draw(scene: &mut Scene, bodies: &[Body]) -> Vec<Drawn> {
@@ -221,8 +340,8 @@ fn draw(scene: &mut Scene, bodies: &[Body]) -> Vec<Drawn> {
             (!triangles.is_empty()).then(|| Drawn {
                 name: body.name.clone(),
                 meshes: [
-                    scene.mesh(&body.name, &vertices, &triangles, BEST),
-                    scene.mesh(&body.name, &vertices, &triangles, OTHER),
+                    scene.mesh(&body.name, &vertices, &triangles, Colour::Best),
+                    scene.mesh(&body.name, &vertices, &triangles, Colour::Other),
                 ],
                 frame: body.grip_from_body,
             })

@@ -1,5 +1,7 @@
 """Node poses, the part's volume, and where the pads lie, through trimesh."""
 
+import json
+import struct
 import sys
 
 import numpy
@@ -7,11 +9,17 @@ import trimesh
 
 from common import grip, report
 
+with open(sys.argv[1], "rb") as file:
+    (length,) = struct.unpack_from("<I", file.read(20), 12)
+    document = json.loads(file.read(length))
+poses = {node["name"]: node["extras"]["pose"] for node in document["nodes"] if "extras" in node}
 scene = trimesh.load(sys.argv[1], process=False)
-grips, gaps, fingers = [], [], []
+grips, gaps, fingers, rounded = [], [], [], []
 nodes = [name for name in scene.graph.nodes if name.startswith("grip_") and "/" not in name]
 for name in sorted(nodes, key=lambda name: int(name.removeprefix("grip_"))):
-    matrix, _ = scene.graph.get(name)
+    single, _ = scene.graph.get(name)
+    matrix = numpy.array(poses[name])
+    rounded.append(float(abs(single - matrix).max()))
     faces = []
     for jaw in ("jaw_i", "jaw_ii"):
         place, geometry = scene.graph.get(f"{name}/{jaw}/pad")
@@ -28,4 +36,4 @@ for name in sorted(nodes, key=lambda name: int(name.removeprefix("grip_"))):
 _, part = scene.graph.get("part")
 mesh = scene.geometry[part]
 mesh.merge_vertices()
-report(grips, gaps=gaps, fingers=fingers, volume=float(mesh.volume), watertight=bool(mesh.is_watertight), bounds=mesh.bounds.tolist())
+report(grips, rounded=rounded, gaps=gaps, fingers=fingers, volume=float(mesh.volume), watertight=bool(mesh.is_watertight), bounds=mesh.bounds.tolist())

@@ -103,7 +103,8 @@ fn scores_are_those_of_the_exact_solver_at_minus_the_width() {
 fn both_sides_together_are_the_two_apart() {
     let scratch = tempfile::tempdir().unwrap();
     let count = |side: &str| {
-        let set = plan(scratch.path(), &format!("{side}.json"), &["--grips", side]);
+        let set =
+            plan(scratch.path(), &format!("{side}.json"), &["--grips", side, "--spacing", "8mm"]);
         (
             set.summary.candidates,
             set.grips.iter().filter(|grip| grip.grip.inside).count(),

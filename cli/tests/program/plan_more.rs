@@ -414,7 +414,7 @@ fn the_ending_of_the_result_chooses_its_format() {
         &BRACKET[..],
         &[
             "--spacing",
-            "15mm",
+            "20mm",
             "-q",
             "--top",
             "3",
