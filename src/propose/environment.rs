@@ -186,6 +186,32 @@ impl Environment {
         depths.iter().position(|depth| height + depth < 0.0)
     }
 
+    /// How far the sweeps in a keep-out box would have to move along one of its axes so that none
+    /// is in it \[m\], and the middle of what the first of them has in common with it, by its
+    /// bounds, part frame \[m\]; `None` where none is in one. Of several boxes the first counts.
+    pub(super) fn kept_out_by(
+        &self,
+        sweeps: &[Sweep],
+        part_from_grip: &Frame,
+    ) -> Option<(f64, DVec3)> {
+        let (first, number) = self.kept_out(sweeps, part_from_grip)?;
+        let [low, high] = self.keep_out[number];
+        let extent = |sweep: &Sweep| {
+            let reach = |direction: DVec3| {
+                let local = part_from_grip.rotation.transpose() * direction;
+                part_from_grip.point(sweep.support_point(local)).dot(direction)
+            };
+            [DVec3::from(DVec3::AXES.map(|axis| -reach(-axis))), DVec3::AXES.map(reach).into()]
+        };
+        let inside = sweeps.iter().filter(|sweep| sweep.meets_box(part_from_grip, low, high));
+        let (mut up, mut down) = (DVec3::ZERO, DVec3::ZERO);
+        for [from, to] in inside.map(extent) {
+            (up, down) = (up.max(high - from), down.max(to - low));
+        }
+        let [from, to] = extent(&sweeps[first]);
+        Some((up.min(down).min_element(), (from.max(low) + to.min(high)) / 2.0))
+    }
+
     /// The first sweep in a keep-out box, and the box's number.
     pub(super) fn kept_out(
         &self,

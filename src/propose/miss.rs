@@ -91,6 +91,10 @@ impl Proposer<'_> {
                 let sweeps = &prepared.outer_sweeps[jaws as usize];
                 self.environment.below(sweeps, &frame).unzip()
             }
+            Rejection::KeepOut { .. } => {
+                let sweeps = &prepared.outer_sweeps[jaws as usize];
+                self.environment.kept_out_by(sweeps, &frame).unzip()
+            }
             Rejection::PartInterference { .. } | Rejection::ApproachBlocked { .. } => {
                 self.depth(prepared, tree, (position, angle), jaws, &frame)
             }

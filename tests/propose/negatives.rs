@@ -210,6 +210,41 @@ fn a_miss_says_what_it_lacks() {
     }
 }
 
+/// Bodies along the axes: a box moved by what is told is free of them along one of its axes, and by
+/// less along none.
+#[test]
+fn a_miss_says_how_far_a_body_is_in_a_box_to_keep_out_of() {
+    let part = cuboid(0.02, 0.03, 0.04);
+    let gripper = gripper::find("generic").unwrap();
+    let wall = [DVec3::new(-0.05, -0.2, 0.05), DVec3::new(0.012, 0.2, 0.3)];
+    let kept_out = |wall: [DVec3; 2]| {
+        let options = ProposeOptions::default()
+            .with_spacing(Some(0.008))
+            .with_angle_step(90_f64.to_radians())
+            .with_keep_out(vec![wall]);
+        Proposer::new(&part, &gripper, &options).unwrap()
+    };
+    let mut compared = 0;
+    for miss in kept_out(wall).misses(25) {
+        if !miss.pose.reason.starts_with("keep_out:") {
+            continue;
+        }
+        let free = |by: f64| {
+            DVec3::AXES.iter().flat_map(|&axis| [axis, -axis]).any(|away| {
+                let moved = kept_out(wall.map(|corner| corner + away * by));
+                let Negative { face_i, face_ii, part_from_grip, .. } = &miss.pose;
+                let explained = moved.explain_pose(*face_i, *face_ii, part_from_grip).unwrap();
+                explained.checks.iter().any(|check| check.name.contains("keep-out") && check.passed)
+            })
+        };
+        let (by, place) = (miss.by.unwrap(), miss.place.unwrap());
+        assert!(free(by + 1e-6) && !free(by - 1e-6), "{miss:?}");
+        assert!(place.cmpge(wall[0]).all() && place.cmple(wall[1]).all(), "{place}");
+        compared += 1;
+    }
+    assert!(compared > 20, "{compared}");
+}
+
 /// The pair of faces that comes nearest to the stroke, gripped in the middle of what they share.
 #[test]
 fn the_faces_nearest_to_the_stroke_are_told() {

@@ -127,7 +127,7 @@ export function missWords(report, k) {
     approach_blocked: () => `${body} meets the part on its way${at}${free}`,
     twisted_out: () => `the one nearest to the centre of mass, ${mm(by, 2)} away, twists out all the same${asked.force ? ` at ${newtons(asked.force)}` : ''}`,
     no_normal_force: () => `a load pulls the part off a pad${asked.force ? ` at ${newtons(asked.force)}` : ''}`,
-    keep_out: () => `${body} would enter a box to keep out of`,
+    keep_out: () => `${body} would enter a box to keep out of${at}${free}`,
     scene: () => `${body} stops it`,
   }[kind];
   return upper(words?.() ?? reason(name, report).title);
