@@ -66,7 +66,7 @@ pub use limits::Limits;
 pub use negatives::near_misses;
 pub use output::{GLB_TOP, WHOLE, solve_every_load};
 pub use outside::{Assessed, Assessment, Standing, explain};
-pub use prepare::PlanBuilder;
+pub use prepare::{PlanBuilder, most_threads};
 
 /// The main job, ready to run.
 #[derive(Debug)]

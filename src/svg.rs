@@ -8,8 +8,7 @@ pub(crate) use crate::text::markup as escape;
 
 /// Metres as millimetres with at most this many decimals, without trailing zeros.
 pub(crate) fn millimetres(value: f64, decimals: usize) -> String {
-    let text = format!("{:.decimals$}", value * 1e3);
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+    crate::units::decimal(value * 1e3, decimals)
 }
 
 /// Appends a closed ring to the data of a path; `place` maps it to pixels.

@@ -350,6 +350,15 @@ impl fmt::Display for Unit {
     }
 }
 
+/// A number with at most so many decimals, without zeros at its end.
+#[must_use]
+pub fn decimal(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let text =
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
 /// The text that [`direction`] reads back bit for bit.
 pub(crate) fn direction_text(direction: DVec3) -> String {
     let same =
@@ -408,6 +417,13 @@ mod tests {
         assert!(
             (Quantity::Angle.parse("x", "180deg").unwrap() - std::f64::consts::PI).abs() < 1e-15
         );
+    }
+
+    #[test]
+    fn numbers_end_without_zeros() {
+        let told = [(12.0, 3), (1.25, 2), (-0.0004, 2), (100.0, 0), (0.1 + 0.2, 4)];
+        let texts = told.map(|(value, decimals)| decimal(value, decimals));
+        assert_eq!(texts, ["12", "1.25", "0", "100", "0.3"]);
     }
 
     #[test]

@@ -29,7 +29,7 @@ pub(crate) fn use_threads(threads: Option<usize>) -> anyhow::Result<()> {
 
 /// A number of threads that the machine can use; said when it is less than asked for.
 fn sensible(threads: usize) -> usize {
-    let most = std::thread::available_parallelism().map_or(1, usize::from).max(16) * 4;
+    let most = gripfast::plan::most_threads();
     if threads > most {
         crate::terminal::say(&format!(
             "warning: {threads} threads are more than this machine can use: {most} run"

@@ -290,9 +290,7 @@ fn range(values: [f64; 2], factor: f64, unit: &str) -> String {
 }
 
 fn short_number(value: f64) -> String {
-    let text = format!("{value:.3}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.into() }
+    gripfast::units::decimal(value, 3)
 }
 
 fn new_table(header: &[&str]) -> Table {

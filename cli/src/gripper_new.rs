@@ -150,10 +150,7 @@ pub(crate) fn run(args: NewArgs) -> anyhow::Result<()> {
     let finger = asker.values::<3>(args.finger, FINGER, Quantity::Length)?;
     let [throat] = asker.values::<1>(args.throat, THROAT, Quantity::Length)?;
     let palm = asker.values::<3>(args.palm, PALM, Quantity::Length)?;
-    let mm = |value: f64| {
-        let text = format!("{:.4}", value * 1e3);
-        format!("{}mm", text.trim_end_matches('0').trim_end_matches('.'))
-    };
+    let mm = |value: f64| format!("{}mm", gripfast::units::decimal(value * 1e3, 4));
     // The finger's tip is flush with the pad's front edge.
     let finger_at = pad[0] / 2.0 - finger[0] / 2.0;
     let front = -pad[0] / 2.0 - throat;

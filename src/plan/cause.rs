@@ -117,8 +117,7 @@ fn describe(face: &CurvedFace) -> Option<(String, f64)> {
 
 /// A length in millimetres, without zeros at the end.
 fn mm(length: f64) -> String {
-    let text = format!("{:.2}", length * 1e3);
-    format!("{} mm", text.trim_end_matches('0').trim_end_matches('.'))
+    format!("{} mm", crate::units::decimal(length * 1e3, 2))
 }
 
 #[cfg(test)]

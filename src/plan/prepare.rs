@@ -163,8 +163,9 @@ impl PlanBuilder {
     }
 }
 
-/// More threads than this gain nothing and cost memory.
-fn most_threads() -> usize {
+/// The most threads that a run takes: more gain nothing and cost memory.
+#[must_use]
+pub fn most_threads() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from).max(16) * 4
 }
 

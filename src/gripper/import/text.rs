@@ -13,9 +13,7 @@ const THIN: f64 = 0.1e-3;
 
 /// Millimetres as the file has them.
 fn mm(value: f64) -> String {
-    let text = format!("{:.4}", value * 1e3);
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    format!("{}mm", if text == "-0" { "0" } else { text })
+    format!("{}mm", crate::units::decimal(value * 1e3, 4))
 }
 
 fn quoted(text: &str) -> String {
