@@ -202,6 +202,9 @@ fn figures(
     seeds: usize,
 ) -> serde_json::Value {
     let solved: usize = measured.scored.iter().map(|scored| scored.solved).sum();
+    let compared: usize = measured.scored.iter().map(|scored| scored.compared).sum();
+    let grips = row.workload.contacts.len();
+    let per_grip = |count: usize| (row.task != Task::Seed).then(|| count as f64 / grips as f64);
     let per_second = |count: usize| count as f64 * f64::from(measured.runs) / measured.seconds;
     let all = matches!(row.task, Task::Score(Polish::All));
     let loads = row.workload.loads();
@@ -209,15 +212,17 @@ fn figures(
         "workload": row.name,
         "what": row.what,
         "backend": backend.name(),
-        "grips": row.workload.contacts.len(),
+        "grips": grips,
         "loads": loads,
         "seeds": seeds,
         "runs": measured.runs,
         "seconds": measured.seconds,
-        "grips_per_second": per_second(row.workload.contacts.len()),
+        "grips_per_second": per_second(grips),
         "loads_per_second": per_second(loads),
         "seed_evaluations_per_second": (!all).then(|| per_second(loads * seeds)),
         "exact_solves_per_second": (row.task != Task::Seed).then(|| per_second(solved)),
+        "exact_solves_per_grip": per_grip(solved),
+        "compared_per_grip": per_grip(compared),
         "agrees_with_cpu": check.map(|check| check.is_ok()),
         "difference": check.map(|check| match check { Ok(most) => json!(most), Err(why) => json!(why) }),
     })
@@ -232,6 +237,8 @@ fn table(rows: &[serde_json::Value]) -> comfy_table::Table {
         "loads/s",
         "seed evaluations/s",
         "exact solves/s",
+        "solved/grip",
+        "compared/grip",
         "agrees",
     ]);
     for row in rows {
@@ -244,6 +251,8 @@ fn table(rows: &[serde_json::Value]) -> comfy_table::Table {
             (serde_json::Value::Bool(false), why) => format!("NO: {why}"),
             _ => String::new(),
         };
+        let share =
+            |key: &str| row[key].as_f64().map_or_else(String::new, |value| format!("{value:.1}"));
         let text = |key: &str| row[key].as_str().unwrap_or_default().to_owned();
         table.add_row([
             text("what"),
@@ -252,6 +261,8 @@ fn table(rows: &[serde_json::Value]) -> comfy_table::Table {
             number("loads_per_second"),
             number("seed_evaluations_per_second"),
             number("exact_solves_per_second"),
+            share("exact_solves_per_grip"),
+            share("compared_per_grip"),
             agrees,
         ]);
     }

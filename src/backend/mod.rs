@@ -33,6 +33,7 @@ mod table;
 mod top;
 #[cfg(test)]
 mod twins;
+mod worst;
 
 #[cfg(feature = "gpu")]
 pub use gpu::{

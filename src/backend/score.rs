@@ -10,13 +10,11 @@ use super::job::Backend;
 use super::prepare::Contacts;
 use super::problem::{Batch, F32_TOLERANCE, Problem, Seed, SeedStatus};
 use super::seeds::SeedSet;
-use crate::contact::{Field, PlaneWrench, Twist};
+use super::worst::{Ended, Work};
+use crate::contact::{PlaneWrench, Twist};
 use crate::error::Result;
-use crate::mechanics::slip;
 use crate::mechanics::twist_out::TwistOut;
-use crate::mechanics::{
-    Comparison, Load, Neighbour, Options, Pads, Search, below, refused, solve_next, solve_pads,
-};
+use crate::mechanics::{Options, Pads, Search, refused, solve_pads};
 use crate::model::{Score, Status};
 use crate::request::{Polish, Refiner, Separation};
 
@@ -156,10 +154,10 @@ pub(super) fn cases<'a>(
 /// One grip with the seeds of its loads.
 #[derive(Clone, Copy)]
 pub(super) struct Case<'a> {
-    problem: &'a Problem<'a>,
-    pads: Option<&'a Pads>,
-    seeds: &'a [Seed],
-    options: &'a ScoreOptions,
+    pub(super) problem: &'a Problem<'a>,
+    pub(super) pads: Option<&'a Pads>,
+    pub(super) seeds: &'a [Seed],
+    pub(super) options: &'a ScoreOptions,
 }
 
 impl Case<'_> {
@@ -195,8 +193,7 @@ impl Case<'_> {
         if self.options.polish == Polish::All {
             return self.score_all();
         }
-        let mut work =
-            Work { case: self, solved: Vec::new(), compared: 0, neighbours: Neighbours::default() };
+        let mut work = Work::new(self);
         let out = |mu: f64| beaten.is_some_and(|beaten| beaten(mu));
         if beaten.is_some() && out(self.lower()) {
             return work.outranked();
@@ -206,11 +203,8 @@ impl Case<'_> {
         };
         let (bounded, open): (Vec<usize>, Vec<usize>) = (0..self.seeds.len()).partition(has_bounds);
         let open = self.in_turn(open, beaten.is_some());
-        let floor = bounded.iter().map(|&load| self.seeds[load].lower).fold(0.0, f64::max);
-        let ended = match work.without_bounds(&open, floor, &out) {
-            Ok(largest) => work.with_bounds(bounded, largest, &out),
-            Err(ended) => Err(ended),
-        };
+        work.at_least(bounded.iter().map(|&load| self.seeds[load].lower).fold(0.0, f64::max));
+        let ended = work.without_bounds(&open, &out).and_then(|()| work.with_bounds(bounded, &out));
         match ended {
             Ok(()) => work.worst(),
             Err(Ended::Outranked) => work.outranked(),
@@ -256,7 +250,7 @@ impl Case<'_> {
             .collect()
     }
 
-    fn options(&self, load: usize, search: Search) -> Options {
+    pub(super) fn options(&self, load: usize, search: Search) -> Options {
         let seed = &self.seeds[load];
         let searched = matches!(
             seed.status,
@@ -286,12 +280,12 @@ impl Case<'_> {
 
     /// Further solutions are looked for where a load seems to have none, and for the worst one in
     /// the end.
-    fn solve(&self, load: usize) -> Score {
+    pub(super) fn solve(&self, load: usize) -> Score {
         let score = self.full(load, Search::Off);
         if usable(&score).is_some() { score } else { self.full(load, Search::WhereNeeded) }
     }
 
-    fn settle(&self, worst: Option<(usize, Score)>) -> Option<(usize, Score)> {
+    pub(super) fn settle(&self, worst: Option<(usize, Score)>) -> Option<(usize, Score)> {
         worst.map(|(load, score)| {
             (
                 load,
@@ -301,7 +295,7 @@ impl Case<'_> {
     }
 
     /// The worst of some loads' answers, which come by rising load index.
-    fn worst(&self, answers: &[(usize, Score)]) -> Option<(usize, Score)> {
+    pub(super) fn worst(&self, answers: &[(usize, Score)]) -> Option<(usize, Score)> {
         let refused: Vec<usize> = answers
             .iter()
             .filter(|(_, score)| usable(score).is_none())
@@ -321,261 +315,6 @@ impl Case<'_> {
             .find(|(_, score)| usable(score).is_some_and(|mu| mu >= largest * (1.0 - TIE)))
             .copied()
     }
-}
-
-/// What has been solved of a grip so far.
-struct Work<'a> {
-    case: &'a Case<'a>,
-    solved: Vec<(usize, Score)>,
-    compared: usize,
-    neighbours: Neighbours,
-}
-
-/// What one more load came to.
-enum Compared {
-    /// Its `mu_s` is less than the value asked about.
-    Below,
-    /// Its `mu_s`.
-    Solved(f64),
-    /// It is not held.
-    Refused,
-}
-
-/// Why a grip's loads are not all looked at.
-enum Ended {
-    /// The grip is out of the race.
-    Outranked,
-    /// The load solved last has no limit state.
-    Refused,
-}
-
-/// States found of some loads, for the next ones to begin at. No more than [`MOST`] and none much
-/// like another, so that finding the nearest does not grow with the number of loads.
-#[derive(Default)]
-struct Neighbours {
-    /// Per coordinate of a load's place, the loads'.
-    places: [Vec<f32>; 6],
-    states: Vec<Neighbour>,
-    /// Squares of distances, while the nearest is looked for.
-    apart: Vec<f32>,
-}
-
-/// States kept of one grip.
-const MOST: usize = 256;
-/// Square of the distance in units of the gripping force from which on a load's state is kept.
-const UNLIKE: f32 = 0.05 * 0.05;
-/// Square of the distance up to which a state helps.
-const LIKE: f32 = 0.5 * 0.5;
-
-impl Neighbours {
-    /// The nearest state, with the square of its distance.
-    fn nearest(&mut self, place: &[f32; 6]) -> Option<(f32, &Neighbour)> {
-        self.apart.clear();
-        self.apart.resize(self.states.len(), 0.0);
-        for (all, x) in self.places.iter().zip(place) {
-            for (apart, other) in self.apart.iter_mut().zip(all) {
-                *apart += (x - other) * (x - other);
-            }
-        }
-        let least = self.apart.iter().fold(f32::INFINITY, |least, &apart| least.min(apart));
-        let index = self.apart.iter().position(|&apart| apart == least)?;
-        Some((least, &self.states[index]))
-    }
-
-    fn add(&mut self, place: [f32; 6], state: Neighbour) {
-        for (all, x) in self.places.iter_mut().zip(place) {
-            all.push(x);
-        }
-        self.states.push(state);
-    }
-}
-
-/// Where a load is among others.
-fn place(load: &Load) -> [f32; 6] {
-    let PlaneWrench { f1, f2, m3 } = load.direction;
-    [f1, f2, m3, load.moment[0], load.moment[1], load.normal[0]].map(|x| x as f32)
-}
-
-impl Work<'_> {
-    /// Compares loads without bounds one by one. The largest `mu_s` among those solved; the others
-    /// have less than this or than `floor`, which a load with bounds reaches.
-    fn without_bounds(
-        &mut self,
-        open: &[usize],
-        mut floor: f64,
-        out: &dyn Fn(f64) -> bool,
-    ) -> std::result::Result<f64, Ended> {
-        let mut largest: f64 = 0.0;
-        // The one that seems to ask for most comes before them all: few of the others reach it.
-        let estimate = |load: usize| self.case.seeds[load].estimate;
-        let leader = open.iter().copied().max_by(|&a, &b| estimate(a).total_cmp(&estimate(b)));
-        let leader = leader.filter(|&load| match self.compare(load, 0.0) {
-            Compared::Solved(mu) => {
-                largest = mu;
-                true
-            }
-            // Its turn comes.
-            _ => {
-                self.solved.clear();
-                false
-            }
-        });
-        for &load in open {
-            if out(largest) {
-                return Err(Ended::Outranked);
-            }
-            floor = floor.max(largest);
-            if leader != Some(load) {
-                match self.compare(load, floor * (1.0 - 2.0 * TIE)) {
-                    Compared::Below => {}
-                    Compared::Solved(mu) => largest = largest.max(mu),
-                    Compared::Refused => return Err(Ended::Refused),
-                }
-            }
-        }
-        if out(largest) { Err(Ended::Outranked) } else { Ok(largest) }
-    }
-
-    /// Solves loads with bounds by falling upper bound, until none can reach the `largest` found.
-    /// For congruent faces the slip problem alone decides `mu_s`: the seven equations are solved
-    /// for the worst of them only.
-    fn with_bounds(
-        &mut self,
-        mut bounded: Vec<usize>,
-        mut largest: f64,
-        out: &dyn Fn(f64) -> bool,
-    ) -> std::result::Result<(), Ended> {
-        let case = self.case;
-        let floor = bounded.iter().map(|&load| case.seeds[load].lower).fold(largest, f64::max);
-        bounded.retain(|&load| case.seeds[load].upper >= floor);
-        bounded
-            .sort_by(|&a, &b| case.seeds[b].upper.total_cmp(&case.seeds[a].upper).then(a.cmp(&b)));
-        let mut slips: Vec<(usize, f64)> = Vec::new();
-        // Ties with the largest are solved too, so that the first of them is found.
-        // Congruent to rounding, not only to the single precision of the part's file.
-        let exact = case.pads.is_some_and(|pads| pads.congruent);
-        let margin = if exact { 2.0 * TIE } else { F32_TOLERANCE };
-        for load in bounded {
-            if case.seeds[load].upper < largest * (1.0 - margin) {
-                break;
-            }
-            if let (SeedStatus::Bounded, Some(pads)) = (case.seeds[load].status, case.pads) {
-                let mu = slip_only(pads, case.problem, load, case.seeds[load].twist);
-                largest = largest.max(mu);
-                slips.push((load, mu));
-            } else {
-                match self.compare(load, largest * (1.0 - 2.0 * TIE)) {
-                    Compared::Below => {}
-                    Compared::Solved(mu) => largest = largest.max(mu),
-                    Compared::Refused => largest = f64::INFINITY,
-                }
-            }
-        }
-        self.compared += slips.len();
-        if out(largest * (1.0 - margin)) {
-            return Err(Ended::Outranked);
-        }
-        slips.retain(|&(_, mu)| mu >= largest * (1.0 - margin));
-        slips.sort_unstable_by_key(|&(load, _)| load);
-        for (load, mu) in slips {
-            let score = self.solve(load);
-            // The first of those that tie is the answer.
-            if exact
-                && usable(&score).is_some_and(|found| {
-                    (found - mu).abs() <= TIE * mu && found >= largest * (1.0 - TIE)
-                })
-            {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether a load's `mu_s` is below a value, or what it is.
-    fn compare(&mut self, load: usize, value: f64) -> Compared {
-        let case = self.case;
-        let (Some(pads), Refiner::Newton) = (case.pads, case.options.refiner) else {
-            return self.answer(load, case.solve(load));
-        };
-        let (problem, options) = (case.problem, case.options(load, Search::Off));
-        let scaled = pads.load(problem.distance, problem.force, &problem.wrenches[load]);
-        let here = place(&scaled);
-        let nearest = self.neighbours.nearest(&here);
-        let apart = nearest.map_or(f32::INFINITY, |(apart, _)| apart);
-        let near = nearest.map(|(_, state)| state).filter(|_| apart < LIKE);
-        let keep = |neighbours: &mut Neighbours, state: Neighbour| {
-            if apart > UNLIKE && neighbours.states.len() < MOST {
-                neighbours.add(here, state);
-            }
-        };
-        match below(pads, problem.force, &scaled, &options, near, value) {
-            Some(Comparison::Below(state)) => {
-                self.compared += 1;
-                keep(&mut self.neighbours, state);
-                return Compared::Below;
-            }
-            Some(Comparison::Solved(score, state)) if usable(&score).is_some() => {
-                keep(&mut self.neighbours, state);
-                return self.answer(load, score);
-            }
-            _ => {}
-        }
-        let mut start = near.map(Neighbour::start);
-        let wrench = &problem.wrenches[load];
-        let score = solve_next(pads, problem.distance, problem.force, wrench, &options, &mut start);
-        if usable(&score).is_none() {
-            return self.answer(load, case.solve(load));
-        }
-        if let Some(start) = start {
-            keep(&mut self.neighbours, Neighbour::at(pads, &scaled, start));
-        }
-        self.answer(load, score)
-    }
-
-    fn answer(&mut self, load: usize, score: Score) -> Compared {
-        self.solved.push((load, score));
-        usable(&score).map_or(Compared::Refused, Compared::Solved)
-    }
-
-    fn solve(&mut self, load: usize) -> Score {
-        let score = self.case.solve(load);
-        self.solved.push((load, score));
-        score
-    }
-
-    fn end(self, worst: Option<(usize, Score)>, outranked: bool) -> Scored {
-        Scored {
-            worst,
-            all: Vec::new(),
-            solved: self.solved.len(),
-            compared: self.compared,
-            outranked,
-        }
-    }
-
-    fn outranked(self) -> Scored {
-        self.end(None, true)
-    }
-
-    /// The load solved last has no limit state.
-    fn refused(self) -> Scored {
-        let last = self.solved.last().copied();
-        self.end(last, false)
-    }
-
-    fn worst(mut self) -> Scored {
-        self.solved.sort_by_key(|(load, _)| *load);
-        let worst = self.case.settle(self.case.worst(&self.solved));
-        self.end(worst, false)
-    }
-}
-
-/// `mu_s` of congruent faces in full contact: their summed pressure is constant.
-fn slip_only(pads: &Pads, problem: &Problem<'_>, load: usize, seed: Twist) -> f64 {
-    let load = pads.load(problem.distance, problem.force, &problem.wrenches[load]);
-    let field = Field { area: &pads.areas[0], p: [2.0 / pads.moments[0][0], 0.0, 0.0] };
-    slip::solve(&[field], load.direction, Some(pads.scaled_twist(seed)), Refiner::Newton).mu
-        * load.size
 }
 
 /// `mu_s` when the load is held.

@@ -319,7 +319,7 @@ const GROW_MOST: usize = 60;
 const GROW_LEAST: f64 = 1e-6;
 
 /// Longest step of [`Solver::follow`] in contact moment, of force times the pads' length.
-const FOLLOW_STEP: f64 = 0.25;
+pub(super) const FOLLOW_STEP: f64 = 0.25;
 /// Shortest step in coupling, and most steps.
 const FOLLOW_LEAST: f64 = 1e-9;
 const FOLLOW_MOST: usize = 1000;

@@ -14,18 +14,18 @@ use super::pads::{Load, Pads};
 use super::pressure;
 use super::slip;
 use super::solve::{Options, Search, Start, finish};
-use crate::contact::Twist;
+use crate::contact::{Loops, Twist};
 use crate::model::Score;
 use crate::request::{Refiner, Separation};
 
 /// A state of a contact near the limit state of some load.
 #[derive(Debug, Clone)]
-pub(crate) struct Neighbour(Box<Integrals>);
+pub(crate) struct Neighbour(Integrals);
 
 impl Neighbour {
     /// The state of a load where another one's solution begins.
     pub(crate) fn at(pads: &Pads, load: &Load, start: Start) -> Self {
-        Self(Box::new(Solver::new(pads, *load, Refiner::Newton).integrate(&start.0)))
+        Self(Solver::new(pads, *load, Refiner::Newton).integrate(&start.0))
     }
 
     /// For [`super::solve_next`].
@@ -34,11 +34,21 @@ impl Neighbour {
     }
 }
 
-/// What [`below`] found out about a load.
+/// How much is to be found out about a load's `mu_s`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Question {
+    /// Whether it is less than this.
+    pub(crate) value: f64,
+    /// If not, between which bounds it lies: this share apart. Zero: what it is.
+    pub(crate) sharp: f64,
+}
+
+/// What [`Comparer::compare`] found out about a load.
 #[derive(Debug, Clone)]
 pub(crate) enum Comparison {
-    /// Its limit state is the only one near and its `mu_s` is less than the value.
-    Below(Neighbour),
+    /// Its limit state is the only one near and its `mu_s` lies between these: below the value asked
+    /// about, or as close together as asked for.
+    Between([f64; 2], Neighbour),
     /// Its answer, as [`super::solve_next`] gives it.
     Solved(Score, Neighbour),
 }
@@ -50,37 +60,62 @@ const WITHIN: f64 = 2.0;
 /// Corrections after the first.
 const CORRECTIONS: u32 = 6;
 
-/// Compares the `mu_s` of a load, which must have an in-plane part and press both pads, with
-/// `value`, from the state `near` or from the pressure without coupling. `None` where that does not
-/// succeed: the load is then to be solved.
-pub(crate) fn below(
-    pads: &Pads,
+/// Compares loads on one contact.
+#[derive(Debug)]
+pub(crate) struct Comparer<'a> {
+    pads: &'a Pads,
+    /// Gripping force \[N\].
     force: f64,
-    load: &Load,
-    options: &Options,
-    near: Option<&Neighbour>,
-    value: f64,
-) -> Option<Comparison> {
-    if options.refiner != Refiner::Newton || load.size == 0.0 {
-        return None;
+    scratch: [Loops; 2],
+}
+
+impl<'a> Comparer<'a> {
+    /// For loads on these pads at this gripping force \[N\].
+    pub(crate) fn new(pads: &'a Pads, force: f64) -> Self {
+        Self { pads, force, scratch: Default::default() }
     }
-    if load.normal.iter().any(|&n| n <= 0.0) {
-        return None;
-    }
-    let mut solver = Solver::new(pads, *load, Refiner::Newton);
-    let start = match near {
-        Some(Neighbour(near)) => **near,
-        None => solver.without_coupling(options.seed.map(|twist| pads.scaled_twist(twist)))?,
-    };
-    // A pad that lifts ends the grip: that is for the solution to say.
-    let value = if options.separation == Separation::Discard { 0.0 } else { value };
-    match solver.approach(&start, value)? {
-        (None, integrals) => Some(Comparison::Below(Neighbour(Box::new(integrals)))),
-        (Some(state), integrals) => {
-            let options = &Options { search: Search::Off, ..*options };
-            let score = finish(pads, force, load, &state, true, solver.evaluations, options);
-            Some(Comparison::Solved(score, Neighbour(Box::new(integrals))))
+
+    /// What is asked about the `mu_s` of a load, which must have an in-plane part and press both
+    /// pads, from the state `near` or from the pressure without coupling. `None` where that does
+    /// not succeed: the load is then to be solved.
+    pub(crate) fn compare(
+        &mut self,
+        load: &Load,
+        options: &Options,
+        near: Option<&Neighbour>,
+        question: Question,
+    ) -> Option<Comparison> {
+        if options.refiner != Refiner::Newton || load.size == 0.0 {
+            return None;
         }
+        if load.normal.iter().any(|&n| n <= 0.0) {
+            return None;
+        }
+        let mut solver = Solver::new(self.pads, *load, Refiner::Newton);
+        solver.scratch = std::mem::take(&mut self.scratch);
+        // A pad that lifts ends the grip: that is for the solution to say.
+        let question = match options.separation {
+            Separation::Discard => Question { value: 0.0, sharp: 0.0 },
+            Separation::Solve => question,
+        };
+        let found = match near {
+            Some(Neighbour(near)) => solver.approach(near, question),
+            None => solver
+                .without_coupling(options.seed.map(|twist| self.pads.scaled_twist(twist)))
+                .and_then(|start| solver.approach(&start, question)),
+        };
+        let evaluations = solver.evaluations;
+        self.scratch = solver.scratch;
+        let (state, bounds, integrals) = found?;
+        let near = Neighbour(integrals);
+        Some(match state {
+            None => Comparison::Between(bounds, near),
+            Some(state) => {
+                let options = &Options { search: Search::Off, ..*options };
+                let score = finish(self.pads, self.force, load, &state, true, evaluations, options);
+                Comparison::Solved(score, near)
+            }
+        })
     }
 }
 
@@ -95,9 +130,13 @@ impl Solver<'_> {
         Some(self.integrate(&unknowns(v, q)))
     }
 
-    /// Newton's method from `start` until `mu_s` is seen to be less than `value` (no state) or to
-    /// the solution; with the integrals reached.
-    fn approach(&mut self, start: &Integrals, value: f64) -> Option<(Option<State>, Integrals)> {
+    /// Newton's method from `start` until bounds on `mu_s` answer the question, or else to the limit
+    /// state; with the integrals reached.
+    fn approach(
+        &mut self,
+        start: &Integrals,
+        Question { value, sharp }: Question,
+    ) -> Option<(Option<State>, [f64; 2], Integrals)> {
         let mut jacobian = Matrix7::zeros();
         let mut at = self.equations(start, 1.0, Some(&mut jacobian));
         let mut step = -solve_newton(&jacobian, &at.residual)?;
@@ -113,12 +152,13 @@ impl Solver<'_> {
             let correction = -solve_newton(&jacobian, &next.residual)?;
             let (before, after) = (self.change(&next, &step), self.change(&next, &correction));
             if after <= CONTRACTION * before {
-                let most = (next.mu_over_size + WITHIN * after) * self.load.size;
+                let [least, most] =
+                    [-WITHIN, WITHIN].map(|by| (next.mu_over_size + by * after) * self.load.size);
                 let weak = most * 2.0 * self.load.half_distance.abs() <= COUPLING_SEARCH;
-                if most < value && weak {
-                    return Some((None, integrals));
+                if weak && (most < value || most - least <= sharp * most) {
+                    return Some((None, [least, most], integrals));
                 }
-                if next.mu_over_size * self.load.size >= value {
+                if sharp == 0.0 && next.mu_over_size * self.load.size >= value {
                     (at, step) = (next, correction);
                     break;
                 }
@@ -126,7 +166,8 @@ impl Solver<'_> {
             (at, step) = (next, correction);
         }
         let found = self.newton(at.z + step, 1.0, 6)?;
-        (!strong(&found, &self.load)).then_some((Some(found), integrals))
+        let mu = found.mu_over_size * self.load.size;
+        (!strong(&found, &self.load)).then_some((Some(found), [mu; 2], integrals))
     }
 
     /// What a change of twist and pressure can change of the dissipation, at most: no point of the

@@ -13,7 +13,7 @@ use std::cell::Cell;
 
 use crate::model::{Score, Status, Wrench};
 
-use super::branch::COUPLING_SEARCH;
+use super::growth::{EQUAL, End, Growth, MOST};
 use super::pads::Pads;
 use super::solve::{Options, Search, solve_next, solve_pads};
 
@@ -49,13 +49,20 @@ pub fn force_needed(
     };
     let search = Limit { friction, solve };
     let start = START.iter().copied().find(|&k| search.holds(k))?;
-    // Where the friction coupling is strong, contact that is whole at the limit may separate before
-    // it.
-    let weak = friction * distance.abs() <= COUPLING_SEARCH * pads.length;
-    let by_proportion = if weak { search.by_proportion(start, pads) } else { None };
-    let limit = by_proportion.or_else(|| {
-        search.upwards(start, first_step(pads, distance, wrench, size, &search, start))
-    })?;
+    let end = near.get().map(|near| {
+        Growth::new(pads, distance, size, wrench, friction, options.separation).end(start, near)
+    });
+    let limit = match end {
+        Some(End::Slips(limit)) => limit,
+        Some(End::Never) => return None,
+        // Just beyond, another limit state may hold it.
+        Some(End::Stops(held)) if held > start && !search.holds(held * (1.0 + FOUND_LOST)) => held,
+        end => {
+            let from = if let Some(End::Stops(held)) = end { held } else { start };
+            let step = first_step(pads, distance, wrench, size, &search, start);
+            search.upwards(from, step)?
+        }
+    };
     Some(size / limit)
 }
 
@@ -82,8 +89,6 @@ pub fn load_multiple(
 /// Loads in units of the gripping force at which the search may begin; the first is below any limit
 /// of practice.
 const START: [f64; 3] = [1e-3, 1e-6, 1e-9];
-/// Largest load in units of the gripping force.
-const MOST: f64 = 1e9;
 /// Equal steps up to the limit that small loads foretell. A window narrower than a step in which
 /// the load is not held, between loads that are, can be missed.
 const STEPS: u32 = 16;
@@ -97,11 +102,6 @@ const FOUND: f64 = 1e-9;
 /// resolve, so a much sharper limit would mean nothing; the load returned is one that was found
 /// held.
 const FOUND_LOST: f64 = 1e-4;
-/// Relative difference at which `mu_s` counts as the pad friction.
-const EQUAL: f64 = 1e-10;
-
-/// Steps of [`Limit::by_proportion`]; it settles in two where `mu_s` is proportional to the load.
-const PROPORTIONS: usize = 12;
 
 /// The search for the largest load held, in units of the gripping force.
 struct Limit<S: Fn(f64) -> Score> {
@@ -119,23 +119,6 @@ impl<S: Fn(f64) -> Score> Limit<S> {
 
     fn holds(&self, k: f64) -> bool {
         self.excess(k).is_some_and(|excess| excess <= 0.0)
-    }
-
-    /// The load at which `mu_s` equals the friction, when the contact is whole there; else `None`.
-    fn by_proportion(&self, mut k: f64, pads: &Pads) -> Option<f64> {
-        for _ in 0..PROPORTIONS {
-            let score = (self.solve)(k);
-            let left = [score.contact_area_i, score.contact_area_ii];
-            let whole = (0..2).all(|face| {
-                left[face] >= pads.moments[face][0] * pads.length * pads.length * (1.0 - 1e-12)
-            });
-            let mu = score.mu_s.filter(|mu| whole && score.status == Status::Ok && *mu > 0.0)?;
-            if (mu / self.friction - 1.0).abs() <= EQUAL {
-                return Some(k);
-            }
-            k *= self.friction / mu;
-        }
-        None
     }
 
     /// The smallest load above `start`, which holds, at which it holds no longer; `None` beyond

@@ -6,6 +6,7 @@ mod branch;
 mod compare;
 pub mod curved;
 pub(crate) mod equilibrium;
+mod growth;
 pub mod inverse;
 pub mod pads;
 pub(crate) mod pressure;
@@ -18,7 +19,7 @@ pub mod twist_out;
 
 pub use crate::request::{Refiner, Separation};
 pub use branch::COUPLING_SEARCH;
-pub(crate) use compare::{Comparison, Neighbour, below};
+pub(crate) use compare::{Comparer, Comparison, Neighbour, Question};
 pub use pads::{Load, Pads, squeeze_pressure};
 pub(crate) use solve::check;
 pub use solve::{Options, Search, Start, limit_states, refused, solve, solve_next, solve_pads};

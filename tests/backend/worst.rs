@@ -1,6 +1,8 @@
 //! The worst load under [`Polish::Worst`], where most loads are left out by bounds, against all
 //! loads solved: grips on the parts that are shipped, under loads of every kind.
 
+use std::path::{Path, PathBuf};
+
 use glam::DVec3;
 use gripfast::backend::{Backend, Batch, Polish, Problem, ScoreOptions, Scored, SeedSet};
 use gripfast::gripper;
@@ -18,9 +20,8 @@ struct Case {
 }
 
 impl Case {
-    fn new(part: &str, gripper: &str) -> Self {
-        let path = crate::support::root().join("data/parts").join(part);
-        let part = Part::read(&path, &ReadOptions::default()).unwrap();
+    fn new(path: &Path, gripper: &str) -> Self {
+        let part = Part::read(path, &ReadOptions::default()).unwrap();
         let gripper = gripper::find(gripper).unwrap();
         let options = ProposeOptions::default().with_spacing(Some(0.006));
         let all: Vec<Grip> = Proposer::new(&part, &gripper, &options)
@@ -102,8 +103,13 @@ fn load_sets(mass: f64) -> [(&'static str, LoadSet); 4] {
     ]
 }
 
-fn worst_is_the_worst_of_all(part: &str, gripper: &str) {
-    let case = Case::new(part, gripper);
+fn shipped(part: &str) -> PathBuf {
+    crate::support::root().join("data/parts").join(part)
+}
+
+fn worst_is_the_worst_of_all(path: &Path, gripper: &str) {
+    let case = Case::new(path, gripper);
+    let part = path.file_name().unwrap().display();
     let weight = 9.81 * case.mass.mass;
     let mut held = 0;
     for (name, loads) in load_sets(case.mass.mass) {
@@ -117,7 +123,18 @@ fn worst_is_the_worst_of_all(part: &str, gripper: &str) {
 
 macro_rules! parts {
     ($($name:ident: $part:expr, $gripper:expr;)+) => {
-        $(#[test] fn $name() { worst_is_the_worst_of_all($part, $gripper); })+
+        $(#[test] fn $name() { worst_is_the_worst_of_all(&shipped($part), $gripper); })+
+    };
+}
+
+macro_rules! reference_parts {
+    ($($name:ident: $part:expr, $gripper:expr;)+) => {
+        $(#[test] fn $name() {
+            let path = crate::support::reference(concat!("parts/gen/gen_", $part, ".stl"));
+            if let Some(path) = path {
+                worst_is_the_worst_of_all(&path, $gripper);
+            }
+        })+
     };
 }
 
@@ -130,9 +147,16 @@ parts! {
     bar: "t_slot_bar.stl", "wsg50-110";
 }
 
+reference_parts! {
+    v_slot: "vslot_20x20_100", "robotiq-2f85";
+    plate: "gantryplate_cbeam", "generic";
+    angle: "lbracket_openbuilds", "generic";
+    block: "pillowblock_cq", "robotiq-2f85";
+}
+
 #[test]
 fn few_loads_of_many_accelerations_are_solved() {
-    let case = Case::new("l_bracket.stl", "robotiq-2f85");
+    let case = Case::new(&shipped("l_bracket.stl"), "robotiq-2f85");
     let loads = LoadSet::new(vec![LoadSource::GravityAxes]).with_acceleration(19.6);
     let scale = case.mass.mass / 0.35;
     let (solved, held) = case.compare("bracket, accelerations", &loads, 235.0 * scale);
