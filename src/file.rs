@@ -1,5 +1,7 @@
 //! Files written whole or not at all, and read within the memory allowed.
 
+mod guard;
+
 use std::fs::File;
 use std::hash::{Hash, Hasher};
 use std::io::{BufWriter, Read, Write};
@@ -7,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::memory::{self, Budget};
+pub(crate) use guard::guarded;
 
 /// Writes a file so that its name never stands for a part of it: the content goes to a temporary
 /// file in the same folder, is forced to the disk and takes the name at the end. A failure or a

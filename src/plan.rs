@@ -35,6 +35,7 @@ mod output;
 mod outside;
 mod prepare;
 mod search;
+mod share;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -57,7 +58,7 @@ use crate::request::{Choice, Polish, Request};
 use crate::results::{GripSet, LoadCase, PartSummary, Provenance, RankedGrip, Resolved, Summary};
 use crate::units::{Force, Length};
 use noise::Noise;
-use search::{Found, Search};
+use search::{Found, Partial, Search};
 
 pub use ahead::Ahead;
 pub use assess::{Assessor, Settings};
@@ -256,16 +257,37 @@ impl Plan {
         let output = self.request.output.output.as_deref();
         let _held = output.map(Lock::take).transpose()?;
         let partial = self.partial()?;
-        let search = Search {
-            assessor: &assessor,
+        let search = self.search(&assessor, partial.as_ref());
+        let found = search.run(&mut proposer, observer, stop)?;
+        let complete = found.complete;
+        let outcome = self.conclude(&proposer, &assessor, found, observer)?;
+        if let Some(partial) = partial.filter(|_| complete) {
+            partial.remove()?;
+        }
+        Ok(outcome)
+    }
+
+    fn search<'a>(&'a self, assessor: &'a Assessor<'a>, partial: Option<&'a Partial>) -> Search<'a> {
+        Search {
+            assessor,
             keep: self.request.kept(),
-            race: scoring.polish == Polish::Top,
+            race: self.request.scoring.polish == Polish::Top,
             ids: self.request.selection.ids.as_deref(),
+            flips: self.propose.flips,
             sample: self.sample(),
-            partial: partial.as_ref(),
+            partial,
             resume: self.request.output.resume,
-        };
-        let mut found = search.run(&mut proposer, observer, stop)?;
+        }
+    }
+
+    /// From what was found to the ranked grips and the files.
+    fn conclude(
+        &self,
+        proposer: &Proposer<'_>,
+        assessor: &Assessor<'_>,
+        mut found: Found,
+        observer: &mut dyn Observer,
+    ) -> Result<Outcome> {
         for remark in proposer.tally().remarks(&self.gripper, &self.propose) {
             observer.note(&remark);
         }
@@ -279,18 +301,18 @@ impl Plan {
         }
         let (complete, checkpoint) = (found.complete, found.checkpoint.clone());
         let lost = found.collector.take_lost();
-        let misses = self.misses(&proposer, &lost);
-        let (set, shown) = self.finish(&proposer, &assessor, found, lost)?;
+        let misses = self.misses(proposer, &lost);
+        let (set, shown) = self.finish(proposer, assessor, found, lost)?;
         if complete && set.grips.is_empty() {
             let rejections = &set.summary.rejections;
             let tally = proposer.tally();
             let causes = cause::causes(&self.part, &self.gripper, &self.propose, tally, rejections);
             causes.iter().for_each(|cause| observer.note(cause));
+            if let Some(cause) = cause::overpowered(&self.loads, self.settings.force, rejections) {
+                observer.note(&cause);
+            }
         }
         let written = self.write(&set, complete, &misses)?;
-        if let Some(partial) = partial.filter(|_| complete) {
-            partial.remove()?;
-        }
         Ok(Outcome { set, shown, checkpoint, written })
     }
 

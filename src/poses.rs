@@ -7,6 +7,7 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 use crate::export::{Convention, Format, Origin, Stated};
+use crate::file::guarded;
 use crate::gripper::Gripper;
 use crate::model::Frame;
 
@@ -67,23 +68,28 @@ pub fn read(path: &Path, options: &Options, gripper: &Gripper) -> Result<Vec<Pos
         None => Format::from_path(path)?,
     };
     let place = path.display().to_string();
-    let bytes = crate::file::read(path)?;
-    let (raw, stated) = match format {
-        Format::Json | Format::JsonLines => return formats::native(&place, &bytes),
-        Format::Csv => formats::csv(&place, &bytes)?,
-        Format::IsaacGrasp => formats::isaac(&place, &bytes)?,
-        Format::MoveIt => formats::moveit(&place, &bytes)?,
-        Format::GraspGen => formats::graspgen(&place, &bytes)?,
-        Format::GraspNet => formats::graspnet(&place, bytes)?,
-        Format::Acronym => formats::acronym(&place, bytes)?,
-        Format::Parquet | Format::Glb | Format::Usd | Format::Intrinsic | Format::Robot => {
+    let bytes = || crate::file::read(path);
+    let found = match format {
+        Format::Json | Format::JsonLines => return formats::native(&place, &bytes()?),
+        Format::Csv => formats::csv(&place, &bytes()?),
+        Format::Parquet => guarded(&place, || formats::parquet(&place, path)),
+        Format::IsaacGrasp => formats::isaac(&place, &bytes()?),
+        Format::MoveIt => formats::moveit(&place, &bytes()?),
+        Format::GraspGen => formats::graspgen(&place, &bytes()?),
+        Format::GraspNet => formats::graspnet(&place, bytes()?),
+        Format::Acronym => {
+            let bytes = bytes()?;
+            guarded(&place, || formats::acronym(&place, bytes))
+        }
+        Format::Glb | Format::Usd | Format::Intrinsic | Format::Robot => {
             return Err(Error::input(
                 place,
                 "poses are not read from this format",
-                "give CSV, isaac_grasp, moveit, graspgen, graspnet, acronym, or a result file",
+                "give CSV, Parquet, isaac_grasp, moveit, graspgen, graspnet, acronym, or a result file",
             ));
         }
     };
+    let (raw, stated) = found?;
     // What the user says, what the file says, what the format usually holds.
     let (axes, from) = stated.as_deref().and_then(stated_frame).unzip();
     let convention = options.convention.or(axes).unwrap_or_else(|| format.convention());

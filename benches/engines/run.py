@@ -6,9 +6,14 @@
     engines/bin/python benches/engines/run.py bench/benchmark.json [--engine mujoco|drake] [--case ID]
 
 Each engine holds the part between two rigid pads, ramps the load up, and says whether the part stays.
-The smallest friction with which it does is found by bisection and printed beside the exact one. Not a
+The smallest friction with which it does is found by bisection and printed beside the exact one. The
+pads are coupled as the jaws of a gripper: a push along the closing axis moves none of them. Not a
 test: an engine's answer depends on its contact model, its step and its patience. MuJoCo takes some
 seconds a grip, Drake with hydroelastic contact some minutes.
+
+What to expect: straight slides agree to 0.2 %. MuJoCo's contact forces minimise one convex function,
+in which friction and normal force trade: where a part turns, normal force moves to the points that
+slip fastest, so the part stays with 10 to 20 % less friction than equal pressure allows.
 """
 
 import argparse
@@ -57,7 +62,7 @@ def mujoco_holds(case, mu, spacing):
     )
     inertia = MASS * GYRATION**2
     pads = "".join(
-        f'<body name="{name}" pos="0 0 {side * (half + THICK)}"><joint type="slide" axis="0 0 1" damping="200"/>'
+        f'<body name="{name}" pos="0 0 {side * (half + THICK)}"><joint name="{name}" type="slide" axis="0 0 1" damping="200"/>'
         f'<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
         f'<geom type="box" size="{PAD} {PAD} {THICK}" contype="2" conaffinity="1"/></body>'
         for name, side in (("low", -1), ("high", 1))
@@ -67,7 +72,7 @@ def mujoco_holds(case, mu, spacing):
         <default><geom friction="{mu} 0 0" condim="3" contype="1" conaffinity="2" solref="0.002 1"/></default>
         <worldbody>{pads}<body name="part"><freejoint/>
         <inertial pos="0 0 0" mass="{MASS}" diaginertia="{inertia} {inertia} {inertia}"/>{spheres}</body>
-        </worldbody></mujoco>"""
+        </worldbody><equality><joint joint1="low" joint2="high" polycoef="0 -1 0 0 0" solref="0.002 1"/></equality></mujoco>"""
     )
     data = mujoco.MjData(model)
     index = {name: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) for name in ("low", "high", "part")}
@@ -96,11 +101,12 @@ def moved(before, after):
 def drake_holds(case, mu, spacing):
     """Whether Drake's part stays: compliant hydroelastic boxes between rigid pads."""
     from pydrake.geometry import AddCompliantHydroelasticProperties, AddContactMaterial
-    from pydrake.geometry import AddRigidHydroelasticProperties, Box, Convex, ProximityProperties
+    from pydrake.geometry import AddRigidHydroelasticProperties, Box, ProximityProperties
     from pydrake.math import RigidTransform
     from pydrake.multibody.math import SpatialForce
     from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
-    from pydrake.multibody.plant import ContactModel, ExternallyAppliedSpatialForce
+    from pydrake.multibody.plant import ContactModel, DiscreteContactApproximation
+    from pydrake.multibody.plant import ExternallyAppliedSpatialForce
     from pydrake.multibody.tree import PrismaticJoint, SpatialInertia, UnitInertia
     from pydrake.systems.analysis import Simulator
     from pydrake.systems.framework import DiagramBuilder, LeafSystem
@@ -109,6 +115,7 @@ def drake_holds(case, mu, spacing):
     builder = DiagramBuilder()
     plant, scene = AddMultibodyPlantSceneGraph(builder, 5e-4)
     plant.set_contact_model(ContactModel.kHydroelastic)
+    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
     plant.mutable_gravity_field().set_gravity_vector([0, 0, 0])
     gyration = UnitInertia(*[GYRATION**2] * 3)
     half = case["distance"] / 2
@@ -123,22 +130,21 @@ def drake_holds(case, mu, spacing):
         return made
 
     part = plant.AddRigidBody("part", SpatialInertia(MASS, [0, 0, 0], gyration))
-    for number, ring in enumerate(map(np.array, case["pieces"])):
-        middle, size = (ring.min(axis=0) + ring.max(axis=0)) / 2, np.ptp(ring, axis=0)
-        if len(ring) == 4:
-            shape, place = Box(*size, 2 * half), RigidTransform([*middle, 0])
-        else:
-            points = np.array([[x, y, z] for x, y in ring for z in (-half, half)])
-            shape, place = Convex(points, "part"), RigidTransform()
-        plant.RegisterCollisionGeometry(part, place, shape, f"piece{number}", properties(True))
-    bodies = {"part": part}
+    # In columns: Drake takes the friction of each face of its coarse meshes at one point.
+    for number, (x, y) in enumerate(cells(case, spacing)):
+        column = Box(spacing, spacing, 2 * half)
+        place = RigidTransform([x, y, 0])
+        plant.RegisterCollisionGeometry(part, place, column, f"column{number}", properties(True))
+    bodies, slides = {"part": part}, []
     for name, side in (("low", -1), ("high", 1)):
         pad = plant.AddRigidBody(name, SpatialInertia(1.0, [0, 0, 0], UnitInertia(1, 1, 1)))
         place = RigidTransform([0, 0, side * (half + THICK)])
-        plant.AddJoint(PrismaticJoint(name, plant.world_frame(), pad.body_frame(), [0, 0, 1], damping=200.0))
+        slide = PrismaticJoint(name, plant.world_frame(), pad.body_frame(), [0, 0, 1], damping=200.0)
+        slides.append(plant.AddJoint(slide))
         box = Box(2 * PAD, 2 * PAD, 2 * THICK)
         plant.RegisterCollisionGeometry(pad, place, box, name, properties(False))
         bodies[name] = pad
+    plant.AddCouplerConstraint(slides[0], slides[1], -1.0)
     plant.Finalize()
 
     load = np.concatenate([case["load"]["moment"], case["load"]["force"]])
@@ -185,7 +191,7 @@ def drake_holds(case, mu, spacing):
     return True
 
 
-ENGINES = {"mujoco": (mujoco_holds, 1e-3), "drake": (drake_holds, 2e-3)}
+ENGINES = {"mujoco": (mujoco_holds, 1e-3), "drake": (drake_holds, 4e-3)}
 
 
 def friction(holds, case, spacing, tolerance):

@@ -25,7 +25,7 @@ const LISTED: usize = 50;
     after_help = "EXAMPLES:\n  gripfast assess bracket.stl --poses taught.csv --gripper robotiq-2f85 --mass 350g\n  \
 gripfast assess bracket.stl --poses grasps.h5 --origin 103.4mm --gripper franka-hand --mass 350g --accel 2g -o good.json\n  \
 gripfast assess bracket.stl --poses lab.isaac_grasp.yaml --origin flange --gripper generic --mass 350g --json\n\n\
-FILES: CSV (columns x_m, y_m, z_m, qx, qy, qz, qw; id), isaac_grasp, moveit, graspgen, graspnet (.npz, .npy), acronym, or a \
+FILES: CSV or Parquet (columns x_m, y_m, z_m, qx, qy, qz, qw; id), isaac_grasp, moveit, graspgen, graspnet (.npz, .npy), acronym, or a \
 result file of gripfast. Axes and origin are those that exports of the format hold (docs/formats.md), or as the file itself or \
 --convention and --origin say. Everything else is asked as of `gripfast plan`.\n\nEXIT CODES:\n  0  at least one pose is a grip    1  none is    2  bad input or usage"
 )]

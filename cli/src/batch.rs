@@ -44,6 +44,10 @@ pub(crate) struct Args {
     /// Jobs at a time [default: one for each core]; changes nothing in the results.
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
+    /// Shares into which the candidates of each job are cut, to keep all cores busy with one large part;
+    /// changes nothing in the results [default: 1].
+    #[arg(long, value_name = "N")]
+    split: Option<usize>,
     /// Best grips to keep of each job [default: 100].
     #[arg(long, value_name = "K")]
     top_k: Option<usize>,
@@ -70,13 +74,24 @@ enum FailOn {
 
 /// Runs the subcommand.
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let Args { inputs, gripper, loads, output, resume, jobs, top_k, fail_on, request, quiet, job } =
-        args;
-    if jobs == Some(0) {
-        anyhow::bail!(Error::input("--jobs", "is 0", "give one or more"));
-    }
-    if top_k == Some(0) {
-        anyhow::bail!(Error::input("--top-k", "is 0", "give one or more"));
+    let Args {
+        inputs,
+        gripper,
+        loads,
+        output,
+        resume,
+        jobs,
+        split,
+        top_k,
+        fail_on,
+        request,
+        quiet,
+        job,
+    } = args;
+    for (flag, number) in [("--jobs", jobs), ("--split", split), ("--top-k", top_k)] {
+        if number == Some(0) {
+            anyhow::bail!(Error::input(flag, "is 0", "give one or more"));
+        }
     }
     let mut batch = batch(&inputs)?;
     if let Some(path) = &request {
@@ -103,7 +118,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let jobs_to_do = batch.jobs()?;
     let interrupt = Interrupt::watched()?;
     let mut shown = Shown::new(quiet, jobs_to_do.len());
-    let workers = Workers { jobs, ..Workers::default() };
+    let workers = Workers { jobs, split, ..Workers::default() };
     let report = batch::run(&jobs_to_do, &output, resume, workers, &mut shown, &interrupt.stop);
     shown.bar.finish_and_clear();
     let report = report?;

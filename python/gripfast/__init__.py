@@ -21,7 +21,7 @@ import sys as _sys
 if _sys.platform == "linux" and "XDG_RUNTIME_DIR" not in _os.environ:
     _os.environ.setdefault("NODEVICE_SELECT", "1")
 
-from ._batch import Batch, Job, Report, Store, run_job
+from ._batch import Batch, Job, Report, Store, gather_job, run_job, run_share
 from ._errors import (
     BusyError,
     CancelledError,
@@ -72,5 +72,7 @@ __all__ = [
     "plan",
     "read",
     "run_job",
+    "run_share",
+    "gather_job",
     "score",
 ]

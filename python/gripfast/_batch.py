@@ -121,14 +121,18 @@ class Batch:
         resume: bool = False,
         jobs: int | None = None,
         threads: int | None = None,
+        split: int = 1,
         progress: bool | Callable[[dict[str, Any], int, int], None] | None = None,
     ) -> Report:
         """Does all jobs on this machine, as ``gripfast batch`` does, ``jobs`` of them at a time.
-        ``progress`` is called with (entry of the manifest, jobs that have ended, jobs in all)."""
+        ``split`` cuts the candidates of each job into shares, which go to the workers one by one: a
+        single large part then keeps all of them busy. It changes nothing in the files. ``progress`` is called with (entry of the manifest, jobs that have ended, jobs in all)."""
         texts = [job.text for job in self.jobs]
         with _Listener(progress, None, "job") as listener:
             return Report._of(
-                _gripfast.batch_run(texts, os.fspath(folder), resume, jobs, threads, listener)
+                _gripfast.batch_run(
+                    texts, os.fspath(folder), resume, (jobs, threads, split), listener
+                )
             )
 
 
@@ -136,6 +140,24 @@ def run_job(job: Job, part: Part | None = None, threads: int | None = None) -> t
     """Does one job, on a part in memory where it is given: its line of the manifest as JSON, and its
     result, which :meth:`Store.record` keeps. A job that fails is an outcome, not an exception."""
     return _gripfast.run_job(job.text, None if part is None else part._native, threads)
+
+
+def run_share(
+    job: Job, number: int, of: int, part: Part | None = None, threads: int | None = None
+) -> tuple[str | None, bytes]:
+    """Does one of the ``of`` shares of a job's candidates, ``number`` from 0: ``None`` and what
+    :func:`gather_job` wants, or, where the job failed, what :meth:`Store.record` wants."""
+    native = None if part is None else part._native
+    return _gripfast.run_share(job.text, (number, of), native, threads)
+
+
+def gather_job(
+    job: Job, shares: Sequence[bytes], part: Part | None = None, threads: int | None = None
+) -> tuple[str, bytes]:
+    """Puts together what all shares of a job have found, in the order of their numbers, wherever they
+    were done: what :func:`run_job` gives, with the same numbers."""
+    native = None if part is None else part._native
+    return _gripfast.gather_job(job.text, list(shares), native, threads)
 
 
 class Store:
@@ -155,6 +177,14 @@ class Store:
     def record(self, entry: str, content: bytes) -> None:
         """Keeps what :func:`run_job` gave."""
         self._native.record(entry, content)
+
+    def share(self, job: int, number: int, of: int) -> bytes | None:
+        """What an earlier run has left of a share of an open job, by the job's number."""
+        return self._native.share(job, (number, of))
+
+    def record_share(self, job: int, number: int, of: int, state: bytes) -> None:
+        """Keeps what :func:`run_share` gave until the whole job is recorded."""
+        self._native.record_share(job, (number, of), state)
 
     def finish(self) -> Report:
         """Writes what is left to be written, and closes the folder."""

@@ -37,6 +37,7 @@ def run(
     folder: Path,
     *,
     resume: bool = False,
+    split: int = 1,
     num_cpus: float = 1,
     num_gpus: float = 0,
     max_retries: int = 3,
@@ -45,44 +46,89 @@ def run(
 ) -> Report:
     """Does all jobs of a batch on the cluster that Ray is connected to (``ray.init``).
 
-    Each job is a task of ``num_cpus`` processors, on as many threads, and ``num_gpus``. Ray does a
-    task again, up to ``max_retries`` times, when its machine or process is lost; after that the job
-    has failed, and ``resume=True`` tries it again. Parts are read by their paths on the machine that
-    does the job; with ``ship=True`` this machine reads the files and sends them (not for parts of
-    several files, such as glTF with buffers beside it). ``progress`` as in :meth:`Batch.run`.
+    Each job is a task of ``num_cpus`` processors, on as many threads, and ``num_gpus``. With
+    ``split`` each job is that many tasks, one for each share of its candidates, and one that puts
+    them together: a single large part keeps many machines busy, and the files are the same, byte for
+    byte. Ray does a task again, up to ``max_retries`` times, when its machine or process is lost;
+    after that the job has failed, and ``resume=True`` tries it again. Parts are read by their paths
+    on the machine that does the job; with ``ship=True`` this machine reads the files and sends them
+    (not for parts of several files, such as glTF with buffers beside it). ``progress`` as in
+    :meth:`Batch.run`.
     """
+    if split < 1:
+        raise ValueError("split is below 1")
     if not ray.is_initialized():
         ray.init()
     jobs = list(batch)
     store = Store(jobs, folder, resume=resume)
     task = ray.remote(
         num_cpus=num_cpus, num_gpus=num_gpus, max_retries=max_retries, retry_exceptions=False
-    )(_job)
+    )(_task)
     threads = max(1, int(num_cpus))
-    waiting = sorted(store.pending(), key=lambda number: (jobs[number].request["part"], number))
-    waiting.reverse()
-    running: dict[Any, int] = {}
+    ordered = sorted(store.pending(), key=lambda number: (jobs[number].request["part"], number))
+    #: Job, and share; None: the whole job.
+    waiting: list[tuple[int, int | None]] = [
+        (number, share)
+        for number in reversed(ordered)
+        for share in (reversed(range(split)) if split > 1 else [None])
+    ]
+    running: dict[Any, tuple[int, int | None]] = {}
+    shares: dict[int, dict[int, bytes]] = {}
     parcels: dict[str, Any] = {}
+
+    def start(number: int, share: int | None, *work: Any) -> None:
+        part = jobs[number].request["part"]
+        if ship and part not in parcels:
+            # Jobs of one part follow each other: its parcel is dropped after the last.
+            parcels.clear()
+            parcels[part] = _parcel(part)
+        text = jobs[number].text
+        running[task.remote(text, threads, parcels.get(part), *work)] = (number, share)
+
+    def take(number: int, share: int, state: bytes) -> None:
+        found = shares.setdefault(number, {})
+        found[share] = state
+        if len(found) == split:
+            del shares[number]
+            start(number, None, "gather", [found[one] for one in range(split)])
+
     with _Listener(progress, None, "job") as hear:
+
+        def record(number: int, entry: str, content: bytes) -> None:
+            shares.pop(number, None)
+            store.record(entry, content)
+            hear("job", entry, *store.counts())
+
+        ended: set[int] = set()
         while waiting or running:
             cluster: Any = ray
             slots = cluster.cluster_resources().get("CPU", 1.0) / max(num_cpus, 0.01)
             while waiting and len(running) < (1 + _AHEAD) * max(slots, 1.0):
-                number = waiting.pop()
-                part = jobs[number].request["part"]
-                if ship and part not in parcels:
-                    # Jobs of one part follow each other: its parcel is dropped after the last.
-                    parcels = {part: _parcel(part)}
-                running[task.remote(jobs[number].text, threads, parcels.get(part))] = number
+                number, share = waiting.pop()
+                if number in ended:
+                    continue
+                if share is None:
+                    start(number, None, "run")
+                elif (state := store.share(number, share, split)) is not None:
+                    take(number, share, state)
+                else:
+                    start(number, share, "share", (share, split))
             done, _ = ray.wait(list(running), num_returns=1, timeout=1.0)
             for reference in done:
-                number = running.pop(reference)
+                number, share = running.pop(reference)
+                if number in ended:
+                    continue
                 try:
                     entry, content = ray.get(reference)
                 except (ray.exceptions.RayError, OSError) as error:
                     entry, content = _gripfast.lost_job(jobs[number].text, _first_line(error)), b""
-                store.record(entry, content)
-                hear("job", entry, *store.counts())
+                if entry is None:
+                    assert share is not None
+                    store.record_share(number, share, split, content)
+                    take(number, share, content)
+                else:
+                    ended.add(number)
+                    record(number, entry, content)
     return store.finish()
 
 
@@ -95,10 +141,20 @@ def _parcel(part: str) -> Any:
         return None
 
 
-def _job(text: str, threads: int, parcel: _Shipped | None) -> tuple[str, bytes]:
-    """One job on a machine of the cluster."""
+def _task(
+    text: str, threads: int, parcel: _Shipped | None, what: str, work: Any = None
+) -> tuple[str | None, bytes]:
+    """A job on a machine of the cluster, a share of it, or the end of its shares."""
+
+    def do(text: str, part: _gripfast.Part | None) -> tuple[str | None, bytes]:
+        if what == "share":
+            return _gripfast.run_share(text, work, part, threads)
+        if what == "gather":
+            return _gripfast.gather_job(text, work, part, threads)
+        return _gripfast.run_job(text, part, threads)
+
     if parcel is None:
-        return _gripfast.run_job(text, None, threads)
+        return do(text, None)
     name, content = parcel
     request = json.loads(text)["request"]
     with tempfile.TemporaryDirectory() as folder:
@@ -113,8 +169,8 @@ def _job(text: str, threads: int, parcel: _Shipped | None) -> tuple[str, bytes]:
             # A bad part is an outcome of the job, which reads it again to say so.
             fields = json.loads(text)
             fields["request"]["part"] = path
-            return _gripfast.run_job(json.dumps(fields), None, threads)
-        return _gripfast.run_job(text, native, threads)
+            return do(json.dumps(fields), None)
+        return do(text, native)
 
 
 def _first_line(error: BaseException) -> str:

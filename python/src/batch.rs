@@ -37,18 +37,18 @@ impl Watch for Tell {
 
 /// Does all jobs here; what came of them, as JSON.
 #[pyfunction]
-#[pyo3(signature = (texts, folder, resume=false, workers=None, threads=None, listener=None))]
+#[pyo3(signature = (texts, folder, resume=false, workers=(None, None, None), listener=None))]
 pub(crate) fn batch_run(
     py: Python<'_>,
     texts: Vec<String>,
     folder: PathBuf,
     resume: bool,
-    workers: Option<usize>,
-    threads: Option<usize>,
+    workers: (Option<usize>, Option<usize>, Option<usize>),
     listener: Option<Py<PyAny>>,
 ) -> PyResult<String> {
     let jobs = jobs(&texts)?;
-    let workers = Workers { jobs: workers, threads };
+    let (at_once, threads, split) = workers;
+    let workers = Workers { jobs: at_once, threads, split };
     let report = watched(py, listener.as_ref(), move |teller, stop| {
         batch::run(&jobs, &folder, resume, workers, &mut Tell(teller), stop)
     })?;
@@ -68,12 +68,53 @@ pub(crate) fn run_job<'py>(
     let part = part.map(|part| (*part.inner).clone());
     let finished =
         watched(py, None, move |_, stop: &AtomicBool| batch::run_job(&job, part, threads, stop))?;
-    // Only an interrupt stops it, which is raised before.
-    let Some(Finished { entry, content }) = finished else {
-        let error = Error::new(gripfast::error::ErrorKind::Cancelled, "job", "was stopped", "");
-        return Err(error).or_raise();
-    };
+    let Some(Finished { entry, content }) = finished else { return Err(stopped()).or_raise() };
     Ok((json(&entry)?, PyBytes::new(py, &content)))
+}
+
+/// Does a share of a job's candidates: its entry as JSON where the job failed, and what the share has
+/// found.
+#[pyfunction]
+#[pyo3(signature = (text, share, part=None, threads=None))]
+pub(crate) fn run_share<'py>(
+    py: Python<'py>,
+    text: &str,
+    share: [usize; 2],
+    part: Option<&Part>,
+    threads: Option<usize>,
+) -> PyResult<(Option<String>, Bound<'py, PyBytes>)> {
+    let job: Job = from_json("job", text)?;
+    let part = part.map(|part| (*part.inner).clone());
+    let done = watched(py, None, move |_, stop: &AtomicBool| {
+        batch::run_share(&job, share, part, threads, stop)
+    })?;
+    match done {
+        Some(Ok(state)) => Ok((None, PyBytes::new(py, &state))),
+        Some(Err(finished)) => Ok((Some(json(&finished.entry)?), PyBytes::new(py, &[]))),
+        None => Err(stopped()).or_raise(),
+    }
+}
+
+/// Puts together what the shares of a job have found: its entry as JSON, and its result.
+#[pyfunction]
+#[pyo3(signature = (text, shares, part=None, threads=None))]
+pub(crate) fn gather_job<'py>(
+    py: Python<'py>,
+    text: &str,
+    shares: Vec<Vec<u8>>,
+    part: Option<&Part>,
+    threads: Option<usize>,
+) -> PyResult<(String, Bound<'py, PyBytes>)> {
+    let job: Job = from_json("job", text)?;
+    let part = part.map(|part| (*part.inner).clone());
+    let finished = py.detach(|| batch::gather_job(&job, &shares, part, threads));
+    let Some(Finished { entry, content }) = finished else { return Err(stopped()).or_raise() };
+    Ok((json(&entry)?, PyBytes::new(py, &content)))
+}
+
+/// Only an interrupt stops a job, which is raised before.
+fn stopped() -> Error {
+    Error::new(gripfast::error::ErrorKind::Cancelled, "job", "was stopped", "")
 }
 
 /// The entry, as JSON, of a job that never came back.
@@ -125,6 +166,28 @@ impl Store {
     fn counts(&self, py: Python<'_>) -> PyResult<(usize, usize)> {
         let Counts { jobs, ended, .. } = self.with(py, |store| Ok(store.counts()))?;
         Ok((ended, jobs))
+    }
+
+    /// What an earlier run has left of a share of a job.
+    fn share<'py>(
+        &self,
+        py: Python<'py>,
+        job: usize,
+        share: [usize; 2],
+    ) -> PyResult<Option<Bound<'py, PyBytes>>> {
+        let state = self.with(py, |store| Ok(store.share(job, share)))?;
+        Ok(state.map(|state| PyBytes::new(py, &state)))
+    }
+
+    /// Keeps what a share of a job has found until the job is recorded.
+    fn record_share(
+        &self,
+        py: Python<'_>,
+        job: usize,
+        share: [usize; 2],
+        state: &[u8],
+    ) -> PyResult<()> {
+        self.with(py, |store| store.record_share(job, share, state))
     }
 
     /// Keeps what came of a job.

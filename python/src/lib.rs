@@ -34,6 +34,8 @@ fn _gripfast(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(batch::batch_jobs, module)?,
         wrap_pyfunction!(batch::batch_run, module)?,
         wrap_pyfunction!(batch::run_job, module)?,
+        wrap_pyfunction!(batch::run_share, module)?,
+        wrap_pyfunction!(batch::gather_job, module)?,
         wrap_pyfunction!(batch::lost_job, module)?,
     ] {
         module.add_function(function)?;

@@ -72,6 +72,36 @@ def test_jobs_done_one_by_one_come_to_the_same_files(theirs, tmp_path):
     assert (report.grips, report.open) == (6, 0) and data(tmp_path) == theirs
 
 
+def test_a_batch_in_shares_writes_the_same_files(theirs, tmp_path):
+    report = batch().run(tmp_path / "here", split=3)
+    assert (report.grips, report.failed) == (6, 0) and data(tmp_path / "here") == theirs
+    # Share by share, some of them on another machine, and begun again.
+    jobs = batch()
+    store = gripfast.Store(jobs, tmp_path / "there")
+    failed, state = gripfast.run_share(jobs.jobs[2], 1, 4, threads=1)
+    assert failed is None
+    store.record_share(2, 1, 4, state)
+    del store
+    store = gripfast.Store(jobs, tmp_path / "there", resume=True)
+    assert store.share(2, 1, 4) == state and store.share(2, 0, 4) is None
+    for number in store.pending():
+        job = jobs.jobs[number]
+        found = [store.share(number, share, 4) or gripfast.run_share(job, share, 4)[1]
+                 for share in range(4)]
+        store.record(*gripfast.gather_job(job, found))
+    assert store.finish().grips == 6 and data(tmp_path / "there") == theirs
+
+
+def test_a_bad_part_in_shares_fails_once(tmp_path):
+    bad = tmp_path / "bad.stl"
+    bad.write_text("nothing")
+    jobs = gripfast.Batch([bad, PARTS[1]], ["generic"], **COARSE)
+    report = jobs.run(tmp_path / "out", split=5)
+    assert (report.grips, report.failed, report.open) == (1, 1, 0)
+    entry, state = gripfast.run_share(jobs.jobs[0], 0, 2)
+    assert json.loads(entry)["outcome"] == "failed" and state == b""
+
+
 def test_a_bad_part_is_an_outcome(tmp_path):
     bad = tmp_path / "bad.stl"
     bad.write_text("nothing")

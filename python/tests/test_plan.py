@@ -373,6 +373,17 @@ def test_poses_from_outside_are_scored_as_the_program_does(bracket, program, tmp
         "assess", BRACKET, "--poses", str(path), "-g", "robotiq-2f85", "--json", *flags(base)
     )
     assert filed.rows == json.loads(done.stdout)["poses"] and len(filed) == len(bracket)
+    # The same from Parquet, in single precision and with whole numbers for names, as others write it.
+    pandas = pytest.importorskip("pandas")
+    table = pandas.read_csv(path)
+    columns = ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw", "jaw_gap_m"]
+    for kind, tolerance in ((np.float64, 0), (np.float32, 1e-3)):
+        table[columns].astype(kind).assign(id=table["id"]).to_parquet(tmp_path / "poses.parquet")
+        again = gripfast.assess(
+            str(ROOT / BRACKET), "robotiq-2f85", tmp_path / "poses.parquet", **base
+        )
+        assert [row["name"] for row in again] == [row["name"] for row in filed]
+        assert np.allclose(again.mu_s, filed.mu_s, rtol=tolerance, atol=0)
     # Turned by more than jaws right, and away from the part.
     wrong = bracket.poses[:2].copy()
     turn = np.array([[1, 0, 0], [0, np.cos(0.3), -np.sin(0.3)], [0, np.sin(0.3), np.cos(0.3)]])

@@ -70,13 +70,20 @@ def test_a_machine_that_is_lost_costs_nothing(here, tmp_path):
         assert done[0] == 6 and len(done) == 19
         assert (report.grips, report.failed) == (24, 0) and data(tmp_path / "sent") == here
 
+        # Every job cut into shares, given up in mid-run and resumed.
+        with pytest.raises(Enough):
+            gripfast.ray.run(batch(), tmp_path / "shares", split=3, progress=give_up)
+        report = gripfast.ray.run(batch(), tmp_path / "shares", split=3, resume=True)
+        assert (report.grips, report.failed) == (24, 0) and data(tmp_path / "shares") == here
+
         # A part that is not there fails its jobs and no others.
         some = gripfast.Batch(
             ["data/parts/hex_nut.stl"], ["generic"],
             description={"part": [{"part": "nowhere.stl"}]}, **COARSE,
         )
-        report = gripfast.ray.run(some, tmp_path / "bad")
-        assert (report.grips, report.failed) == (1, 1)
+        for split in (1, 3):
+            report = gripfast.ray.run(some, tmp_path / f"bad{split}", split=split)
+            assert (report.grips, report.failed) == (1, 1)
         assert report.failed_jobs[0][1]["kind"] == "not_found"
     finally:
         ray.shutdown()

@@ -13,7 +13,7 @@ use super::Job;
 use super::ledger::checksum;
 use crate::error::{Error, Result};
 use crate::part::Part;
-use crate::plan::{Observer, Plan};
+use crate::plan::{self, Observer, Plan};
 use crate::request::Request;
 use crate::results::{GripSet, PartSummary, Resolved};
 
@@ -177,26 +177,62 @@ pub fn run_job(
     threads: Option<usize>,
     stop: &AtomicBool,
 ) -> Option<Finished> {
-    run_job_on(job, || part, threads, stop)
+    finished(job, |heard| {
+        let plan = plan(job, part, threads)?;
+        planned(job, &plan, plan.run(heard, stop)?)
+    })
 }
 
-/// The same on the part that `part` brings: a fault while it is read is the job's as well.
-pub(super) fn run_job_on(
+/// What has come of a share of a job: its state for [`gather_job`], or, where it failed, the whole job.
+pub type ShareOutcome = std::result::Result<Vec<u8>, Box<Finished>>;
+
+/// Does the share `number`, from 0, of `of` shares of a job's candidates, otherwise as [`run_job`].
+pub fn run_share(
     job: &Job,
-    part: impl FnOnce() -> Option<Part>,
+    [number, of]: [usize; 2],
+    part: Option<Part>,
     threads: Option<usize>,
     stop: &AtomicBool,
+) -> Option<ShareOutcome> {
+    let mut state = None;
+    let failed = finished(job, |_| {
+        state = plan(job, part, threads)?.run_share(number, of, stop)?;
+        Ok(None)
+    });
+    match (failed, state) {
+        (Some(failed), _) => Some(Err(Box::new(failed))),
+        (None, state) => state.map(Ok),
+    }
+}
+
+/// Puts together what all shares of a job have found, in the order of their numbers: what [`run_job`]
+/// gives, byte for byte.
+pub fn gather_job(
+    job: &Job,
+    shares: &[Vec<u8>],
+    part: Option<Part>,
+    threads: Option<usize>,
+) -> Option<Finished> {
+    finished(job, |heard| {
+        let plan = plan(job, part, threads)?;
+        planned(job, &plan, plan.gather(shares, heard)?)
+    })
+}
+
+/// The end of a job: what `work` came to, or how it failed, a fault of the program included; `None`
+/// where it came to nothing.
+fn finished(
+    job: &Job,
+    work: impl FnOnce(&mut Heard) -> Result<Option<Planned>>,
 ) -> Option<Finished> {
     let (begin, clock) = (SystemTime::now(), Instant::now());
     let mut heard = Heard::default();
-    let ended = catch_unwind(AssertUnwindSafe(|| plan(job, part(), threads, stop, &mut heard)));
+    let ended = catch_unwind(AssertUnwindSafe(|| work(&mut heard)));
     let mut entry = Entry::of(job, begin);
     let mut content = Vec::new();
     match ended {
-        Ok(Ok(planned)) => {
-            if !planned.set.provenance.complete {
-                return None;
-            }
+        Ok(Ok(None)) => return None,
+        Ok(Ok(Some(planned))) => {
             content = planned.content;
             fill(&mut entry, &planned.set, planned.health, &heard.notes);
         }
@@ -228,29 +264,29 @@ struct Planned {
     content: Vec<u8>,
 }
 
-fn plan(
-    job: &Job,
-    part: Option<Part>,
-    threads: Option<usize>,
-    stop: &AtomicBool,
-    heard: &mut Heard,
-) -> Result<Planned> {
+fn plan(job: &Job, part: Option<Part>, threads: Option<usize>) -> Result<Plan> {
     let mut request = job.request.clone();
     request.scoring.threads = request.scoring.threads.or(threads);
     let mut builder = Plan::builder(request);
     if let Some(part) = part {
         builder = builder.part(part);
     }
-    let plan = builder.build()?;
-    let outcome = plan.run(heard, stop)?;
+    builder.build()
+}
+
+/// What a run came to; `None` where it was stopped.
+fn planned(job: &Job, plan: &Plan, outcome: plan::Outcome) -> Result<Option<Planned>> {
     let mut set = outcome.set;
+    if !set.provenance.complete {
+        return Ok(None);
+    }
     set.grips.retain(|ranked| outcome.shown.contains(&ranked.grip.id));
     // Where the work was done must not show in the result.
     set.provenance.request = job.request.clone();
     let mut content = Vec::new();
     set.write_json_lines(&mut content)
         .map_err(|error| Error::io(&job.request.part, "write the result of", error))?;
-    Ok(Planned { set, health: serde_json::to_value(&plan.part().health).ok(), content })
+    Ok(Some(Planned { set, health: serde_json::to_value(&plan.part().health).ok(), content }))
 }
 
 /// What the manifest says of a job that ran to its end.

@@ -3,7 +3,8 @@
 //!
 //! [`Batch`] says which jobs there are; [`run_job`] does one of them, wherever; [`Store`] keeps what
 //! came of them in a folder, so that nothing finished is lost or done twice; [`run`] does all of
-//! them here. One bad part never stops the others.
+//! them here. One bad part never stops the others. A large job can be cut into shares of its
+//! candidates ([`run_share`], [`gather_job`]), which changes nothing in its result.
 //!
 //! ```
 //! use gripfast::batch::{self, Batch, Workers};
@@ -31,10 +32,13 @@ mod job;
 mod ledger;
 mod run;
 mod shard;
+mod split;
 mod store;
 
 pub use describe::{Batch, Job, Variant};
-pub use job::{Entry, Failure, Finished, Outcome, lost_job, run_job};
+pub use job::{
+    Entry, Failure, Finished, Outcome, ShareOutcome, gather_job, lost_job, run_job, run_share,
+};
 pub use run::{Watch, Workers, run};
 pub use store::{Counts, Report, Store};
 

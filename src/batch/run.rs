@@ -1,12 +1,14 @@
 //! All jobs of a batch on this machine.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 use super::Job;
-use super::job::{Entry, Finished, run_job_on};
+use super::job::{Entry, Finished, run_job};
+use super::split::Split;
 use super::store::{Counts, Report, Store};
 use crate::error::Result;
 use crate::part::{Part, ReadOptions};
@@ -19,6 +21,8 @@ pub struct Workers {
     pub jobs: Option<usize>,
     /// Threads of each job whose request does not say; absent: the cores shared out.
     pub threads: Option<usize>,
+    /// Shares into which the candidates of each job are cut, each done by itself; absent: one.
+    pub split: Option<usize>,
 }
 
 /// Sees a batch while it goes.
@@ -73,27 +77,42 @@ pub fn run(
     stop: &AtomicBool,
 ) -> Result<Report> {
     let mut store = Store::open(jobs, folder, resume)?;
+    let files = store.split(workers.split.unwrap_or(1));
     let mut pending = store.pending();
     // Those of one part together: it is read once for all of them.
     pending.sort_by_key(|&job| (&jobs[job].request.part, job));
+    let splits: Vec<Split> = pending.iter().map(|_| Split::default()).collect();
+    let units = pending.len() * files.of;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let count = workers.jobs.unwrap_or(cores).clamp(1, pending.len().max(1));
+    let count = workers.jobs.unwrap_or(cores).clamp(1, units.max(1));
     let threads = Some(workers.threads.unwrap_or((cores / count).max(1)));
     let next = AtomicUsize::new(0);
+    let work = |unit: usize, shelf: &mut Shelf| {
+        let (place, share) = (unit / files.of, unit % files.of);
+        let job = &jobs[pending[place]];
+        // A fault while the part is read is the job's, which reads it again.
+        let mut part = || {
+            let read = AssertUnwindSafe(|| shelf.part(&job.request));
+            if units > 1 { catch_unwind(read).ok().flatten() } else { None }
+        };
+        if files.of == 1 {
+            run_job(job, part(), threads, stop)
+        } else {
+            splits[place].run(job, share, &files, &mut part, (threads, stop))
+        }
+    };
     let outcome = std::thread::scope(|scope| {
         let (send, receive) = sync_channel::<Finished>(count);
         for _ in 0..count {
-            let (send, next, pending) = (send.clone(), &next, &pending);
+            let (send, next, work) = (send.clone(), &next, &work);
             scope.spawn(move || {
                 let mut shelf = Shelf::default();
                 while !stop.load(Ordering::Relaxed) {
-                    let Some(&job) = pending.get(next.fetch_add(1, Ordering::Relaxed)) else {
+                    let unit = next.fetch_add(1, Ordering::Relaxed);
+                    if unit >= units {
                         return;
-                    };
-                    let job = &jobs[job];
-                    let shared = pending.len() > 1;
-                    let part = || if shared { shelf.part(&job.request) } else { None };
-                    let Some(finished) = run_job_on(job, part, threads, stop) else { return };
+                    }
+                    let Some(finished) = work(unit, &mut shelf) else { continue };
                     if send.send(finished).is_err() {
                         return;
                     }

@@ -17,6 +17,7 @@ use super::Job;
 use super::job::{Entry, Failure, Finished, Outcome};
 use super::ledger::{Ledger, checksum};
 use super::shard::{self, Written};
+use super::split::ShareFiles;
 use crate::error::{Error, ErrorKind, Result};
 use crate::file::Lock;
 use crate::gripper;
@@ -113,6 +114,7 @@ pub struct Store {
     before: usize,
     report: Report,
     parquet: bool,
+    shares: ShareFiles,
     _lock: Lock,
 }
 
@@ -200,6 +202,7 @@ impl Store {
             before: 0,
             report: Report::default(),
             parquet: cfg!(feature = "parquet"),
+            shares: ShareFiles::new(&folder.join(WORK), 1),
             _lock: lock,
         };
         store.forget();
@@ -245,6 +248,32 @@ impl Store {
         Counts { jobs: self.states.len(), ended, before: self.before }
     }
 
+    /// Cuts jobs into this many shares from now on.
+    pub(super) fn split(&mut self, of: usize) -> ShareFiles {
+        self.shares.of = of.max(1);
+        self.shares.clone()
+    }
+
+    /// What [`super::run_share`] gave for share `number` of `of` shares of a job, where an earlier run
+    /// has left it here.
+    pub fn share(&mut self, job: usize, [number, of]: [usize; 2]) -> Option<Vec<u8>> {
+        self.split(of).read(job, number)
+    }
+
+    /// Keeps what [`super::run_share`] gave until the job is recorded.
+    ///
+    /// # Errors
+    /// When the folder cannot be written.
+    pub fn record_share(
+        &mut self,
+        job: usize,
+        [number, of]: [usize; 2],
+        state: &[u8],
+    ) -> Result<()> {
+        let written = self.split(of).write(job, number, state);
+        written.map_err(|error| Error::io(&self.folder.join(WORK), "write to", error))
+    }
+
     /// Keeps what came of a job.
     ///
     /// # Errors
@@ -261,6 +290,7 @@ impl Store {
             std::fs::write(&path, content).map_err(|error| Error::io(&path, "write", error))?;
         }
         self.manifest.append(entry)?;
+        self.shares.remove(job);
         self.states[job] = State::Ended(entry.outcome);
         self.results[job] = (content.len() as u64, checksum(content));
         Told::of(entry).count(&mut self.report);
@@ -282,9 +312,11 @@ impl Store {
                 self.write_shard(group)?;
             }
         }
-        // Left where some job failed: its shard is written again when that is mended.
-        let _ = std::fs::remove_dir(self.folder.join(WORK));
         self.report.open = self.report.jobs - self.counts().ended;
+        // Left where some job failed: its shard is written again when that is mended.
+        if self.report.open + self.report.failed == 0 {
+            let _ = std::fs::remove_dir_all(self.folder.join(WORK));
+        }
         Ok(self.report)
     }
 

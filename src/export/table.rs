@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3};
 use super::{Format, Options, View, tidy};
 use crate::error::Result;
 use crate::geometry::patch_area;
-use crate::model::Slip;
+use crate::model::{Slip, Wrench};
 use crate::results::{ForceRange, GripSet, PadFriction, RankedGrip};
 
 /// A column with its name, which ends in the unit.
@@ -199,9 +199,9 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
         number("slip_c2_m", &|grip| slip_centre(grip).map(|c| c[1])),
     ]);
     columns
-        .extend(vector(["force_1_n", "force_2_n", "force_3_n"], &|grip| grip.worst.wrench.force));
+        .extend(vector(["force_1_n", "force_2_n", "force_3_n"], &|grip| worst(grip).force));
     columns.extend(vector(["moment_1_nm", "moment_2_nm", "moment_3_nm"], &|grip| {
-        grip.worst.wrench.moment
+        worst(grip).moment
     }));
     columns.extend([
         number("mu_lower", &|grip| grip.worst.bounds.map(|bounds| bounds.lower)),
@@ -252,9 +252,25 @@ pub(super) fn positive(quaternion: DQuat) -> DQuat {
     if first.is_some_and(|part| part < 0.0) { -quaternion } else { quaternion }
 }
 
+/// What rounding leaves of nothing, as a share of a force, and of it times a metre.
+const ROUNDING: f64 = 1e-15;
+
+/// The worst load without components that are rounding only.
+fn worst(grip: &RankedGrip) -> Wrench {
+    let Wrench { force, moment } = grip.worst.wrench;
+    let size = force.length();
+    let plain = |value: DVec3, least: f64| {
+        DVec3::from_array(value.to_array().map(|v| if v.abs() <= least { 0.0 } else { v }))
+    };
+    let moment_size = size.max(moment.length());
+    Wrench { force: plain(force, ROUNDING * size), moment: plain(moment, ROUNDING * moment_size) }
+}
+
 fn slip_centre(grip: &RankedGrip) -> Option<[f64; 2]> {
     match grip.worst.slip {
-        Some(Slip::Rotation { c, .. }) => Some(c),
+        Some(Slip::Rotation { c, .. }) => {
+            Some(c.map(|value| if value.abs() <= ROUNDING { 0.0 } else { value }))
+        }
         _ => None,
     }
 }

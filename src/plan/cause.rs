@@ -5,6 +5,9 @@ use std::collections::BTreeMap;
 use crate::gripper::{self, Gripper, catalogue::CATALOGUE};
 use crate::part::{CurvedFace, Part, Shape};
 use crate::propose::{ProposeOptions, Tally};
+use crate::rank;
+use crate::model::Status;
+use crate::results::LoadCase;
 
 /// Round faces that are spoken of, the largest ones.
 const MOST_ROUND: usize = 3;
@@ -63,6 +66,27 @@ pub(super) fn causes(
         causes.push(format!("{name} (face {}): {why}", face.id));
     }
     causes
+}
+
+/// Where loads lift a pad off with more than the jaws press: the largest load and what they can bear.
+pub(super) fn overpowered(
+    loads: &[LoadCase],
+    force: f64,
+    rejections: &BTreeMap<String, u64>,
+) -> Option<String> {
+    let most = rejections.values().max()?;
+    let count = rejections.get(&rank::status_name(Status::NoNormalForce))?;
+    let size = |load: &&LoadCase| load.wrench.force.length();
+    let worst = loads.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    (count == most && size(&worst) > 2.0 * force).then(|| {
+        format!(
+            "the load '{}' is {:.0} N; along the closing axis jaws that press with {force:.0} N each \
+             bear no more than {:.0} N",
+            worst.name,
+            size(&worst),
+            2.0 * force
+        )
+    })
 }
 
 /// What is wrong with a width, and who reaches it.
@@ -137,6 +161,34 @@ mod tests {
         assert!(
             within(0.5, &gripper).unwrap_err().ends_with("no gripper of the catalogue reaches it")
         );
+        assert_eq!(mm(0.02), "20 mm");
+    }
+
+    #[test]
+    fn a_part_that_is_too_heavy_is_told() {
+        let load = |name: &str, force: f64| LoadCase {
+            name: name.into(),
+            wrench: crate::model::Wrench {
+                force: glam::DVec3::new(0.0, 0.6 * force, -0.8 * force),
+                moment: glam::DVec3::ZERO,
+            },
+        };
+        let loads = [load("small", 3.0), load("large", 1962.0)];
+        let counts = |lost: u64| {
+            BTreeMap::from([("contact too small".into(), 10), ("no_normal_force".into(), lost)])
+        };
+        assert_eq!(
+            overpowered(&loads, 150.0, &counts(4000)).unwrap(),
+            "the load 'large' is 1962 N; along the closing axis jaws that press with 150 N each bear \
+             no more than 300 N"
+        );
+        assert_eq!(overpowered(&loads, 150.0, &counts(4)), None);
+        assert_eq!(overpowered(&loads, 1500.0, &counts(4000)), None);
+        assert_eq!(overpowered(&loads, 150.0, &BTreeMap::new()), None);
+    }
+
+    #[test]
+    fn a_length_has_no_zeros_at_its_end() {
         assert_eq!(mm(0.02), "20 mm");
         assert_eq!(mm(0.02054), "20.54 mm");
     }

@@ -54,17 +54,28 @@ impl<'a> Checkpoint<'a> {
         }
     }
 
+    /// The state as the content of a file.
+    ///
+    /// # Errors
+    /// When it cannot be put in JSON.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        let mut bytes = serde_json::to_vec(self).map_err(|error| {
+            Error::io(Path::new("state"), "write", std::io::Error::other(error))
+        })?;
+        let sum = checksum(&bytes);
+        bytes.push(b'\n');
+        bytes.extend_from_slice(sum.as_bytes());
+        bytes.push(b'\n');
+        Ok(bytes)
+    }
+
     /// Writes the state, whole or not at all.
     ///
     /// # Errors
     /// When the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let state = serde_json::to_vec(self)
-            .map_err(|error| Error::io(path, "write", std::io::Error::other(error)))?;
-        crate::file::write(path, |writer| {
-            writer.write_all(&state)?;
-            writeln!(writer, "\n{}", checksum(&state))
-        })
+        let state = self.to_bytes()?;
+        crate::file::write(path, |writer| writer.write_all(&state))
     }
 
     /// Reads a state and makes sure that it answers the question that is asked now.
@@ -73,11 +84,21 @@ impl<'a> Checkpoint<'a> {
     /// When the file cannot be read or is no state of this version, or the inputs differ; the
     /// message names those that do.
     pub fn read(path: &Path, inputs: &BTreeMap<String, Value>) -> Result<Checkpoint<'static>> {
-        let place = path.display().to_string();
-        let bytes = crate::file::read(path)?;
+        Self::parse(&path.display().to_string(), &crate::file::read(path)?, inputs)
+    }
+
+    /// As [`Checkpoint::read`], from the content of the file that `place` names.
+    ///
+    /// # Errors
+    /// As [`Checkpoint::read`].
+    pub fn parse(
+        place: &str,
+        bytes: &[u8],
+        inputs: &BTreeMap<String, Value>,
+    ) -> Result<Checkpoint<'static>> {
         let remedy = "start from the beginning, without resuming";
         let wrong =
-            |problem: String| Error::format(&place, problem, remedy).with_options(&["resume"]);
+            |problem: String| Error::format(place, problem, remedy).with_options(&["resume"]);
         #[derive(Deserialize)]
         struct Marks {
             format: String,

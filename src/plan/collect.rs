@@ -79,6 +79,20 @@ impl Collector {
         }
     }
 
+    /// Takes what another one has found among other candidates of the same run.
+    pub fn gather(&mut self, other: Self) {
+        self.kept.extend(other.kept);
+        self.ranked += other.ranked;
+        self.holding += other.holding;
+        other.rejections.into_iter().for_each(|(reason, count)| self.reject(reason, count));
+        for (reason, poses) in other.lost {
+            let lost = self.lost.entry(reason).or_default();
+            lost.extend(poses);
+            lost.sort_by_key(|pose| scatter(pose.id));
+            lost.truncate(self.sample);
+        }
+    }
+
     /// Keeps a grip that does not hold if it belongs to the sample.
     fn lose(&mut self, grip: &RankedGrip, reason: String) {
         if self.sample == 0 {

@@ -179,6 +179,7 @@ impl Plan {
                 partial: None,
                 resume: false,
                 ids: None,
+                flips: self.propose.flips,
             };
             let found = search.run(&mut proposer, &mut (), &AtomicBool::new(false))?;
             let (low, high) = self.part.mesh.bounding_box();

@@ -16,6 +16,8 @@ use crate::propose::{self, Proposer};
 
 /// Among the rejections: free candidates that are not among the numbers asked for.
 const NOT_CHOSEN: &str = "not_chosen";
+/// Among the rejections: grips that are another one with the jaws exchanged.
+const FLIP: &str = "flip";
 
 /// A checkpoint costs at most one part in this many of the time.
 const LEAST_PAUSE: u32 = 20;
@@ -72,15 +74,20 @@ impl Plan {
         Ok(path.map(|path| Partial {
             path,
             every: Duration::from_secs_f64(output.checkpoint.0),
-            inputs: checkpoint::inputs(
-                &self.part,
-                &self.mass,
-                &self.gripper,
-                &self.loads,
-                &self.propose,
-                self.decisive(),
-            ),
+            inputs: self.inputs(),
         }))
+    }
+
+    /// Everything that decides which grips are found and how they are ranked.
+    pub(super) fn inputs(&self) -> BTreeMap<String, Value> {
+        checkpoint::inputs(
+            &self.part,
+            &self.mass,
+            &self.gripper,
+            &self.loads,
+            &self.propose,
+            self.decisive(),
+        )
     }
 
     /// The settings that decide which grips are kept, by name, less those of part, loads and
@@ -110,6 +117,7 @@ impl Plan {
 }
 
 /// What came of the search.
+#[derive(Debug)]
 pub(super) struct Found {
     pub(super) collector: Collector,
     /// Whether every candidate was looked at.
@@ -129,6 +137,8 @@ pub(super) struct Search<'a> {
     pub(super) race: bool,
     /// Only these candidates are scored.
     pub(super) ids: Option<&'a [u64]>,
+    /// Whether grips that are another one with the jaws exchanged are scored too.
+    pub(super) flips: bool,
     /// Grips that do not hold to keep for each reason.
     pub(super) sample: usize,
     pub(super) partial: Option<&'a Partial>,
@@ -220,9 +230,15 @@ impl Search<'_> {
             grips.retain(|grip| ids.contains(&grip.id));
         }
         let others = (all - grips.len()) as u64;
+        if !self.flips {
+            grips.retain(|grip| grip.flip_of.is_none());
+        }
+        let flips = all as u64 - others - grips.len() as u64;
         let (grips, mut left_out) = self.assessor.carried(grips);
-        if others > 0 {
-            left_out.insert(NOT_CHOSEN.to_owned(), others);
+        for (reason, count) in [(NOT_CHOSEN, others), (FLIP, flips)] {
+            if count > 0 {
+                left_out.insert(reason.to_owned(), count);
+            }
         }
         (grips, left_out)
     }

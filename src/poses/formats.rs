@@ -5,8 +5,6 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::{Pose, Raw};
-#[cfg(not(feature = "hdf5"))]
-use crate::error::ErrorKind;
 use crate::error::{Error, Result};
 use crate::model::Frame;
 use crate::results::GripSet;
@@ -55,44 +53,131 @@ pub(super) fn native(place: &str, bytes: &[u8]) -> Result<Vec<Pose>> {
     Ok(set.grips.iter().map(|ranked| pose(&ranked.grip)).collect())
 }
 
-/// Columns `x_m`, `y_m`, `z_m`, `qx`, `qy`, `qz`, `qw`, and, where there are, `id` or `name`,
-/// `jaw_gap_m`, `tool_frame`.
-pub(super) fn csv(place: &str, bytes: &[u8]) -> Result<Found> {
-    let mut reader = csv::Reader::from_reader(bytes);
-    let failed = |error: csv::Error| wrong(place, error.to_string());
-    let names = reader.headers().map_err(failed)?.clone();
-    let column = |name: &str| names.iter().position(|known| known.trim() == name);
-    let needed = ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"]
-        .map(|name| column(name).ok_or_else(|| wrong(place, format!("has no column {name}"))));
-    let mut columns = [0; 7];
-    for (slot, found) in columns.iter_mut().zip(needed) {
-        *slot = found?;
+/// A cell of a table.
+enum Cell {
+    Number(f64),
+    /// As written; empty where there is nothing.
+    Text(String),
+}
+
+/// A table of poses by its columns: `x_m`, `y_m`, `z_m`, `qx`, `qy`, `qz`, `qw`, and, where there
+/// are, `id` or `name`, `jaw_gap_m`, `tool_frame`.
+struct Columns {
+    names: Vec<String>,
+    pose: [usize; 7],
+    name: Option<usize>,
+    gap: Option<usize>,
+    words: Option<usize>,
+}
+
+impl Columns {
+    fn new(place: &str, names: Vec<String>) -> Result<Self> {
+        let column = |name: &str| names.iter().position(|known| known.trim() == name);
+        let needed = ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"]
+            .map(|name| column(name).ok_or_else(|| wrong(place, format!("has no column {name}"))));
+        let mut pose = [0; 7];
+        for (slot, found) in pose.iter_mut().zip(needed) {
+            *slot = found?;
+        }
+        let (name, gap) = (column("id").or(column("name")), column("jaw_gap_m"));
+        let words = column("tool_frame");
+        Ok(Self { pose, name, gap, words, names })
     }
-    let (name, gap) = (column("id").or(column("name")), column("jaw_gap_m"));
-    let words = column("tool_frame");
-    let (mut found, mut stated) = (Vec::new(), None);
-    for (row, record) in reader.records().enumerate() {
-        let record = record.map_err(failed)?;
-        let place = format!("{place}:{}", row + 2);
-        let number = |column: usize| {
-            let text = record.get(column).unwrap_or_default().trim();
-            text.parse::<f64>()
-                .map_err(|_| wrong(&place, format!("'{text}' in {} is no number", &names[column])))
+
+    /// The pose of row `row`, and the frame that it states.
+    fn read(
+        &self,
+        place: &str,
+        row: usize,
+        cell: impl Fn(usize) -> Cell,
+    ) -> Result<(Raw, Option<String>)> {
+        let number = |column: usize| match cell(column) {
+            Cell::Number(number) => Ok(number),
+            Cell::Text(text) => text.parse::<f64>().map_err(|_| {
+                wrong(place, format!("'{text}' in {} is no number", self.names[column]))
+            }),
+        };
+        let text = |column: usize| match cell(column) {
+            Cell::Number(number) => number.to_string(),
+            Cell::Text(text) => text,
         };
         let mut values = [0.0; 7];
-        for (value, column) in values.iter_mut().zip(columns) {
+        for (value, column) in values.iter_mut().zip(self.pose) {
             *value = number(column)?;
         }
         let [x, y, z, quaternion @ ..] = values;
-        let text = |column: usize| record.get(column).unwrap_or_default().trim().to_owned();
-        stated = stated.or_else(|| words.map(text));
-        found.push(Raw {
-            name: name.map_or_else(|| row.to_string(), text),
-            frame: from_quaternion(&place, quaternion, DVec3::new(x, y, z))?,
-            gap: gap.filter(|column| !text(*column).is_empty()).map(number).transpose()?,
-        });
+        let raw = Raw {
+            name: self.name.map_or_else(|| row.to_string(), text),
+            frame: from_quaternion(place, quaternion, DVec3::new(x, y, z))?,
+            gap: self.gap.filter(|column| !text(*column).is_empty()).map(number).transpose()?,
+        };
+        Ok((raw, self.words.map(text)))
+    }
+}
+
+/// A table in CSV.
+pub(super) fn csv(place: &str, bytes: &[u8]) -> Result<Found> {
+    let mut reader = csv::Reader::from_reader(bytes);
+    let failed = |error: csv::Error| wrong(place, error.to_string());
+    let names = reader.headers().map_err(failed)?.iter().map(str::to_owned).collect();
+    let columns = Columns::new(place, names)?;
+    let (mut found, mut stated) = (Vec::new(), None);
+    for (row, record) in reader.records().enumerate() {
+        let record = record.map_err(failed)?;
+        let cell =
+            |column: usize| Cell::Text(record.get(column).unwrap_or_default().trim().to_owned());
+        let (raw, words) = columns.read(&format!("{place}:{}", row + 2), row, cell)?;
+        stated = stated.or(words);
+        found.push(raw);
     }
     Ok((found, stated))
+}
+
+/// The same table in Parquet, numbers in any precision.
+#[cfg(feature = "parquet")]
+pub(super) fn parquet(place: &str, path: &std::path::Path) -> Result<Found> {
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use parquet::record::Field;
+
+    let failed = |error: parquet::errors::ParquetError| wrong(place, error.to_string());
+    let file = std::fs::File::open(path).map_err(|error| Error::io(path, "read", error))?;
+    let reader = SerializedFileReader::new(file).map_err(failed)?;
+    let metadata = reader.metadata();
+    let size = metadata.row_groups().iter().map(|group| group.total_byte_size().max(0) as u64);
+    crate::memory::Budget::new(None).room(place, size.sum())?;
+    let fields = metadata.file_metadata().schema().get_fields();
+    let columns = Columns::new(place, fields.iter().map(|f| f.name().to_owned()).collect())?;
+    let (mut found, mut stated) = (Vec::new(), None);
+    for (index, row) in reader.get_row_iter(None).map_err(failed)?.enumerate() {
+        let row: Vec<(String, Field)> = row.map_err(failed)?.into_columns();
+        let cell = |column: usize| match row.get(column).map(|(_, field)| field) {
+            Some(Field::Double(number)) => Cell::Number(*number),
+            Some(Field::Float(number)) => Cell::Number(f64::from(*number)),
+            Some(Field::Str(text)) => Cell::Text(text.trim().to_owned()),
+            Some(Field::Null) | None => Cell::Text(String::new()),
+            Some(other) => Cell::Text(other.to_string()),
+        };
+        let (raw, words) = columns.read(&format!("{place}, row {index}"), index, cell)?;
+        stated = stated.or(words);
+        found.push(raw);
+    }
+    Ok((found, stated))
+}
+
+#[cfg(not(feature = "parquet"))]
+pub(super) fn parquet(place: &str, _path: &std::path::Path) -> Result<Found> {
+    Err(unsupported(place, "Parquet"))
+}
+
+/// A format that this build leaves out.
+#[cfg(not(all(feature = "parquet", feature = "hdf5")))]
+fn unsupported(place: &str, format: &str) -> Error {
+    Error::new(
+        crate::error::ErrorKind::Unsupported,
+        place,
+        format!("this build has no {format}"),
+        "build with `cargo build --release --features full`",
+    )
 }
 
 /// A YAML file as plain values.
@@ -355,10 +440,5 @@ pub(super) fn acronym(place: &str, bytes: Vec<u8>) -> Result<Found> {
 
 #[cfg(not(feature = "hdf5"))]
 pub(super) fn acronym(place: &str, _bytes: Vec<u8>) -> Result<Found> {
-    Err(Error::new(
-        ErrorKind::Unsupported,
-        place,
-        "this build has no HDF5",
-        "build with `cargo build --release --features full`",
-    ))
+    Err(unsupported(place, "HDF5"))
 }

@@ -1,6 +1,7 @@
 //! The stream of proposals: sites once, then chunk after chunk of work items.
 
 mod progress;
+mod share;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,6 +11,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use progress::Progress;
+use share::Share;
 
 use super::environment::{Environment, Way};
 use super::options::{ProposeOptions, Rejection};
@@ -162,6 +164,8 @@ pub struct Proposer<'a> {
     /// The faces that come nearest to the stroke of those outside.
     pub(super) outside: Option<FacePair>,
     next: Cursor,
+    /// Which candidates; absent: all.
+    share: Option<Share>,
     /// Corners per candidate in the last chunk.
     corners: f64,
     pub(super) tree: Option<(usize, Arc<Tree>)>,
@@ -283,6 +287,7 @@ impl<'a> Proposer<'a> {
                 round_special_id: (grid + special + round_grid) as u64 * stride,
                 ..Cursor::default()
             },
+            share: None,
             corners: 400.0,
             tree: None,
         })
@@ -394,7 +399,6 @@ impl<'a> Proposer<'a> {
             let count = site.places(self.next.places, self.next.angle).len();
             let end = (self.next.position + ITEM).min(count);
             let positions = self.next.position..end;
-            candidates += positions.len();
             let stride = self.stride();
             let next = match (self.next.site < self.plane, self.next.places) {
                 (true, Places::Grid) => &mut self.next.id,
@@ -404,7 +408,12 @@ impl<'a> Proposer<'a> {
             };
             let id = *next;
             *next += positions.len() as u64 * stride;
-            if !positions.is_empty() {
+            let mut chosen = !positions.is_empty();
+            if let Some(share) = &mut self.share {
+                chosen &= share.takes(positions.len());
+            }
+            if chosen {
+                candidates += positions.len();
                 items.push(Item {
                     site: self.next.site,
                     places: self.next.places,

@@ -1,10 +1,16 @@
 //! Loads close to lifting a pad off, in which limit states hide: close to each other, or on the last
 //! of a contact.
 
+use std::collections::BTreeMap;
+
 use gripfast::case;
 use gripfast::mechanics::{self, Options};
-use gripfast::model::Status;
+use gripfast::model::{Score, Status};
+use rayon::prelude::*;
 
+use crate::brute::cases::{self, Case};
+use crate::brute::{Problem, check};
+use crate::support::random::Random;
 use crate::support::reference;
 
 fn only_case(name: &str) -> Option<case::Case> {
@@ -46,4 +52,99 @@ fn a_state_on_the_last_of_a_contact_is_found() {
         assert!(answer.mu_s.is_some_and(|mu| mu > 0.0), "{name}: {answer:?}");
         assert!(answer.status.holds() && answer.residual < 1e-9, "{name}: {answer:?}");
     }
+}
+
+fn solve(case: &Case) -> Score {
+    let options = Options::default();
+    mechanics::solve(&case.contact, case.distance, case.force, &case.wrench, &options).unwrap()
+}
+
+/// A random case with its load scaled to close by that at which answers end and refusals begin, on
+/// either side; `None` where no load of this kind is refused or answered.
+fn near_the_end(number: u64) -> Option<Case> {
+    let base = cases::case(number);
+    let scaled = |times: f64| Case {
+        wrench: gripfast::model::Wrench {
+            force: base.wrench.force * times,
+            moment: base.wrench.moment * times,
+        },
+        ..base.clone()
+    };
+    let answered = |power: f64| solve(&scaled(power.exp2())).mu_s.is_some();
+    let (mut low, mut high) = (0.0, 0.0);
+    if answered(0.0) {
+        while answered(high) {
+            (low, high) = (high, high + 1.0);
+            if high > 12.0 {
+                return None;
+            }
+        }
+    } else {
+        while !answered(low) {
+            (low, high) = (low - 1.0, low);
+            if low < -12.0 {
+                return None;
+            }
+        }
+    }
+    for _ in 0..14 {
+        let middle = f64::midpoint(low, high);
+        if answered(middle) { low = middle } else { high = middle }
+    }
+    let mut random = Random::new(number ^ 0x0011_f70f);
+    let beside = 10f64.powf(-random.range(0.3, 4.0));
+    let side = if random.chance(0.5) { 1.0 + beside } else { 1.0 - beside };
+    Some(scaled(f64::midpoint(low, high).exp2() * side))
+}
+
+/// What a scan finds out about the answer to a case, and the case where the answer is wrong.
+fn look(number: u64) -> (&'static str, Option<String>) {
+    let Some(case) = near_the_end(number) else { return ("no end within 4096 times", None) };
+    let score = solve(&case);
+    let Some(problem) = Problem::new(&case) else { return ("no normal force", None) };
+    let told = |mus: &[f64], coupling: Option<f64>| {
+        Some(format!("case {number}: scan {mus:?}, coupling {coupling:?}\n  {score:?}\n  {}", case.json()))
+    };
+    if !matches!(score.status, Status::TwistedOut | Status::Ok) {
+        return match score.status {
+            Status::Ambiguous => ("ambiguous", None),
+            Status::NotConverged => ("not converged", None),
+            _ => ("others", None),
+        };
+    }
+    let scan = problem.scan_to_the_rim(40, 20);
+    let mus: Vec<f64> = scan.zeros.iter().map(|zero| zero.mu).collect();
+    match score.mu_s {
+        None if mus.is_empty() => ("refused, none found", None),
+        None => ("REFUSED, but a limit state exists", told(&mus, None)),
+        Some(mu) => {
+            let others = mus.iter().filter(|other| (*other / mu - 1.0).abs() > 1e-5).count();
+            let coupling = check(&case, &score).map(|check| check.coupling);
+            match others {
+                0 => ("ok, no other found", None),
+                _ => ("OK, but another limit state exists", told(&mus, coupling)),
+            }
+        }
+    }
+}
+
+fn count(first: u64, cases: u64) -> (BTreeMap<&'static str, u64>, Vec<String>) {
+    let looked: Vec<_> = (first..first + cases).into_par_iter().map(look).collect();
+    let mut counts = BTreeMap::new();
+    looked.iter().for_each(|(kind, _)| *counts.entry(*kind).or_default() += 1);
+    (counts, looked.into_iter().filter_map(|(_, wrong)| wrong).collect())
+}
+
+#[test]
+#[ignore = "a quarter of an hour: GRIPFAST_CASES=10000 cargo test --release -p gripfast --test mechanics near_the_end -- --ignored"]
+fn many_cases_near_the_end() {
+    let number = |name: &str, default: u64| {
+        std::env::var(name).map_or(default, |text| text.parse().unwrap())
+    };
+    let (first, cases) = (number("GRIPFAST_FIRST", 0), number("GRIPFAST_CASES", 10_000));
+    let (counts, wrong) = count(first, cases);
+    for (kind, count) in &counts {
+        crate::support::say(&format!("  {count:8} {kind}"));
+    }
+    assert!(wrong.is_empty(), "{} of {cases}:\n{}", wrong.len(), wrong.join("\n"));
 }

@@ -96,9 +96,9 @@ fn pads_on_cranks_follow_the_public_models() {
             gripper: "onrobot-rg2",
             pivot: [17.0, 47.34 + 76.0],
             crank: [-2.5, 54.943],
-            pad: [-14.5, 36.5 + 1.4],
+            pad: [-14.5 - 4.45, 36.5 + 1.4],
             sense: 1.0,
-            joint: [0.0, 1.2227],
+            joint: [0.081, 1.2227],
         },
     ];
     for Linkage { gripper: name, pivot, crank, pad, sense, joint } in linkages {

@@ -12,6 +12,7 @@ mod pick_rank;
 mod pick_scene;
 mod plan_library;
 mod plan_scene;
+mod plan_shares;
 mod poses;
 mod report_browser;
 mod robot_models;

@@ -1,7 +1,6 @@
 //! Mesh files: the format is chosen by the suffix, the bytes are checked against it.
 
 mod gltf;
-mod guard;
 mod obj;
 mod off;
 mod ply;
@@ -22,6 +21,7 @@ use glam::{DAffine3, DVec3};
 use super::ReadOptions;
 use super::weld::{MAX_TRIANGLES, Soup, Welder};
 use crate::error::{Error, ErrorKind, Result};
+use crate::file::guarded;
 use crate::memory::Budget;
 
 #[cfg(feature = "step")]
@@ -48,22 +48,25 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Soup> {
     let place = path.display().to_string();
     let (suffix, zipped) = suffix(path);
     let step = matches!(suffix.as_str(), "step" | "stp");
-    if (step && !cfg!(feature = "step")) || matches!(suffix.as_str(), "iges" | "igs" | "brep") {
-        let build = if step {
-            ", or build gripfast with the feature `step` (needs Open CASCADE: Debian's libocct-data-exchange-dev)"
+    if matches!(suffix.as_str(), "iges" | "igs" | "brep") {
+        let remedy = if cfg!(feature = "step") {
+            "export STEP or a mesh (STL, 3MF) from the CAD system: this build reads both"
         } else {
-            ""
+            "export a mesh (STL, 3MF) from the CAD system"
         };
+        let problem = format!("'.{suffix}' holds exact surfaces in a format that is not read");
+        return Err(Error::new(ErrorKind::Unsupported, place, problem, remedy));
+    }
+    if step && !cfg!(feature = "step") {
         return Err(Error::new(
             ErrorKind::Unsupported,
             place,
             format!(
                 "'.{suffix}' holds exact surfaces, not triangles; this build has no CAD kernel to tessellate them"
             ),
-            format!(
-                "convert it first, for example with the PyPI package cascadio: \
-                 python3 -c \"import cascadio; cascadio.step_to_glb('part.step', 'part.glb', tol_linear=0.01)\", or export STL from the CAD system{build}"
-            ),
+            "convert it first, for example with the PyPI package cascadio: \
+             python3 -c \"import cascadio; cascadio.step_to_glb('part.step', 'part.glb', tol_linear=0.01)\", or export STL from the CAD system, \
+             or build gripfast with the feature `step` (needs Open CASCADE: Debian's libocct-data-exchange-dev)",
         ));
     }
     // Asked before it is opened: opening a pipe waits for its writer.
@@ -91,7 +94,7 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Soup> {
         budget,
         options,
     };
-    let soup = guard::guarded(&place, || read_as(&suffix, &mut source));
+    let soup = guarded(&place, || read_as(&suffix, &mut source));
     // Some libraries do not pass on why a stream failed.
     if passed.get() {
         return Err(source.budget.exceeded(&place, source.budget.limit()));

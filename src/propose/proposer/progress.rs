@@ -27,6 +27,32 @@ impl Proposer<'_> {
         Progress { next: self.next, corners: self.corners, tally: self.tally.clone() }
     }
 
+    /// Takes over what the shares of a run have counted, as if this one had looked at all of its
+    /// candidates.
+    ///
+    /// # Errors
+    /// When they are not the shares of this run, or not all of them.
+    pub fn gather<'p>(&mut self, shares: impl IntoIterator<Item = &'p Progress>) -> Result<()> {
+        let before = self.tally.clone();
+        for Progress { tally, .. } in shares {
+            self.tally.candidates += tally.candidates;
+            self.tally.grips += tally.grips;
+            for (reason, count) in &tally.rejections {
+                // What is known before the first candidate stands in every share.
+                let known = before.rejections.get(reason).copied().unwrap_or(0);
+                let counted = self.tally.rejections.entry(reason.clone()).or_default();
+                *counted += count.saturating_sub(known);
+            }
+        }
+        if self.tally.candidates != self.candidates() {
+            let problem =
+                format!("hold {} of {} candidates", self.tally.candidates, self.candidates());
+            let remedy = "give every share of one run once";
+            return Err(Error::new(ErrorKind::Mismatch, "shares", problem, remedy));
+        }
+        Ok(())
+    }
+
     /// Goes on where a run with the same part, gripper and options had come to: the chunks that
     /// follow are the same as there.
     ///

@@ -328,8 +328,22 @@ impl Problem {
 
     /// Looks at the map on `rays` times `rings` points and polishes what looks like a zero.
     pub(crate) fn scan(&self, rays: usize, rings: usize) -> Scan {
-        let ends = self.rays(rays);
         let share = |j: usize| 1.0 - (1.0 - 0.85 * j as f64 / rings as f64).powi(4);
+        self.scan_at(rays, &(1..=rings).map(share).collect::<Vec<_>>())
+    }
+
+    /// The same with more rings close to the rim, where the last of a contact is: from 1e-4 to 1e-7 of
+    /// the way from the middle.
+    pub(crate) fn scan_to_the_rim(&self, rays: usize, rings: usize) -> Scan {
+        let share = |j: usize| 1.0 - (1.0 - 0.85 * j as f64 / rings as f64).powi(4);
+        let near = (8..=14).map(|half| 1.0 - 10f64.powf(-0.5 * f64::from(half)));
+        self.scan_at(rays, &(1..=rings).map(share).chain(near).collect::<Vec<_>>())
+    }
+
+    /// On rings at these shares of the way to the rim, rising.
+    fn scan_at(&self, rays: usize, shares: &[f64]) -> Scan {
+        let ends = self.rays(rays);
+        let rings = shares.len();
         let (mut blind, mut points) = (0, 1);
         let Some(centre) = self.sample(self.middle, None) else {
             return Scan { zeros: vec![], winding: None, blind: 1, points };
@@ -340,7 +354,7 @@ impl Problem {
             let mut ray = vec![Some(centre)];
             for j in 1..=rings {
                 let near = ray.iter().rev().flatten().next().copied();
-                let sample = self.sample(self.middle + share(j) * *end, near.as_ref());
+                let sample = self.sample(self.middle + shares[j - 1] * *end, near.as_ref());
                 points += 1;
                 blind += usize::from(sample.is_none());
                 ray.push(sample);

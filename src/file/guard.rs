@@ -15,7 +15,7 @@ static HOOK: Once = Once::new();
 
 /// Runs a reader of foreign code; a panic in it becomes bad input at `place`. What the reader has
 /// half done is dropped with it.
-pub(super) fn guarded<T>(place: &str, read: impl FnOnce() -> Result<T>) -> Result<T> {
+pub(crate) fn guarded<T>(place: &str, read: impl FnOnce() -> Result<T>) -> Result<T> {
     HOOK.call_once(|| {
         let before = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |information| {
