@@ -13,7 +13,9 @@ seconds a grip, Drake with hydroelastic contact some minutes.
 
 What to expect: straight slides agree to 0.2 %. MuJoCo's contact forces minimise one convex function,
 in which friction and normal force trade: where a part turns, normal force moves to the points that
-slip fastest, so the part stays with 10 to 20 % less friction than equal pressure allows.
+slip fastest (seen in its contact forces: on the square their mean distance from the middle rises from
+7.64 to 8.32 mm once it turns), so the part creeps but stays with 10 to 20 % less friction than equal
+pressure allows. Drake's contact SAP does the same; its lagged one, which is used here, does not.
 """
 
 import argparse
@@ -115,7 +117,7 @@ def drake_holds(case, mu, spacing):
     builder = DiagramBuilder()
     plant, scene = AddMultibodyPlantSceneGraph(builder, 5e-4)
     plant.set_contact_model(ContactModel.kHydroelastic)
-    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
+    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
     plant.mutable_gravity_field().set_gravity_vector([0, 0, 0])
     gyration = UnitInertia(*[GYRATION**2] * 3)
     half = case["distance"] / 2

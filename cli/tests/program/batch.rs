@@ -245,7 +245,9 @@ fn killed_at_any_moment_and_resumed_it_comes_to_the_same_bytes() {
         let random = gripfast::propose::scatter(now ^ kill) as f64 / u64::MAX as f64;
         let moment = time.mul_f64(random * 2.0 / kills as f64) + Duration::from_millis(5);
         let jobs = ["1", "2"][kill as usize % 2];
-        let mut child = many(&out, &["--resume", "--jobs", jobs]).spawn().unwrap();
+        let split = ["1", "3"][kill as usize / 2 % 2];
+        let mut child =
+            many(&out, &["--resume", "--jobs", jobs, "--split", split]).spawn().unwrap();
         std::thread::sleep(moment);
         child.kill().unwrap();
         killed += usize::from(child.wait().unwrap().code().is_none());
@@ -255,6 +257,16 @@ fn killed_at_any_moment_and_resumed_it_comes_to_the_same_bytes() {
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     assert_eq!(data(&out), expected);
     assert_eq!(manifest(&out).len(), 24);
+
+    // In shares from the beginning, nothing else to be seen of it.
+    let shares = folder.path().join("shares");
+    let output = many(&shares, &["--split", "5"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert_eq!(data(&shares), expected);
+    let all = |folder: &Path| manifest(folder).into_values().map(|entry| entry["checksum"].clone());
+    assert!(all(&shares).eq(all(&whole)), "the results with their counts are the same bytes");
+    let output = many(&shares, &["--resume", "--split", "0"]).output().unwrap();
+    assert!(text(&output.stderr).contains("--split: is 0"), "{}", text(&output.stderr));
 
     // A data file that was damaged is made again, the others are left alone.
     let name = "grips.jsonl/gripper=generic/00000.jsonl";
