@@ -40,6 +40,23 @@ fn a_second_state_is_seen() {
     }
 }
 
+/// Found by [`many_cases_near_the_end`]: two states 0.9 % apart where 0.3 % of a contact is left, not
+/// beside each other.
+#[test]
+fn two_states_on_the_last_of_a_contact_are_seen() {
+    let path = crate::support::root().join("tests/mechanics/cases/two_states.json");
+    let case = case::read(&path).unwrap().remove(0);
+    let (contact, d, force, wrench) = (&case.contact, case.distance, case.force, &case.wrench);
+    let options = Options::default();
+    let answer = mechanics::solve(contact, d, force, wrench, &options).unwrap();
+    assert_eq!(answer.status, Status::Ambiguous, "{answer:?}");
+    let all = mechanics::limit_states(contact, d, force, wrench, &options).unwrap();
+    let found: Vec<f64> = all.iter().filter_map(|score| score.mu_s).collect();
+    for mu in [0.1679805660842801, 0.1694572464368676] {
+        assert!(found.iter().any(|other| (other / mu - 1.0).abs() < 1e-6), "{found:?}");
+    }
+}
+
 /// A limit state was found with fifty digits: the load is not refused.
 #[test]
 fn a_state_on_the_last_of_a_contact_is_found() {
