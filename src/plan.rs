@@ -267,7 +267,11 @@ impl Plan {
         Ok(outcome)
     }
 
-    fn search<'a>(&'a self, assessor: &'a Assessor<'a>, partial: Option<&'a Partial>) -> Search<'a> {
+    fn search<'a>(
+        &'a self,
+        assessor: &'a Assessor<'a>,
+        partial: Option<&'a Partial>,
+    ) -> Search<'a> {
         Search {
             assessor,
             keep: self.request.kept(),

@@ -198,11 +198,9 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
         number("slip_c1_m", &|grip| slip_centre(grip).map(|c| c[0])),
         number("slip_c2_m", &|grip| slip_centre(grip).map(|c| c[1])),
     ]);
+    columns.extend(vector(["force_1_n", "force_2_n", "force_3_n"], &|grip| worst(grip).force));
     columns
-        .extend(vector(["force_1_n", "force_2_n", "force_3_n"], &|grip| worst(grip).force));
-    columns.extend(vector(["moment_1_nm", "moment_2_nm", "moment_3_nm"], &|grip| {
-        worst(grip).moment
-    }));
+        .extend(vector(["moment_1_nm", "moment_2_nm", "moment_3_nm"], &|grip| worst(grip).moment));
     columns.extend([
         number("mu_lower", &|grip| grip.worst.bounds.map(|bounds| bounds.lower)),
         number("mu_upper", &|grip| grip.worst.bounds.map(|bounds| bounds.upper)),

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use crate::gripper::{self, Gripper, catalogue::CATALOGUE};
+use crate::model::Status;
 use crate::part::{CurvedFace, Part, Shape};
 use crate::propose::{ProposeOptions, Tally};
 use crate::rank;
-use crate::model::Status;
 use crate::results::LoadCase;
 
 /// Round faces that are spoken of, the largest ones.

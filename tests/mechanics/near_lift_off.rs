@@ -120,7 +120,10 @@ fn look(number: u64) -> (&'static str, Option<String>) {
     let score = solve(&case);
     let Some(problem) = Problem::new(&case) else { return ("no normal force", None) };
     let told = |mus: &[f64], coupling: Option<f64>| {
-        Some(format!("case {number}: scan {mus:?}, coupling {coupling:?}\n  {score:?}\n  {}", case.json()))
+        Some(format!(
+            "case {number}: scan {mus:?}, coupling {coupling:?}\n  {score:?}\n  {}",
+            case.json()
+        ))
     };
     if !matches!(score.status, Status::TwistedOut | Status::Ok) {
         return match score.status {

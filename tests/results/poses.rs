@@ -41,10 +41,8 @@ fn exports_read_back_are_the_same_grips() {
         assert!(set.grips.len() > 50);
         for (format, _, endings) in Format::ALL {
             // Those that are written only.
-            let unread = matches!(
-                format,
-                Format::Glb | Format::Usd | Format::Intrinsic | Format::Robot
-            );
+            let unread =
+                matches!(format, Format::Glb | Format::Usd | Format::Intrinsic | Format::Robot);
             if unread || export::check(format).is_err() {
                 continue;
             }
