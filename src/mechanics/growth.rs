@@ -6,6 +6,8 @@
 //! the two ends say of the way between them agrees, and is cut otherwise. Where `mu_s` comes up to
 //! the friction, the load is solved for together with the state.
 
+use std::ops::ControlFlow;
+
 use super::branch::{FOLLOW_STEP, strong};
 use super::equilibrium::{Matrix7, Solver, State, TOLERANCE, Vector7, solve_newton};
 use super::pads::{Load, Pads};
@@ -73,12 +75,6 @@ struct Point {
     rise: f64,
 }
 
-/// Where a step leads.
-enum Step {
-    To(Point),
-    Slips(f64),
-}
-
 impl<'a> Growth<'a> {
     /// `size` is the force \[N\] whose `k`-th part squeezes the pads.
     pub(super) fn new(
@@ -104,8 +100,8 @@ impl<'a> Growth<'a> {
                     return End::Stops(at.k);
                 }
                 match self.step(&at, step) {
-                    Some(Step::Slips(k)) => return End::Slips(k),
-                    Some(Step::To(next)) => break next,
+                    Some(ControlFlow::Break(k)) => return End::Slips(k),
+                    Some(ControlFlow::Continue(next)) => break next,
                     None => step *= CUT,
                 }
                 longest = step;
@@ -163,8 +159,9 @@ impl<'a> Growth<'a> {
         step
     }
 
-    /// A step from a state; `None` where it does not lead to one for certain.
-    fn step(&mut self, at: &Point, step: f64) -> Option<Step> {
+    /// A step from a state to the next, or to the load that slips; `None` where it does not lead to
+    /// one for certain.
+    fn step(&mut self, at: &Point, step: f64) -> Option<ControlFlow<f64, Point>> {
         let next = self.point(at.k + step, at.state.z + step * at.slope)?;
         let whole = |point: &Point| {
             let q = point.state.q();
@@ -180,7 +177,7 @@ impl<'a> Growth<'a> {
             return None;
         }
         if let Some((k, z)) = self.within(at, &next) {
-            return self.slips(k, z, [at.k, next.k]).map(Step::Slips);
+            return self.slips(k, z, [at.k, next.k]).map(ControlFlow::Break);
         }
         if next.mu > NEAR * self.friction && next.rise > 0.0 {
             let on = (self.friction - next.mu) / next.rise;
@@ -188,10 +185,10 @@ impl<'a> Growth<'a> {
             if on < step
                 && let Some(k) = self.slips(k, next.state.z + on * next.slope, [next.k, k + on])
             {
-                return Some(Step::Slips(k));
+                return Some(ControlFlow::Break(k));
             }
         }
-        Some(Step::To(next))
+        Some(ControlFlow::Continue(next))
     }
 
     /// Where the coupling is strong: whether the next state is on the same side of any turning
@@ -245,7 +242,8 @@ impl<'a> Growth<'a> {
             }
             let z = state.z - solve_newton(&jacobian, &state.residual)?;
             let next = self.solver.evaluate(&z, 1.0, Some(&mut jacobian));
-            if !(next.residual.norm() <= 0.5 * state.residual.norm()) {
+            let falls = next.residual.norm() <= 0.5 * state.residual.norm();
+            if !falls {
                 return None;
             }
             state = next;
