@@ -429,6 +429,66 @@ fn the_flat_of_a_shaft_stays_a_plane() {
     }
 }
 
+/// What of a convex outline lies below `normal . x = offset`.
+fn below(outline: &[DVec2], normal: DVec2, offset: f64) -> Vec<DVec2> {
+    let mut kept = Vec::new();
+    for (k, &a) in outline.iter().enumerate() {
+        let b = outline[(k + 1) % outline.len()];
+        let (over_a, over_b) = (normal.dot(a) - offset, normal.dot(b) - offset);
+        if over_a <= 0.0 {
+            kept.push(a);
+        }
+        if over_a * over_b < 0.0 {
+            kept.push(a.lerp(b, over_a / (over_a - over_b)));
+        }
+    }
+    kept
+}
+
+#[test]
+fn strips_cut_off_beside_a_flat_belong_to_the_round_face() {
+    // A flat cuts the facets of a prism, not the circle: the strips beside it end on chords.
+    for (n, phase, offsets) in [
+        (64, 0.0, vec![9.0, 9.0]),
+        (24, 0.3, vec![8.0]),
+        (32, 0.7, vec![9.3, 6.5]),
+        (90, 0.45, vec![9.0, 9.9]),
+        (48, 0.1, vec![4.0]),
+        (200, 0.5, vec![9.5]),
+    ] {
+        let step = TAU / n as f64;
+        let mut outline: Vec<DVec2> =
+            (0..n).map(|k| 10.0 * DVec2::from_angle(step * (k as f64 + phase))).collect();
+        for (side, offset) in offsets.iter().enumerate() {
+            let normal = if side == 0 { DVec2::NEG_Y } else { DVec2::Y };
+            outline = below(&outline, normal, *offset);
+        }
+        let part = Solid::extrude(&outline, 40.0).part(7, 0.0);
+        let what = format!("{n} {phase}");
+        assert_eq!(part.faces.len(), 2 + offsets.len(), "{what}");
+        for face in &part.curved {
+            let Shape::Cylinder { radius, .. } = face.shape else { panic!("{:?}", face.shape) };
+            assert!((radius - 10e-3).abs() < 1e-7, "{what}");
+            assert!(face.residual < 1e-7, "{what}: {}", face.residual);
+        }
+        let planar: f64 = part.faces.iter().map(|face| face.area).sum();
+        let curved: f64 = part.curved.iter().map(|face| face.area).sum();
+        let triangles = 0..part.mesh.triangles.len() as u32;
+        let all: f64 = triangles
+            .map(|triangle| {
+                let [a, b, c] = part.mesh.corners(triangle);
+                0.5 * (b - a).cross(c - a).length()
+            })
+            .sum();
+        assert!((planar + curved - all).abs() < 1e-9 * all, "{what}");
+    }
+    // A chamfer as narrow as a strip is none.
+    let mut outline = arc(DVec2::ZERO, 10.0, 0.0, PI, 32);
+    outline.extend([DVec2::new(-10.2, -0.9), DVec2::new(10.2, -0.9)]);
+    let part = Solid::extrude(&outline, 40.0).part(3, 0.0);
+    assert_eq!(part.faces.len(), 5);
+}
+
 #[test]
 fn rounded_boxes_have_their_planes_and_fillets() {
     // Vertical edges rounded: four cylinders between six planes.

@@ -50,6 +50,8 @@ const ARC: f64 = 0.01;
 pub(super) struct Face {
     pub found: Found,
     pub cut: Cut,
+    /// Corners of strips that are cut off, which lie on chords of the surface.
+    pub rim: Vec<DVec3>,
 }
 
 /// Curved faces by falling area, not numbered yet, and what follows from them for the planes.
@@ -89,6 +91,7 @@ pub(in crate::part) fn curved_faces(
     growth.join_rows(&mut faces);
     growth.noisy(&seeds, &mut faces);
     growth.join_same(&mut faces);
+    growth.join_cut(&mut faces);
     let least = (LEAST * part.diagonal).powi(2);
     let mut described = Vec::new();
     for face in faces.iter().filter(|face| !face.found.members.is_empty()) {
@@ -182,7 +185,7 @@ impl Growth<'_> {
         losers.dedup();
         self.claim(&found);
         for loser in losers.into_iter().filter(|&loser| loser != FREE) {
-            let Face { found: left, cut } = &mut faces[loser as usize];
+            let Face { found: left, cut, .. } = &mut faces[loser as usize];
             let before = left.members.len();
             left.members.retain(|&facet| self.owner[facet as usize] == loser);
             // A rest is no surface any more.
@@ -197,7 +200,7 @@ impl Growth<'_> {
                 cut.turn = turn(left, std::f64::consts::TAU / cut.facets);
             }
         }
-        faces.push(Face { found, cut });
+        faces.push(Face { found, cut, rim: Vec::new() });
     }
 
     /// Whether chords rise above the uncertainty of the vertices: of finer facets a few in a row lie
@@ -416,7 +419,7 @@ fn describe(part: &Repaired, regions: &Regions, face: &Face) -> Option<CurvedFac
     let sense = axis.direction[axis.direction.abs().max_position()].signum();
     let mut axis = Axis { direction: axis.direction * sense, ..axis };
     let extent = |axis: Axis| {
-        let places = found.points.iter().map(|&point| axis.along(point));
+        let places = found.points.iter().chain(&face.rim).map(|&point| axis.along(point));
         places.fold([f64::INFINITY, f64::NEG_INFINITY], |along, place| {
             [along[0].min(place), along[1].max(place)]
         })

@@ -2,6 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use glam::DVec3;
+
+use super::Axis;
 use super::fit::{Kind, Profile};
 use super::grow::{Exactness, Found, Growth};
 use crate::part::topology::{NONE, ends};
@@ -244,14 +247,17 @@ impl Growth<'_> {
 
 /// The arc that the face covers about its axis \[rad\].
 pub(super) fn turn(found: &Found, step: f64) -> f64 {
-    let (u, v) = found.surface.axis.direction.any_orthonormal_pair();
-    arc(
-        found.points.iter().map(|&point| {
-            let from = point - found.surface.axis.origin;
-            from.dot(v).atan2(from.dot(u))
-        }),
-        step,
-    )
+    arc_of(found.surface.axis, found.points.iter().copied(), step)
+}
+
+/// The arc that points cover about an axis \[rad\]; `step`: the widest gap within.
+pub(super) fn arc_of(axis: Axis, points: impl Iterator<Item = DVec3>, step: f64) -> f64 {
+    let (u, v) = axis.direction.any_orthonormal_pair();
+    let angle = |point: DVec3| {
+        let from = point - axis.origin;
+        from.dot(v).atan2(from.dot(u))
+    };
+    arc(points.map(angle), step)
 }
 
 /// The arcs that a torus covers about its tube and about its axis \[rad\].

@@ -14,6 +14,7 @@ mod judge;
 mod net;
 mod profile;
 mod seed;
+mod trim;
 
 pub(super) use find::{Curves, curved_faces};
 

@@ -1,0 +1,70 @@
+//! Strips of cylinders and cones that are cut off along their length, or at an angle: a flat, a
+//! slot or a hole beside a faceted round leaves facets whose corners lie on chords of the round
+//! ones. They belong to the round face.
+
+use glam::DVec3;
+
+use super::find::Face;
+use super::fit::{Kind, Profile};
+use super::grow::{FREE, Growth};
+use super::judge::arc_of;
+
+/// Depth of a strip's plane over that of the other strips' up to which it is one of them.
+const AS_DEEP: f64 = 1.1;
+
+impl Growth<'_> {
+    /// Adds the strips that are cut off to their faces; their corners go to [`Face::rim`].
+    pub(super) fn join_cut(&mut self, faces: &mut [Face]) {
+        for (number, face) in faces.iter_mut().enumerate() {
+            if !matches!(face.found.kind, Kind::Cylinder | Kind::Cone) {
+                continue;
+            }
+            let mut next = 0;
+            let whole = face.found.members.len();
+            while next < face.found.members.len() {
+                let facet = face.found.members[next];
+                next += 1;
+                for border in self.net.borders.of(facet as usize) {
+                    let other = border.other;
+                    if self.owner[other as usize] == FREE
+                        && self.net.is_smooth(facet, other)
+                        && self.is_cut_strip(face, other)
+                    {
+                        self.owner[other as usize] = number as u32;
+                        face.found.members.push(other);
+                        let triangles = self.net.triangles(other).iter();
+                        face.rim.extend(triangles.flat_map(|&t| self.net.part.mesh.corners(t)));
+                    }
+                }
+            }
+            if face.found.members.len() > whole {
+                let axis = face.found.surface.axis;
+                let points = face.found.points.iter().chain(&face.rim).copied();
+                face.cut.turn = arc_of(axis, points, std::f64::consts::TAU / face.cut.facets);
+            }
+        }
+    }
+
+    /// Whether a facet's plane is a chord of the surface no deeper than those of the strips, and its
+    /// corners lie on the chord.
+    fn is_cut_strip(&self, face: &Face, facet: u32) -> bool {
+        let (net, found) = (self.net, &face.found);
+        let (axis, Profile::Line { radius, slope }) = (found.surface.axis, found.surface.profile)
+        else {
+            return false;
+        };
+        let normal = net.normal(facet);
+        let Some(away) = (found.sign * normal.reject_from(axis.direction)).try_normalize() else {
+            return false;
+        };
+        let tolerance = self.tolerance_of(found);
+        let depths = -tolerance..=AS_DEEP * found.sag + tolerance;
+        let fits = |corner: DVec3| {
+            let s = axis.along(corner);
+            let crest = axis.origin + s * axis.direction + (radius + s * slope.tan()) * away;
+            depths.contains(&(found.sign * normal.dot(crest - corner)))
+                && depths.contains(&-found.surface.distance(corner))
+        };
+        net.triangles(facet).iter().all(|&t| net.part.mesh.corners(t).into_iter().all(fits))
+    }
+}
