@@ -24,7 +24,7 @@ const POINTS: usize = 12;
 const PANEL: f64 = 0.8;
 /// Distance of the slip centre from the area's box, over the box's smaller half side, from which on
 /// the points of the area are taken.
-const OUTSIDE: f64 = 0.5;
+const OUTSIDE: f64 = 1.0;
 /// The area is cut where the pressure is `-CUT` of its greatest value, so that an edge of the
 /// polygon that lies exactly where the pressure ends is no tie. What it adds is of the order of
 /// the square.
@@ -32,8 +32,11 @@ const CUT: f64 = 1e-9;
 /// Change of the greatest pressure along a cylinder, as a share, up to which its edges are lines.
 const LINE: f64 = 1e-8;
 /// Gauss points on panels that are at most this long over their distance from the slip centre, with
-/// the same error.
-const FEWER: [(f64, usize); 2] = [(0.2, 6), (0.4, 8)];
+/// the same error: it falls as `(4 / ratio)^(2 - 2n)` where the pressure bends.
+const FEWER: [(f64, usize); 7] =
+    [(0.002, 3), (0.02, 4), (0.1, 5), (0.2, 6), (0.3, 7), (0.4, 8), (0.6, 10)];
+/// Gauss points more along the boundary, where the distance from the foot changes too.
+const MORE: usize = 1;
 /// Turn over the shift, on the area, up to which a motion counts as a shift and a first correction:
 /// the error is of the order of the square.
 const SHIFT: f64 = 1e-8;
@@ -95,6 +98,14 @@ struct Arc {
     curve: f64,
     /// Slope across the chord at its start, and its change along it.
     slope: [f64; 2],
+    /// Length of the chord over the distance from its middle at which the arc turns back, which
+    /// counts as a slip centre's does.
+    bent: f64,
+}
+
+/// Gauss points for a panel's length over its distance from the slip centre.
+fn enough(ratio: f64) -> usize {
+    FEWER.iter().find(|few| ratio <= few.0).map_or(POINTS, |few| few.1)
 }
 
 /// An area in its surface's own axes, with the quadratic that is positive in it.
@@ -251,12 +262,11 @@ impl Region {
             let step = b - a;
             let arc = arc.then(|| {
                 let (l, normal) = (self.u.l, step.perp() / step.length());
-                Arc {
-                    normal,
-                    bend: 0.5 * l.dot(step * step),
-                    curve: 0.5 * l.dot(normal * normal),
-                    slope: [self.u.slope(a).dot(normal), (l * step).dot(normal)],
-                }
+                let (bend, curve) = (0.5 * l.dot(step * step), 0.5 * l.dot(normal * normal));
+                let slope = [self.u.slope(a).dot(normal), (l * step).dot(normal)];
+                let least = slope[0].abs().min((slope[0] + slope[1]).abs());
+                let bent = 2.0 * (bend * curve).abs().sqrt() / least;
+                Arc { normal, bend, curve, slope, bent }
             });
             self.elements.push(Element { a, b, arc });
         }
@@ -283,7 +293,7 @@ impl Region {
     fn at(&self, element: &Element, t: f64) -> (DVec2, DVec2) {
         let step = element.b - element.a;
         let on_chord = element.a + t * step;
-        let Some(Arc { normal, bend, curve, slope }) = element.arc else {
+        let Some(Arc { normal, bend, curve, slope, .. }) = element.arc else {
             return (on_chord, step);
         };
         let value = bend * t * (t - 1.0);
@@ -327,7 +337,7 @@ impl Region {
     /// the fourth degree besides `u` on straight pieces; weights may be negative where the area is not convex.
     pub fn points(&self, mut visit: impl FnMut(DVec2, f64)) {
         for element in &self.elements {
-            let rule = &RULES[if element.arc.is_some() { POINTS } else { 5 }];
+            let rule = &RULES[element.arc.map_or(5, |arc| (enough(arc.bent) + 2).min(POINTS))];
             for &(s, ws) in rule {
                 let (x, dx) = self.at(element, s);
                 let (foot, turn) = self.foot(x, dx);
@@ -482,58 +492,83 @@ impl Region {
     ) {
         let [s, t] = range;
         let middle = |r: [f64; 2]| 0.5 * (r[0] + r[1]);
-        let mut points = POINTS;
-        if centre.is_finite() && depth < 40 {
-            let line = |s: f64| {
-                let (x, dx) = self.at(element, s);
-                (self.foot(x, dx).0, x)
-            };
-            let (first, half, last) = (line(s[0]), line(middle(s)), line(s[1]));
-            let point = |line: (DVec2, DVec2), t: f64| line.0.lerp(line.1, t);
-            let along = (point(last, t[1]) - point(first, t[1])).length();
-            let across = (point(half, t[1]) - point(half, t[0])).length();
-            let distance = (point(half, middle(t)) - centre).length();
-            if along.max(across) > PANEL * distance {
-                let split = |r: [f64; 2]| [[r[0], middle(r)], [middle(r), r[1]]];
-                for part in split(if along > across { s } else { t }) {
-                    let range = if along > across { [part, t] } else { [s, part] };
-                    self.area_panel::<BY>(element, twist, centre, range, depth + 1, sum);
-                }
-                return;
+        let line = |s: f64| {
+            let (x, dx) = self.at(element, s);
+            (self.foot(x, dx).0, x)
+        };
+        let lines = [s[0], middle(s), s[1]].map(line);
+        let point = |line: (DVec2, DVec2), t: f64| line.0.lerp(line.1, t);
+        let along = (point(lines[2], t[1]) - point(lines[0], t[1])).length();
+        let across = |line: (DVec2, DVec2)| (t[1] - t[0]) * (line.1 - line.0).length();
+        let distance = (point(lines[1], middle(t)) - centre).length();
+        let wide = across(lines[1]);
+        if along.max(wide) > PANEL * distance && depth < 40 {
+            let split = |r: [f64; 2]| [[r[0], middle(r)], [middle(r), r[1]]];
+            for part in split(if along > wide { s } else { t }) {
+                let range = if along > wide { [part, t] } else { [s, part] };
+                self.area_panel::<BY>(element, twist, centre, range, depth + 1, sum);
             }
-            let ratio = along.max(across) / distance;
-            points = FEWER.iter().find(|few| ratio <= few.0).map_or(POINTS, |few| few.1);
+            return;
         }
-        let [u1, u2, omega] = twist;
-        let along = if element.arc.is_some() { POINTS } else { points };
-        for &(ns, ws) in &RULES[along] {
+        // As seen from the nearer end.
+        let widest = lines.map(across).into_iter().fold(0.0, f64::max);
+        let bent = element.arc.map_or(0.0, |arc| arc.bent * (s[1] - s[0]));
+        let [of_along, of_wide] = [(along, widest), (widest, along)]
+            .map(|(length, other)| length / (distance - 0.5 * other).max(0.5 * length));
+        let counts = [(enough(of_along.max(bent)) + MORE).min(POINTS), enough(of_wide)];
+        let rules = counts.map(|count| RULES[count].as_slice());
+        self.area_sums::<BY>(element, twist, range, rules, sum);
+    }
+
+    /// Points of the part between an element and the line of [`Self::foot`] by Gauss rules along and
+    /// across.
+    fn area_sums<const BY: bool>(
+        &self,
+        element: &Element,
+        [u1, u2, omega]: [f64; 3],
+        [s, t]: [[f64; 2]; 2],
+        [along, across]: [&[(f64, f64)]; 2],
+        (sum, by): &mut (Dissipation, [[f64; 3]; 3]),
+    ) {
+        // Upper half of the second derivatives by rows.
+        let (mut value, mut gradient, mut bends) = (0.0, [0.0; 3], [0.0; 6]);
+        for &(ns, ws) in along {
             let (x, dx) = self.at(element, s[0] + ns * (s[1] - s[0]));
             let (foot, turn) = self.foot(x, dx);
             if turn == 0.0 {
                 continue;
             }
-            let turn = ws * (s[1] - s[0]) * turn;
-            for &(nt, wt) in &RULES[points] {
+            let turn = ws * (s[1] - s[0]) * turn * (t[1] - t[0]);
+            for &(nt, wt) in across {
                 let x = foot.lerp(x, t[0] + nt * (t[1] - t[0]));
-                let area = turn * wt * (t[1] - t[0]);
+                let area = turn * wt;
                 let weight = area * self.u.value(x);
                 let v = DVec2::new(u1 - omega * x.y, u2 + omega * x.x);
                 let speed = v.length();
-                let e = v / speed;
-                sum.0.value += weight * speed;
-                let tangent = [e.x, e.y, x.perp_dot(e)];
-                let normal = [e.y, -e.x, -x.dot(e)];
-                let bend = weight / speed;
-                for i in 0..3 {
-                    sum.0.gradient[i] += weight * tangent[i];
-                    for j in 0..3 {
-                        sum.0.hessian[i][j] += bend * normal[i] * normal[j];
-                    }
-                }
+                let inverse = speed.recip();
+                let e = inverse * v;
+                let (turned, along) = (x.perp_dot(e), x.dot(e));
+                value += weight * speed;
+                gradient[0] += weight * e.x;
+                gradient[1] += weight * e.y;
+                gradient[2] += weight * turned;
+                let bend = weight * inverse;
+                bends[0] += bend * e.y * e.y;
+                bends[1] -= bend * e.y * e.x;
+                bends[2] -= bend * e.y * along;
+                bends[3] += bend * e.x * e.x;
+                bends[4] += bend * e.x * along;
+                bends[5] += bend * along * along;
                 if BY {
-                    by_pressure(&mut sum.1, area, x, tangent);
+                    by_pressure(by, area, x, [e.x, e.y, turned]);
                 }
             }
+        }
+        sum.value += value;
+        sum.gradient.iter_mut().zip(gradient).for_each(|(sum, more)| *sum += more);
+        let [a, b, c, d, e, f] = bends;
+        for (row, more) in sum.hessian.iter_mut().zip([[a, b, c], [b, d, e], [c, e, f]]) {
+            row.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
         }
     }
 
@@ -554,9 +589,8 @@ impl Region {
             self.edge_panel::<BY>(element, centre, [middle, s[1]], depth + 1, sum);
             return;
         }
-        let ratio = length / distance;
-        let fewer = FEWER.iter().find(|few| ratio <= few.0).filter(|_| element.arc.is_none());
-        let points = fewer.map_or(POINTS, |few| few.1);
+        let bent = element.arc.map_or(0.0, |arc| arc.bent * (s[1] - s[0]));
+        let points = (enough((length / distance).max(bent)) + MORE).min(POINTS);
         let here = self.u.value(centre);
         let slope = self.u.slope(centre);
         for &(node, weight) in &RULES[points] {

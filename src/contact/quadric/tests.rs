@@ -131,6 +131,42 @@ fn both_ways_agree_and_the_derivatives_are_those_of_the_value() {
     }
 }
 
+/// As many points as a panel needs give what four times as many on 64 parts of it give.
+#[test]
+fn fewer_points_far_away_are_as_good() {
+    for (rings, u) in shapes() {
+        let region = Region::new(&rings, u);
+        for i in 0..24 {
+            let away = 1.05 * 1.3_f64.powi(i);
+            let c = region.middle + region.half * away * DVec2::from_angle(0.7 * f64::from(i));
+            let twist = [c.y, -c.x, 1.0];
+            let (mut few, mut many): (Sums, Sums) = Default::default();
+            for element in &region.elements {
+                region.area_panel::<true>(element, twist, c, [[0.0, 1.0]; 2], 0, &mut few);
+                let part = |k: u32| [f64::from(k) / 8.0, f64::from(k + 1) / 8.0];
+                for (s, t) in (0..64).map(|k| (part(k / 8), part(k % 8))) {
+                    let rules = [&RULES[12]; 2].map(Vec::as_slice);
+                    region.area_sums::<true>(element, twist, [s, t], rules, &mut many);
+                }
+            }
+            let ((few, few_by), (many, many_by)) = (few, many);
+            let what = format!("{u:?} {away}");
+            assert!((few.value / many.value - 1.0).abs() < 2e-14, "{what} {few:?} {many:?}");
+            let size = many.value / (region.half.length() * (1.0 + away));
+            for k in 0..2 {
+                assert!((few.gradient[k] - many.gradient[k]).abs() < 3e-14 * size, "{what} {k}");
+                let bend = (few.hessian[k][k] - many.hessian[k][k]).abs();
+                assert!(bend < 1e-12 * size, "{what} {k} {bend:e}");
+            }
+            for (a, b) in few_by.iter().flatten().zip(many_by.iter().flatten()) {
+                assert!((a - b).abs() < 1e-12 * (1.0 + b.abs()), "{what} {a} {b}");
+            }
+        }
+    }
+}
+
+type Sums = (Dissipation, [[f64; 3]; 3]);
+
 /// The sphere's closed form: pressure `1 - r^2` on the unit disc, slip centre at a distance.
 #[test]
 fn the_sphere_agrees_with_its_closed_form() {

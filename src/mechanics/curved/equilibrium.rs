@@ -55,8 +55,6 @@ const SOLVED: f64 = 1e-9;
 const ENOUGH: f64 = 1e-13;
 /// Newton steps at most.
 const STEPS: u32 = 40;
-/// Step of the difference quotients, in units of the tilt.
-const DIFFERENCE: f64 = 1e-6;
 /// Points of the scan over the tilt: along a line, and rays by rings in the plane.
 const LINE: usize = 48;
 const RAYS: usize = 16;
@@ -162,7 +160,7 @@ impl<'a> Problem<'a> {
         Some(State { angles: angles.to_vec(), faces: [one, two], slip, residual })
     }
 
-    /// Newton's method on the tilt with differences, from a state.
+    /// Newton's method on the tilt, from a state.
     pub(super) fn newton(&self, start: State<'a>, coupling: f64) -> Option<State<'a>> {
         let n = self.held.len();
         let mut state = start;
@@ -171,24 +169,7 @@ impl<'a> Problem<'a> {
             if n == 0 || state.error() <= ENOUGH {
                 break;
             }
-            let slope = |i: usize| -> Option<Vec<f64>> {
-                let mut angles = state.angles.clone();
-                let h = DIFFERENCE * angles[i].abs().max(1.0);
-                angles[i] += h;
-                let up = self.at(&angles, coupling, Some(&state))?;
-                angles[i] -= 2.0 * h;
-                let down = self.at(&angles, coupling, Some(&state))?;
-                Some((0..n).map(|j| (up.residual[j] - down.residual[j]) / (2.0 * h)).collect())
-            };
-            let columns = (0..n).map(slope).collect::<Option<Vec<_>>>()?;
-            let r = &state.residual;
-            let step = if n == 1 {
-                vec![-r[0] / columns[0][0]]
-            } else {
-                let (a, b) = (&columns[0], &columns[1]);
-                let det = a[0] * b[1] - a[1] * b[0];
-                vec![(b[0] * r[1] - b[1] * r[0]) / det, (a[1] * r[0] - a[0] * r[1]) / det]
-            };
+            let Some(step) = self.step(&state, coupling) else { break };
             if step.iter().any(|x| !x.is_finite()) {
                 break;
             }
@@ -220,6 +201,23 @@ impl<'a> Problem<'a> {
             }
         }
         (state.error() <= SOLVED).then_some(state)
+    }
+
+    /// Newton's step of the tilt.
+    fn step(&self, state: &State<'a>, coupling: f64) -> Option<Vec<f64>> {
+        let faces = [&state.faces[0], &state.faces[1]];
+        let give = faces[0].compression().max(faces[1].compression());
+        let joint = Joint::new(self, slip::length(faces), give).coupled(coupling);
+        let mut place = Place::new(faces);
+        place.angles[..state.angles.len()].copy_from_slice(&state.angles);
+        let mut mu = 1.0;
+        if let Some(slip) = state.slip.as_ref().filter(|slip| slip.mu > 0.0) {
+            let w = self.along(faces, self.moment_beyond(faces), DVec2::ZERO);
+            place.mode = slip.rolls_on.map_or(Mode::Slips, Mode::Rolls);
+            (place.motion, mu) = (joint.motion(slip, &w), slip.mu);
+        }
+        let step = joint.turn(&place, mu, &state.residual)?;
+        Some(step[..self.held.len()].to_vec())
     }
 
     /// The state next to that without friction's lever, all unknowns at once, from the `pressed`
@@ -307,14 +305,16 @@ impl<'a> Problem<'a> {
                 before = here;
             }
         } else if self.held.len() == 2 {
-            let mut nodes = Vec::new();
+            let middle = self.at(&[0.0; 2], 1.0, None);
+            let mut nodes: Vec<State<'a>> = middle.clone().into_iter().collect();
             for ray in 0..RAYS {
                 let e = DVec2::from_angle(std::f64::consts::TAU * ray as f64 / RAYS as f64);
-                for ring in 0..=RINGS {
+                let mut before = middle.clone();
+                for ring in 1..=RINGS {
                     let x = stretch(0.95 * ring as f64 / RINGS as f64) * e;
-                    if ring > 0 || ray == 0 {
-                        nodes.extend(self.at(&[x.x, x.y], 1.0, None));
-                    }
+                    let here = self.at(&[x.x, x.y], 1.0, before.as_ref());
+                    nodes.extend(here.clone());
+                    before = here;
                 }
             }
             any |= !nodes.is_empty();

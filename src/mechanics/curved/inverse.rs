@@ -5,10 +5,14 @@ use crate::model::Wrench;
 
 /// Relative width at which the force counts as found.
 const FOUND: f64 = 1e-9;
+/// The same on the way, so that what is found is right to [`FOUND`].
+const CLOSER: f64 = 1e-11;
 /// Solves at most.
 const STEPS: u32 = 120;
 /// Force over the load's size beyond which none is enough.
 const MOST: f64 = 1e9;
+/// Slopes of the logarithm of `mu_s` over that of the force that are taken for one.
+const SLOPES: std::ops::Range<f64> = -2.0..-0.2;
 
 /// The gripping force \[N\] at which the pads just hold `wrench` with the friction `friction`, looked
 /// for from `start` \[N\] on; `None` where no force holds it. `mu_s` falls with the force: what
@@ -16,6 +20,8 @@ const MOST: f64 = 1e9;
 ///
 /// Where the load twists out or pulls a pad off before it slips, the least force at which it does
 /// not.
+///
+/// The limit state is followed from force to force; what is found is then solved by itself.
 pub fn force_needed(
     pads: &Pads,
     distance: f64,
@@ -28,58 +34,116 @@ pub fn force_needed(
         return None;
     }
     // The logarithm of mu_s over the friction; infinite where there is no limit state.
-    let excess = |force: f64| {
+    let over = |mu: Option<f64>| mu.map_or(f64::INFINITY, |mu| (mu / friction).ln());
+    let solved = |force: f64| {
         let score = pads.answer(distance, force, wrench, false).score;
-        let mu = score.mu_s.filter(|_| score.status.holds());
-        mu.map_or(f64::INFINITY, |mu| (mu / friction).ln())
+        over(score.mu_s.filter(|_| score.status.holds()))
     };
     if size == 0.0 {
         // What leans is pushed out in proportion to the force: any holds it, or none.
-        return (excess(start) <= 0.0).then_some(0.0);
+        return (solved(start) <= 0.0).then_some(0.0);
     }
-    let most = MOST * size.max(start);
-    // `low` is too little, `high` enough.
-    let mut low: Option<(f64, f64)> = None;
-    let mut high: Option<(f64, f64)> = None;
-    let mut force = start;
-    for _ in 0..STEPS {
-        let here = excess(force);
-        if here.abs() <= FOUND {
-            return Some(force);
+    let search = Search { size, most: MOST * size.max(start) };
+    if let Some(mut follow) = pads.follow(distance, start, wrench) {
+        // Where there is nothing to follow, what holds the part begins at some force, or friction
+        // has no share in it.
+        let leads = follow.mu(start).is_some() || solved(start) == f64::INFINITY;
+        if leads {
+            let end = search.run(start, CLOSER, &mut |force| over(follow.mu(force)));
+            if end.is_right(&solved) {
+                return end.found;
+            }
         }
-        if here > 0.0 {
-            low = Some((force, here))
-        } else {
-            high = Some((force, here))
-        }
-        force = match (low, high) {
-            (Some((a, over)), Some((b, under))) => {
-                if b - a <= FOUND * b {
-                    return Some(b);
-                }
-                // mu_s is nearly proportional to one over the force.
-                let step = if over.is_finite() { over / (over - under) } else { 0.5 };
-                let step = if step > 0.001 && step < 0.999 { step } else { 0.5 };
-                let guess = a * (b / a).powf(step);
-                // From the last value, where that falls between.
-                let foretold = force * here.exp();
-                if foretold.is_finite() && foretold > a && foretold < b { foretold } else { guess }
-            }
-            (Some((a, over)), None) => {
-                if a > most {
-                    return None;
-                }
-                // A little further, so that the answer is soon enclosed.
-                a * if over.is_finite() { over.exp().min(1e3) * (1.0 + 1e-7) } else { 2.0 }
-            }
-            (None, Some((b, under))) => {
-                if under == f64::NEG_INFINITY || b < size / MOST {
-                    return Some(b.min(size / MOST));
-                }
-                b * under.exp().max(1e-3) * (1.0 - 1e-7)
-            }
-            (None, None) => return None,
+    }
+    search.run(start, FOUND, &mut |force| solved(force)).found
+}
+
+/// The search for a force.
+struct Search {
+    /// The load's size \[N\].
+    size: f64,
+    /// Force beyond which none is enough \[N\].
+    most: f64,
+}
+
+/// Where a search ended.
+struct End {
+    found: Option<f64>,
+    /// The greatest force that is too little.
+    low: Option<f64>,
+}
+
+impl End {
+    /// Whether the solution at the force found, or at those tried in vain, agrees.
+    fn is_right(&self, solved: &dyn Fn(f64) -> f64) -> bool {
+        let Some(found) = self.found else {
+            return self.low.is_some_and(|low| solved(low) > 0.0);
         };
+        let over = solved(found);
+        // Enough, while a little less is not.
+        let is_least = || self.low.is_some_and(|low| low < found && solved(low) == f64::INFINITY);
+        over.abs() <= FOUND || over.is_finite() && over < 0.0 && is_least()
     }
-    high.map(|(force, _)| force)
+}
+
+impl Search {
+    /// `excess`: the logarithm of `mu_s` over the friction at a force; `within`: as much of it counts
+    /// as none.
+    fn run(&self, start: f64, within: f64, excess: &mut dyn FnMut(f64) -> f64) -> End {
+        // `low` is too little, `high` enough; `last` is the one before, if it has a limit state.
+        let mut low: Option<(f64, f64)> = None;
+        let mut high: Option<(f64, f64)> = None;
+        let mut last: Option<(f64, f64)> = None;
+        let mut force = start;
+        let end =
+            |found: Option<f64>, low: Option<(f64, f64)>| End { found, low: low.map(|x| x.0) };
+        for _ in 0..STEPS {
+            let here = excess(force);
+            if here.abs() <= within {
+                return end(Some(force), low);
+            }
+            if here > 0.0 {
+                low = Some((force, here))
+            } else {
+                high = Some((force, here))
+            }
+            // mu_s is nearly proportional to one over the force.
+            let slope = last
+                .map(|(before, value)| (here - value) / (force / before).ln())
+                .filter(|slope| SLOPES.contains(slope))
+                .unwrap_or(-1.0);
+            let foretold = force * (-here / slope).exp();
+            last = here.is_finite().then_some((force, here));
+            force = match (low, high) {
+                (Some((a, over)), Some((b, under))) => {
+                    if b - a <= FOUND * b {
+                        return end(Some(b), low);
+                    }
+                    let step = if over.is_finite() { over / (over - under) } else { 0.5 };
+                    let step = if step > 0.001 && step < 0.999 { step } else { 0.5 };
+                    let guess = a * (b / a).powf(step);
+                    if foretold.is_finite() && foretold > a && foretold < b {
+                        foretold
+                    } else {
+                        guess
+                    }
+                }
+                (Some((a, over)), None) => {
+                    if a > self.most {
+                        return end(None, low);
+                    }
+                    if over.is_finite() { foretold.clamp(a, 1e3 * a) } else { 2.0 * a }
+                }
+                (None, Some((b, under))) => {
+                    let least = self.size / MOST;
+                    if under == f64::NEG_INFINITY || b < least {
+                        return end(Some(b.min(least)), low);
+                    }
+                    foretold.clamp(1e-3 * b, b)
+                }
+                (None, None) => return end(None, low),
+            };
+        }
+        end(high.map(|(force, _)| force), low)
+    }
 }

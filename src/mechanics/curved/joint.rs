@@ -80,6 +80,8 @@ pub(super) struct Joint<'p, 'a> {
     tilts: [DVec2; 2],
     /// Distance of the pads' points from the origin \[m\].
     reach: f64,
+    /// Share of the friction's lever `d/2` that counts.
+    coupling: f64,
 }
 
 /// The equations at some values of the unknowns.
@@ -138,7 +140,33 @@ impl<'p, 'a> Joint<'p, 'a> {
             give,
             tilts,
             reach: problem.faces[0].reach().max(problem.faces[1].reach()),
+            coupling: 1.0,
         }
+    }
+
+    /// The same with a share of the friction's lever.
+    pub(super) fn coupled(self, coupling: f64) -> Self {
+        Self { coupling, ..self }
+    }
+
+    /// Newton's step of the angles where compressions and motion follow them, from a place at which
+    /// these are solved: `mu` there, and what the moments leave over.
+    pub(super) fn turn(&self, place: &Place, mu: f64, residual: &[f64]) -> Option<[f64; 2]> {
+        let mut x = Vector7::zeros();
+        (x[5], x[6]) = (place.delta[0] / self.give, place.delta[1] / self.give);
+        let mut right = Vector7::zeros();
+        for i in 0..self.held() {
+            x[self.active + i] = place.angles[i];
+            right[self.active + i] = residual[i];
+        }
+        if place.mode == Mode::Slips {
+            // Its length there is such that the dissipation's gradient times mu is the load.
+            x.rows_mut(0, self.active).copy_from(&self.scaled(&place.motion).rows(0, self.active));
+        }
+        let step = -self.at(&x, place.mode, mu)?.jacobian.lu().solve(&right)?;
+        let mut turn = [0.0; 2];
+        turn.iter_mut().zip(step.iter().skip(self.active)).for_each(|(to, x)| *to = *x);
+        Some(turn)
     }
 
     fn held(&self) -> usize {
@@ -233,7 +261,8 @@ impl<'p, 'a> Joint<'p, 'a> {
                 self.still(mode, &w, &by)
             }
         };
-        let turned = |couple: DVec2| 0.5 * self.problem.distance * DVec2::new(couple.y, -couple.x);
+        let lever = 0.5 * self.coupling * self.problem.distance;
+        let turned = |couple: DVec2| lever * DVec2::new(couple.y, -couple.x);
         let left = moment + turned(friction.couple);
         for i in 0..n {
             let (row, e) = (self.active + i, self.problem.held[i]);
@@ -407,6 +436,9 @@ impl<'p, 'a> Joint<'p, 'a> {
                     && tried.residual.norm() <= (1.0 - 0.1 * t) * error
                 {
                     next = Some((moved, tried));
+                    break;
+                }
+                if error <= ROUNDING {
                     break;
                 }
                 t *= 0.5;

@@ -141,6 +141,11 @@ impl Pads {
         }
     }
 
+    /// Distance of the farthest corner of the pieces from the grip origin \[m\].
+    pub fn reach(&self) -> f64 {
+        self.faces[0].reach().max(self.faces[1].reach())
+    }
+
     /// As [`solve`]; numbers must be finite and `force` positive.
     pub fn solve(&self, distance: f64, force: f64, wrench: &Wrench) -> Answer {
         self.answer(distance, force, wrench, true)

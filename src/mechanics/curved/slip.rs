@@ -77,8 +77,12 @@ struct Problem<'a, 'b> {
 
 /// Newton steps at most.
 const STEPS: u32 = 60;
+/// What is added to the second derivatives, over their sum, until a step succeeds.
+const LIFTS: [f64; 5] = [1e-15, 1e-12, 1e-9, 1e-6, 1e-3];
 /// Residual at which Newton's method is content; `mu` is right to its square.
 const ENOUGH: f64 = 1e-14;
+/// Residual below which rounding keeps a full step from making it smaller: no shorter one would.
+const ROUNDED: f64 = 1e-12;
 /// Share of the sliding face's friction below which the other face counts as at rest: at a tie both
 /// may slip.
 const AT_REST: f64 = 1.0 - 1e-9;
@@ -235,14 +239,16 @@ impl<'a, 'b> Problem<'a, 'b> {
                 matrix[(i, i)] = 1.0;
             }
             let mut moved = false;
-            for lift in [1e-15, 1e-12, 1e-9, 1e-6, 1e-3] {
-                let lifted = matrix + lift * trace * Matrix5::identity();
+            let (lifts, halvings) =
+                if error.amax() <= ROUNDED { (1, 1) } else { (LIFTS.len(), 30) };
+            for lift in &LIFTS[..lifts] {
+                let lifted = matrix + *lift * trace * Matrix5::identity();
                 let Some(factor) = lifted.cholesky() else { continue };
                 let step = -factor.solve(&error);
                 let slope = error.dot(&step);
                 let here = merit(&at, &z);
                 let mut t = 1.0;
-                for _ in 0..30 {
+                for _ in 0..halvings {
                     let tried = z + t * step;
                     let there = self.both(&tried);
                     let left = residual(&there);
