@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 
 use super::score::{Scored, TIE, usable};
+use super::top::{Beaten, Best, race};
 use crate::mechanics::curved::{Compared, Pads, Screen};
 use crate::mechanics::refused;
 use crate::model::{Score, Status, Wrench};
@@ -31,9 +32,22 @@ pub fn score_curved(problems: &[CurvedProblem<'_>], polish: Polish) -> Vec<Score
         .par_iter()
         .map(|problem| match polish {
             Polish::All => problem.score_all(),
-            _ => problem.screened().unwrap_or_else(|| problem.score()),
+            _ => problem.screened(None).unwrap_or_else(|| problem.score()),
         })
         .collect()
+}
+
+/// The same without the grips that cannot be among the `best`, as [`super::Backend::score_best`].
+pub fn score_curved_best(
+    problems: &[CurvedProblem<'_>],
+    best: &mut Best,
+    merit: &(dyn Fn(usize, f64) -> f64 + Sync),
+) -> Vec<Scored> {
+    let promise = |(index, problem): (usize, &CurvedProblem<'_>)| merit(index, problem.about());
+    let promise = problems.par_iter().enumerate().map(promise).collect();
+    race(promise, best, merit, &|index, beaten| {
+        problems[index].screened(Some(beaten)).unwrap_or_else(|| problems[index].score())
+    })
 }
 
 /// Loads looked at so far.
@@ -46,7 +60,24 @@ struct Seen {
     compared: usize,
 }
 
+impl Seen {
+    fn outranked(self) -> Scored {
+        let (solved, compared) = (self.solved.len(), self.compared);
+        Scored { worst: None, all: Vec::new(), solved, compared, outranked: true }
+    }
+}
+
 impl CurvedProblem<'_> {
+    /// About the `mu_s` of the worst load, for the order of grips.
+    fn about(&self) -> f64 {
+        let lever = self.pads.map_or(f64::INFINITY, |pads| 0.5 * pads.reach());
+        let about = |wrench: &Wrench| {
+            let slide = wrench.force.x.hypot(wrench.force.y);
+            slide.hypot(wrench.moment.z / lever) / (2.0 * self.force - wrench.force.z.abs())
+        };
+        self.wrenches.iter().map(about).fold(0.0, f64::max)
+    }
+
     fn solve(&self, load: usize) -> Score {
         match self.pads {
             Some(pads) => pads.solve(self.distance, self.force, &self.wrenches[load]).score,
@@ -75,8 +106,9 @@ impl CurvedProblem<'_> {
         Scored { worst, all: Vec::new(), solved, compared: 0, outranked: false }
     }
 
-    /// The same answer from fewer solutions; `None` where loads cannot be compared.
-    fn screened(&self) -> Option<Scored> {
+    /// The same answer from fewer solutions; `None` where loads cannot be compared. `beaten`: whether
+    /// a grip of at least this `mu_s` need not be solved to the end.
+    fn screened(&self, beaten: Option<&Beaten<'_>>) -> Option<Scored> {
         let mut screen = self.pads?.screen(self.distance, self.force, self.wrenches)?;
         let estimates: Vec<f64> =
             self.wrenches.iter().map(|wrench| screen.estimate(wrench)).collect();
@@ -85,7 +117,12 @@ impl CurvedProblem<'_> {
         let (mut seen, mut largest) = (Seen::default(), 0.0);
         for (place, &load) in order.iter().enumerate() {
             match self.held(&mut screen, load, largest * (1.0 - 2.0 * TIE), &mut seen) {
-                Some(mu) => largest = f64::max(largest, mu),
+                Some(mu) => {
+                    largest = f64::max(largest, mu);
+                    if beaten.is_some_and(|beaten| beaten(largest)) {
+                        return Some(seen.outranked());
+                    }
+                }
                 None => return Some(self.first_refused(&mut screen, &order[place..], seen)),
             }
         }

@@ -43,7 +43,7 @@ pub use gpu::{
 
 pub use crate::request::{Choice, Polish};
 pub use choice::{Selection, select};
-pub use curved::{CurvedProblem, score_curved};
+pub use curved::{CurvedProblem, score_curved, score_curved_best};
 pub use job::Backend;
 pub use problem::{Batch, F32_TOLERANCE, Problem, Seed, SeedStatus};
 pub use score::{ScoreOptions, Scored};

@@ -66,30 +66,36 @@ impl Backend {
     ) -> Result<Vec<Scored>> {
         self.by_blocks(BLOCK, batch, seeds, |Block { range, contacts, seeds }| {
             let cases = cases(&contacts, &batch.problems[range.clone()], &seeds, options);
-            race(&cases, best, &|index, mu| merit(range.start + index, mu))
+            let merit = |index: usize, mu: f64| merit(range.start + index, mu);
+            let lower = |(index, case): (usize, &Case<'_>)| merit(index, case.lower());
+            let promise = cases.par_iter().enumerate().map(lower).collect();
+            race(promise, best, &merit, &|index, beaten| cases[index].score(Some(beaten)))
         })
     }
 }
 
-fn race(
-    cases: &[Case<'_>],
+/// The answer of a grip by its place, which may end as soon as its friction is beaten.
+type Entry<'a> = &'a (dyn Fn(usize, &Beaten<'_>) -> Scored + Sync);
+/// Whether a grip that needs this friction at least is surely not among the best.
+pub(super) type Beaten<'a> = dyn Fn(f64) -> bool + Sync + 'a;
+
+/// Scores grips, those that promise the greatest merits first.
+pub(super) fn race(
+    promise: Vec<f64>,
     best: &mut Best,
     merit: &(dyn Fn(usize, f64) -> f64 + Sync),
+    score: Entry<'_>,
 ) -> Vec<Scored> {
-    let mut order: Vec<(f64, usize)> = cases
-        .par_iter()
-        .enumerate()
-        .map(|(index, case)| (merit(index, case.lower()), index))
-        .collect();
+    let mut scored: Vec<Option<Scored>> = vec![None; promise.len()];
+    let mut order: Vec<(f64, usize)> = promise.into_iter().zip(0..).collect();
     order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    let mut scored: Vec<Option<Scored>> = vec![None; cases.len()];
     let (mut rest, mut round) = (order.as_slice(), *ROUNDS.start());
     while !rest.is_empty() {
         let (now, later) = rest.split_at(round.min(rest.len()));
         let known = &*best;
         let answers: Vec<Scored> = now
             .par_iter()
-            .map(|&(_, index)| cases[index].score(Some(&|mu| known.beats(merit(index, mu)))))
+            .map(|&(_, index)| score(index, &|mu| known.beats(merit(index, mu))))
             .collect();
         for (&(_, index), answer) in now.iter().zip(answers) {
             if let Some(mu) = answer.worst.as_ref().and_then(|(_, score)| usable(score)) {

@@ -9,6 +9,7 @@ use rustc_hash::FxHashMap;
 
 use crate::backend::{
     Backend, Batch, Best, CurvedProblem, Problem, ScoreOptions, Scored, SeedSet, score_curved,
+    score_curved_best,
 };
 use crate::error::{Error, Result};
 use crate::geometry::patch_area;
@@ -252,7 +253,6 @@ impl Assessor<'_> {
         Ok(jobs.map(measure).collect())
     }
 
-    /// Grips on surfaces, each load solved to the end.
     fn assess_curved(&self, grips: Vec<Grip>, best: Option<&mut Best>) -> Vec<RankedGrip> {
         let ready = Surfaced::new(grips.iter(), self.settings.force);
         let wrenches: Vec<Vec<Wrench>> = grips.par_iter().map(|grip| self.wrenches(grip)).collect();
@@ -261,23 +261,28 @@ impl Assessor<'_> {
             .zip(&wrenches)
             .map(|(grip, wrenches)| self.curved_problem(grip, &ready, wrenches))
             .collect();
-        let scored = score_curved(&problems, self.settings.score.polish);
-        let jobs = grips.into_par_iter().zip(wrenches.par_iter()).zip(scored);
-        let measure = |((grip, wrenches), scored): ((Grip, &Vec<Wrench>), Scored)| {
-            let free = ready.of(&grip).map_or_else(Vec::new, |ready| ready.free.clone());
-            let lever = FreeTwistOut::new(&grip.contact, free);
-            let margin = |wrench: &Wrench| lever.margin(self.settings.force, wrench);
-            let least = lever.least_lever().unwrap_or(0.0);
-            self.measure(grip, wrenches, &scored, least, &margin)
+        let lever = |grip: &Grip| {
+            let free = ready.of(grip).map_or_else(Vec::new, |ready| ready.free.clone());
+            FreeTwistOut::new(&grip.contact, free)
         };
-        let ranked: Vec<RankedGrip> = jobs.map(measure).collect();
-        if let Some(best) = best {
-            for ranked in ranked.iter().filter(|ranked| ranked.worst.status.holds()) {
-                let mu = ranked.worst.mu_s.unwrap_or(f64::INFINITY);
-                best.insert(self.settings.merit(mu, ranked.alpha));
+        let levers: Vec<FreeTwistOut> = grips.par_iter().map(lever).collect();
+        let least = |lever: &FreeTwistOut| lever.least_lever().unwrap_or(0.0);
+        let scored = match best {
+            None => score_curved(&problems, self.settings.score.polish),
+            Some(best) => {
+                let alpha = |(grip, lever)| self.alpha(grip, least(lever));
+                let alphas: Vec<f64> = grips.iter().zip(&levers).map(alpha).collect();
+                let merit = |index: usize, mu: f64| self.settings.merit(mu, alphas[index]);
+                score_curved_best(&problems, best, &merit)
             }
-        }
-        ranked
+        };
+        let jobs = grips.into_par_iter().zip(wrenches.par_iter()).zip(levers).zip(scored);
+        jobs.filter(|(_, scored)| !scored.outranked)
+            .map(|(((grip, wrenches), lever), scored)| {
+                let margin = |wrench: &Wrench| lever.margin(self.settings.force, wrench);
+                self.measure(grip, wrenches, &scored, least(&lever), &margin)
+            })
+            .collect()
     }
 
     fn curved_problem<'a>(
