@@ -32,7 +32,7 @@ pub fn score_curved(problems: &[CurvedProblem<'_>], polish: Polish) -> Vec<Score
         .par_iter()
         .map(|problem| match polish {
             Polish::All => problem.score_all(),
-            _ => problem.screened(None).unwrap_or_else(|| problem.score()),
+            _ => problem.screened(None).unwrap_or_else(|| problem.score(None)),
         })
         .collect()
 }
@@ -46,7 +46,8 @@ pub fn score_curved_best(
     let promise = |(index, problem): (usize, &CurvedProblem<'_>)| merit(index, problem.about());
     let promise = problems.par_iter().enumerate().map(promise).collect();
     race(promise, best, merit, &|index, beaten| {
-        problems[index].screened(Some(beaten)).unwrap_or_else(|| problems[index].score())
+        let problem = &problems[index];
+        problem.screened(Some(beaten)).unwrap_or_else(|| problem.score(Some(beaten)))
     })
 }
 
@@ -95,15 +96,21 @@ impl CurvedProblem<'_> {
         Scored { worst, solved: all.len(), all, compared: 0, outranked: false }
     }
 
-    /// Every load solved, up to the first that is not held.
-    fn score(&self) -> Scored {
-        let mut solved = 0;
-        let scores = (0..self.wrenches.len()).map(|load| {
-            solved += 1;
-            (load, self.solve(load))
-        });
-        let worst = worst(scores);
-        Scored { worst, all: Vec::new(), solved, compared: 0, outranked: false }
+    /// Every load solved, up to the first that is not held, or that is beaten.
+    fn score(&self, beaten: Option<&Beaten<'_>>) -> Scored {
+        let mut seen = Seen::default();
+        for load in 0..self.wrenches.len() {
+            let score = self.solve(load);
+            seen.solved.push((load, score));
+            match usable(&score) {
+                Some(mu) if beaten.is_some_and(|beaten| beaten(mu)) => return seen.outranked(),
+                Some(_) => {}
+                None => break,
+            }
+        }
+        let Seen { solved, compared, .. } = seen;
+        let worst = worst(solved.iter().copied());
+        Scored { worst, all: Vec::new(), solved: solved.len(), compared, outranked: false }
     }
 
     /// The same answer from fewer solutions; `None` where loads cannot be compared. `beaten`: whether

@@ -28,9 +28,8 @@ pub struct ProposeOptions {
     pub angle_step: f64,
     /// Approach along and across the edges of the gripped faces as well.
     pub edge_angles: bool,
-    /// Propose grips on curved faces, and on opposite planes that are not parallel; `None`: where no
-    /// two parallel plane faces lie within the stroke.
-    pub curved: Option<bool>,
+    /// Propose grips on curved faces, and on opposite planes that are not parallel.
+    pub curved: bool,
     /// Smallest contact area on either face, as a share of the most that a pad can touch there: the
     /// area in which the two faces overlap, or that of a pad over the middle of its bounds, at the
     /// grip's angle, whichever is smaller. Of curved faces what is pressed without a load counts.
@@ -81,7 +80,7 @@ setters!(ProposeOptions {
     with_spacing: spacing: Option<f64>,
     with_angle_step: angle_step: f64,
     with_edge_angles: edge_angles: bool,
-    with_curved: curved: Option<bool>,
+    with_curved: curved: bool,
     with_min_contact: min_contact: f64,
     with_min_pad_share: min_pad_share: f64,
     with_max_offset: max_offset: Option<f64>,
@@ -270,6 +269,11 @@ pub enum Rejection {
     LeansTooMuch,
     /// Counts bores, not candidates: the pads are too wide to go in and lie along the wall.
     PadTooWide,
+    /// Counts round faces, not candidates: the part stands above them wherever a pad may lie.
+    OutOfReach,
+    /// Counts face pairs, not candidates: they lean, and overlap by less than a tenth of a pad or of
+    /// the part's largest plane: strips of a freely curved surface, flanks of teeth.
+    PairTooSmall,
     /// The contact area on a face is below [`ProposeOptions::min_contact`].
     ContactTooSmall,
     /// The contact area on a face is below [`ProposeOptions::min_pad_share`].
@@ -315,6 +319,8 @@ impl Rejection {
             Self::RollsApart => "face_pair_rolls_apart".into(),
             Self::LeansTooMuch => "face_pair_leans_too_much".into(),
             Self::PadTooWide => "bore_too_narrow_for_pads".into(),
+            Self::OutOfReach => "round_face_out_of_reach".into(),
+            Self::PairTooSmall => "face_pair_too_small".into(),
             Self::ContactTooSmall => "contact_too_small".into(),
             Self::PadShareTooSmall => "pad_share_too_small".into(),
             Self::Ground { body } => with("ground", body),

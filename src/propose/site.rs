@@ -9,6 +9,7 @@ mod relief;
 mod round;
 mod rows;
 mod shapes;
+mod skyline;
 mod special;
 mod tapers;
 
@@ -154,9 +155,7 @@ pub(super) fn sites(
     }
     let plane = sites.len();
     let mut round = Round::default();
-    let named = |faces: &Vec<u32>| faces.iter().any(|&face| face as usize >= part.faces.len());
-    let asked = options.faces.as_ref().is_some_and(named) || sites.is_empty();
-    if options.curved.unwrap_or(asked) {
+    if options.curved {
         let curved;
         (curved, round) = finder.round()?;
         sites.extend(curved);

@@ -4,7 +4,7 @@
 use glam::{DVec2, DVec3};
 use gripfast::case::{self, Case};
 use gripfast::contact::surface::{Gap, Piece, Surfaces};
-use gripfast::mechanics::curved::{Answer, Note, solve};
+use gripfast::mechanics::curved::{Answer, Note, Pads, force_needed, solve};
 use gripfast::mechanics::{self, Options};
 use gripfast::model::{Contact, Face, Slip, Status, Wrench};
 use nalgebra::{Matrix5, Vector5};
@@ -801,4 +801,39 @@ fn random_bodies_agree_with_forces_on_points() {
 fn many_random_bodies_agree_with_forces_on_points() {
     let seen = agree_on_points(1_000..6_000, 64);
     assert!(seen.answered > 4_000 && seen.loose < 250, "{seen:?}");
+}
+
+/// The force needed is where `mu_s` meets the friction, or the least at which the load is held at
+/// all.
+#[test]
+fn the_force_needed_is_where_mu_meets_the_friction() {
+    let (mut met, mut at_the_end, mut never) = (0, 0, 0);
+    for number in 0..160 {
+        let posed = posed(number);
+        let pads = Pads::new(&posed.surfaces).unwrap();
+        let mu = |force: f64| {
+            let score = pads.solve(posed.distance, force, &posed.wrench).score;
+            score.mu_s.filter(|_| score.status.holds()).unwrap_or(f64::INFINITY)
+        };
+        for (friction, start) in [(0.15, posed.force), (0.6, posed.force), (0.6, 0.1 * posed.force)]
+        {
+            let needed = force_needed(&pads, posed.distance, &posed.wrench, friction, start);
+            let what = format!("case {number}, {friction} from {start}: {needed:?}");
+            let Some(needed) = needed else {
+                assert!(mu(1e4 * posed.force) > friction, "{what}");
+                never += 1;
+                continue;
+            };
+            let (here, below) = (mu(needed), mu(needed * (1.0 - 1e-6)));
+            if (here / friction - 1.0).abs() < 2e-9 {
+                assert!(below > friction, "{what}");
+                met += 1;
+            } else {
+                assert!(here < friction && below > friction, "{what}: {here}, {below}");
+                at_the_end += 1;
+            }
+        }
+    }
+    println!("{met} met, {at_the_end} at the end, {never} never");
+    assert!(met > 300 && never < 60, "{met} {at_the_end} {never}");
 }

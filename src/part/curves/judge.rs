@@ -112,6 +112,7 @@ impl Growth<'_> {
                 if (0.5 * step..2.0 * step).contains(&bend)
                     && (0.4..2.5).contains(&widths)
                     && miss < net.floor + 0.35 * found.sag
+                    && !(found.kind == Kind::Cylinder && self.is_cut_strip(found, other))
                 {
                     edge.runs_on += border.length;
                 }

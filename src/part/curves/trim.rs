@@ -6,11 +6,14 @@ use glam::DVec3;
 
 use super::find::Face;
 use super::fit::{Kind, Profile};
-use super::grow::{FREE, Growth};
+use super::grow::{FREE, Found, Growth};
 use super::judge::arc_of;
 
-/// Depth of a strip's plane over that of the other strips' up to which it is one of them.
-const AS_DEEP: f64 = 1.1;
+/// Difference of the depth of a strip's plane and that of the other strips', as a share of it, up to
+/// which it is one of them.
+const AS_DEEP: f64 = 0.05;
+/// Difference of the sines and cosines of its angle to the axis and theirs.
+const STEEP: f64 = 0.05;
 
 impl Growth<'_> {
     /// Adds the strips that are cut off to their faces; their corners go to [`Face::rim`].
@@ -28,7 +31,7 @@ impl Growth<'_> {
                     let other = border.other;
                     if self.owner[other as usize] == FREE
                         && self.net.is_smooth(facet, other)
-                        && self.is_cut_strip(face, other)
+                        && self.is_cut_strip(&face.found, other)
                     {
                         self.owner[other as usize] = number as u32;
                         face.found.members.push(other);
@@ -45,25 +48,32 @@ impl Growth<'_> {
         }
     }
 
-    /// Whether a facet's plane is a chord of the surface no deeper than those of the strips, and its
+    /// Whether a facet's plane is a chord of the surface as deep as those of the strips, and its
     /// corners lie on the chord.
-    fn is_cut_strip(&self, face: &Face, facet: u32) -> bool {
-        let (net, found) = (self.net, &face.found);
+    pub(super) fn is_cut_strip(&self, found: &Found, facet: u32) -> bool {
+        let net = self.net;
         let (axis, Profile::Line { radius, slope }) = (found.surface.axis, found.surface.profile)
         else {
             return false;
         };
         let normal = net.normal(facet);
-        let Some(away) = (found.sign * normal.reject_from(axis.direction)).try_normalize() else {
+        let outward = found.sign * normal;
+        let (rise, across) = (outward.dot(axis.direction), outward.reject_from(axis.direction));
+        // As steep as the strips.
+        if across.length() < slope.cos() - STEEP || (rise + slope.sin()).abs() > STEEP {
             return false;
-        };
+        }
+        let away = across.normalize();
         let tolerance = self.tolerance_of(found);
-        let depths = -tolerance..=AS_DEEP * found.sag + tolerance;
+        // The narrow end of a cone has flatter strips.
+        let least = if found.kind == Kind::Cylinder { 1.0 - AS_DEEP } else { 0.0 };
+        let [least, most] = [least, 1.0 + AS_DEEP].map(|share| share * found.sag);
+        let (plane, inside) = (least - tolerance..=most + tolerance, -tolerance..=most + tolerance);
         let fits = |corner: DVec3| {
             let s = axis.along(corner);
             let crest = axis.origin + s * axis.direction + (radius + s * slope.tan()) * away;
-            depths.contains(&(found.sign * normal.dot(crest - corner)))
-                && depths.contains(&-found.surface.distance(corner))
+            plane.contains(&outward.dot(crest - corner))
+                && inside.contains(&-found.surface.distance(corner))
         };
         net.triangles(facet).iter().all(|&t| net.part.mesh.corners(t).into_iter().all(fits))
     }

@@ -11,6 +11,7 @@ use glam::{DVec2, DVec3};
 
 use super::relief::{LEVEL, Relief, Surveyor};
 use super::shapes::{project, stretches};
+use super::skyline::Skyline;
 use super::tapers::upright;
 use super::{Base, Finder, SAME_PLANE, Site, axes, lie};
 use crate::error::Result;
@@ -32,6 +33,8 @@ const MOST_PLANES: usize = 24;
 const ICOSAHEDRON: f64 = 1.1071;
 /// Divisions of its edge at most.
 const MOST_DIVISIONS: usize = 8;
+/// Places along a crest at which it is looked at from above.
+const PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 /// Share of the distance of two crests by which their radii may fall short of it: on one axis they
 /// are the same.
 const ON_ONE_AXIS: f64 = 2e-3;
@@ -69,13 +72,17 @@ impl Round {
         for outcome in pairs.0.into_values() {
             match outcome {
                 None => self.pairs += 1,
-                Some(reason) => {
-                    match self.rejections.iter_mut().find(|(known, _)| *known == reason) {
-                        Some((_, count)) => *count += 1,
-                        None => self.rejections.push((reason, 1)),
-                    }
-                }
+                Some(reason) => self.add(reason, 1),
             }
+        }
+    }
+
+    /// Adds pairs without sites.
+    pub(super) fn add(&mut self, reason: Rejection, pairs: u64) {
+        match self.rejections.iter_mut().find(|(known, _)| *known == reason) {
+            Some((_, count)) => *count += pairs,
+            None if pairs > 0 => self.rejections.push((reason, pairs)),
+            None => {}
         }
     }
 }
@@ -90,6 +97,8 @@ struct Crest {
     radius: f64,
     /// Around it, in the direction's axes.
     bounds: Bounds2,
+    /// Its ends in the axes of the upright direction.
+    ends: [DVec3; 2],
 }
 
 impl Finder<'_> {
@@ -103,8 +112,13 @@ impl Finder<'_> {
         }
         let loose = self.loose();
         for closing in self.closings() {
-            let above = levels(self.crests(closing), SAME_PLANE * self.size);
-            let below = levels(self.crests(-closing), SAME_PLANE * self.size);
+            let skyline = self
+                .half_pad()
+                .map(|half| Skyline::new(&self.part.mesh.vertices, &axes(closing), half));
+            let [above, below] = [1.0, -1.0].map(|side| {
+                let crests = self.crests(side * closing);
+                levels(self.open(crests, side, skyline.as_ref(), &mut seen), SAME_PLANE * self.size)
+            });
             for top in &above {
                 for bottom in &below {
                     let outcome = self.round_sites(closing, top, bottom, &loose, &mut sites)?;
@@ -122,6 +136,34 @@ impl Finder<'_> {
         let mut round = Round { widths, ..Round::default() };
         round.count(seen);
         Ok((sites, round))
+    }
+
+    /// Half of the shorter side of the pads where these are rectangles \[m\].
+    fn half_pad(&self) -> Option<f64> {
+        let pads = self.gripper.pads(self.gripper.stroke[1]);
+        let [one, two] = self.gripper.pad_sizes();
+        pads.iter().all(|pad| pad.len() == 4).then(|| 0.5 * one.min(two).min_element())
+    }
+
+    /// The crests on which some pad can come down; `seen`: the others.
+    fn open(
+        &self,
+        mut crests: Vec<Crest>,
+        side: f64,
+        skyline: Option<&Skyline>,
+        seen: &mut Outcomes,
+    ) -> Vec<Crest> {
+        let slack = 2.0 * SAME_PLANE * self.size;
+        crests.retain(|crest| {
+            let Some(skyline) = skyline.filter(|_| crest.radius.is_finite()) else { return true };
+            let [from, to] = crest.ends;
+            let is_open = PLACES.iter().any(|&t| !skyline.buries(from.lerp(to, t), side, slack));
+            if !is_open {
+                seen.add(crest.face, crest.face, Some(Rejection::OutOfReach));
+            }
+            is_open
+        });
+        crests
     }
 
     /// Triangles of no face.
@@ -239,7 +281,7 @@ impl Finder<'_> {
 
     /// The crests that face a direction.
     fn crests(&self, closing: DVec3) -> Vec<Crest> {
-        let axes_from_part = axes(closing);
+        let (axes_from_part, upright_axes) = (axes(closing), axes(upright(closing)));
         let place = |point: DVec3| (axes_from_part * point).truncate();
         let mut crests = Vec::new();
         for face in &self.part.faces {
@@ -250,8 +292,9 @@ impl Finder<'_> {
                 && self.may_touch(face.id)
             {
                 let bounds = polygon::bounds(&project(std::iter::once(face), &axes_from_part));
-                let height = closing.dot(face.centroid);
-                crests.push(Crest { face: face.id, height, radius: f64::INFINITY, bounds });
+                let (height, ends) = (closing.dot(face.centroid), [DVec3::ZERO; 2]);
+                let radius = f64::INFINITY;
+                crests.push(Crest { face: face.id, height, radius, bounds, ends });
             }
         }
         for face in self.round_faces() {
@@ -270,7 +313,8 @@ impl Finder<'_> {
             if self.has_crest(face, closing, middle, radius) {
                 let bounds = Bounds2::of(&ends.map(place));
                 let height = closing.dot(middle) + radius;
-                crests.push(Crest { face: face.id, height, radius, bounds });
+                let ends = ends.map(|end| upright_axes * (end + radius * closing));
+                crests.push(Crest { face: face.id, height, radius, bounds, ends });
             }
         }
         crests

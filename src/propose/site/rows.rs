@@ -41,7 +41,8 @@ struct Posture {
 impl Finder<'_> {
     /// The sites on surfaces that lean.
     pub(super) fn leaning(&mut self, round: &mut Round) -> Result<Vec<Site>> {
-        let mut tapers = self.drafted();
+        let (mut tapers, too_small) = self.drafted();
+        round.add(Rejection::PairTooSmall, too_small);
         if self.options.outside {
             self.cones(&mut tapers);
         }

@@ -1,0 +1,87 @@
+//! What of the part stands above a place on which a pad is to come down.
+
+use glam::{DMat3, DVec2, DVec3};
+use rustc_hash::FxHashMap;
+
+/// Cells across half a pad.
+const CELLS: f64 = 4.0;
+/// Sectors around a place.
+const SECTORS: u32 = 12;
+
+/// The highest and the lowest corner of the part's mesh in each cell of a grid across a direction.
+pub(super) struct Skyline {
+    cells: FxHashMap<[i32; 2], [DVec3; 2]>,
+    /// Half of the pads' shorter side \[m\].
+    half: f64,
+}
+
+impl Skyline {
+    pub(super) fn new(vertices: &[DVec3], axes_from_part: &DMat3, half: f64) -> Self {
+        let mut skyline = Self { cells: FxHashMap::default(), half };
+        for &vertex in vertices {
+            let point = *axes_from_part * vertex;
+            let [top, bottom] =
+                skyline.cells.entry(skyline.cell(point.truncate())).or_insert([point; 2]);
+            if point.z > top.z {
+                *top = point;
+            }
+            if point.z < bottom.z {
+                *bottom = point;
+            }
+        }
+        skyline
+    }
+
+    fn cell(&self, place: DVec2) -> [i32; 2] {
+        (place * (CELLS / self.half)).floor().as_ivec2().to_array()
+    }
+
+    /// Whether corners of the part rise above `place` (in the direction's axes; `side` 1: seen from
+    /// above, -1: from below) by more than `slack` wherever a rectangular pad may lie that covers
+    /// it. Such a pad holds a quarter of a disc about it with half its shorter side, and so two
+    /// neighbouring sectors of twelve.
+    pub(super) fn buries(&self, place: DVec3, side: f64, slack: f64) -> bool {
+        let at = place.truncate();
+        let ([left, low], [right, high]) = (self.cell(at - self.half), self.cell(at + self.half));
+        let mut blocked = [false; SECTORS as usize];
+        for x in left..=right {
+            for y in low..=high {
+                let Some(ends) = self.cells.get(&[x, y]) else { continue };
+                let point = ends[usize::from(side < 0.0)];
+                let away = point.truncate() - at;
+                if side * (point.z - place.z) > slack && away.length() < self.half {
+                    let turn = away.to_angle() / std::f64::consts::TAU + 0.5;
+                    blocked[((turn * f64::from(SECTORS)) as usize).min(blocked.len() - 1)] = true;
+                }
+            }
+        }
+        (0..blocked.len()).all(|k| blocked[k] || blocked[(k + 1) % blocked.len()])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_in_a_well_is_buried_and_one_beside_a_wall_is_not() {
+        let wall = |from: f64, to: f64| -> Vec<DVec3> {
+            (0..200)
+                .map(|k| from + (to - from) * f64::from(k) / 200.0)
+                .map(|turn| (0.6 * DVec2::from_angle(turn)).extend(1.0))
+                .collect()
+        };
+        let turn = std::f64::consts::TAU;
+        let buried = |vertices: &[DVec3], side: f64| {
+            Skyline::new(vertices, &DMat3::IDENTITY, 1.0).buries(DVec3::ZERO, side, 0.01)
+        };
+        assert!(buried(&wall(0.0, turn), 1.0));
+        assert!(!buried(&wall(0.0, turn), -1.0));
+        assert!(buried(&wall(0.0, 0.9 * turn), 1.0));
+        assert!(!buried(&wall(0.0, 0.5 * turn), 1.0));
+        // Too far away for the pad.
+        let far: Vec<DVec3> =
+            wall(0.0, turn).iter().map(|p| *p * DVec3::new(2.0, 2.0, 1.0)).collect();
+        assert!(!buried(&far, 1.0));
+    }
+}
