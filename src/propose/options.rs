@@ -269,7 +269,8 @@ pub enum Rejection {
     LeansTooMuch,
     /// Counts bores, not candidates: the pads are too wide to go in and lie along the wall.
     PadTooWide,
-    /// Counts round faces, not candidates: the part stands above them wherever a pad may lie.
+    /// Counts face pairs, not candidates: the part stands in the way wherever pads may lie on round
+    /// faces.
     OutOfReach,
     /// Counts face pairs, not candidates: they lean, and overlap by less than a tenth of a pad or of
     /// the part's largest plane: strips of a freely curved surface, flanks of teeth.

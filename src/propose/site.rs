@@ -43,6 +43,10 @@ const SAME_PLANE: f64 = 2e-5;
 /// At most this many positions on one site; more is a slip of the unit.
 const MOST_POSITIONS: f64 = 2e7;
 
+/// Shapes of what is pressed on a curved face beyond which no special places are looked for: each
+/// costs as many cuts of all of them.
+const MOST_SHAPES: usize = 16;
+
 /// Which places of a site.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub(super) enum Places {
@@ -339,7 +343,10 @@ impl Finder<'_> {
             edges: &edges,
             points: [centre_of_mass, polygon::patch_moments(&local).centroid, grid.bounds.centre()],
         };
-        site.special = self.special(&site, &landmarks);
+        // A thread's crest has no edges to go by.
+        if site.relief.is_none() || local.len() <= MOST_SHAPES {
+            site.special = self.special(&site, &landmarks);
+        }
         site.bounds =
             special::bounds(&site.special).map_or(site.bounds, |bounds| bounds.union(site.bounds));
         Ok(site)

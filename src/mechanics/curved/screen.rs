@@ -10,7 +10,7 @@ use super::equilibrium::Problem;
 use super::face::Pressed;
 use super::joint::{Found, Joint, Mode, Place, Reached};
 use super::space::{self, Kind};
-use super::{Case, Pads, slip, strong};
+use super::{Case, NO_LEVER, Pads, slip, strong};
 use crate::model::Wrench;
 
 /// What is known of a load.
@@ -59,12 +59,14 @@ impl Pads {
             let one = self.faces[0].carry(force + 0.5 * pull, DVec2::ZERO, None)?;
             Some([one, self.faces[1].carry(force - 0.5 * pull, DVec2::ZERO, None)?])
         };
+        let none = NO_LEVER * force * distance.abs();
         let free = |pressed: &[Pressed<'_>; 2]| {
             let rotations = space::rotations([&pressed[0], &pressed[1]], distance);
             let free = rotations.map(|rotation| match rotation.kind {
                 Kind::Free | Kind::Facets(_) => Some(true),
                 Kind::Held => Some(false),
-                Kind::Nearly(_) => None,
+                // As good as one axis, or rolling out: free under any load.
+                Kind::Nearly(stiffness) => (stiffness <= none).then_some(true),
             });
             Some((rotations, [free[0]?, free[1]?]))
         };

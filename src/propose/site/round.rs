@@ -115,13 +115,20 @@ impl Finder<'_> {
             let skyline = self
                 .half_pad()
                 .map(|half| Skyline::new(&self.part.mesh.vertices, &axes(closing), half));
-            let [above, below] = [1.0, -1.0].map(|side| {
-                let crests = self.crests(side * closing);
-                levels(self.open(crests, side, skyline.as_ref(), &mut seen), SAME_PLANE * self.size)
-            });
+            let [above, below] =
+                [1.0, -1.0].map(|side| levels(self.crests(side * closing), SAME_PLANE * self.size));
             for top in &above {
                 for bottom in &below {
-                    let outcome = self.round_sites(closing, top, bottom, &loose, &mut sites)?;
+                    let outcome = match self.facing(closing, top, bottom) {
+                        Ok(None) => None,
+                        Ok(Some(_)) if self.is_buried(top, bottom, skyline.as_ref()) => {
+                            Some(Some(Rejection::OutOfReach))
+                        }
+                        Ok(Some(boxes)) => {
+                            self.round_sites(closing, [top, bottom], boxes, &loose, &mut sites)?
+                        }
+                        Err(reason) => Some(Some(reason)),
+                    };
                     let key = |level: &[Crest]| level.iter().map(|crest| crest.face).min();
                     let (Some(outcome), Some(a), Some(b)) = (outcome, key(top), key(bottom)) else {
                         continue;
@@ -138,32 +145,24 @@ impl Finder<'_> {
         Ok((sites, round))
     }
 
-    /// Half of the shorter side of the pads where these are rectangles \[m\].
+    /// Half of the shorter side of the pads where these are two rectangles alike \[m\].
     fn half_pad(&self) -> Option<f64> {
-        let pads = self.gripper.pads(self.gripper.stroke[1]);
-        let [one, two] = self.gripper.pad_sizes();
-        pads.iter().all(|pad| pad.len() == 4).then(|| 0.5 * one.min(two).min_element())
+        let [one, two] = self.gripper.pads(self.gripper.stroke[1]);
+        (one == two && one.len() == 4).then(|| 0.5 * self.gripper.pad_sizes()[0].min_element())
     }
 
-    /// The crests on which some pad can come down; `seen`: the others.
-    fn open(
-        &self,
-        mut crests: Vec<Crest>,
-        side: f64,
-        skyline: Option<&Skyline>,
-        seen: &mut Outcomes,
-    ) -> Vec<Crest> {
+    /// Whether the part stands in the pads' way wherever they cover a crest of two levels.
+    fn is_buried(&self, top: &[Crest], bottom: &[Crest], skyline: Option<&Skyline>) -> bool {
+        let Some(skyline) = skyline else { return false };
         let slack = 2.0 * SAME_PLANE * self.size;
-        crests.retain(|crest| {
-            let Some(skyline) = skyline.filter(|_| crest.radius.is_finite()) else { return true };
-            let [from, to] = crest.ends;
-            let is_open = PLACES.iter().any(|&t| !skyline.buries(from.lerp(to, t), side, slack));
-            if !is_open {
-                seen.add(crest.face, crest.face, Some(Rejection::OutOfReach));
-            }
-            is_open
-        });
-        crests
+        let heights = [top[0].height + slack, -bottom[0].height - slack];
+        let is_round = |level: &[Crest]| level.iter().all(|crest| crest.radius.is_finite());
+        let level = if is_round(top) { top } else { bottom };
+        is_round(level)
+            && level.iter().all(|crest| {
+                let [from, to] = crest.ends.map(DVec3::truncate);
+                PLACES.iter().all(|&t| skyline.buries(from.lerp(to, t), heights))
+            })
     }
 
     /// Triangles of no face.
@@ -341,19 +340,15 @@ impl Finder<'_> {
         })
     }
 
-    /// Adds the sites of two levels of crests. `None`: they do not face each other; else the reason
-    /// for which there is no site, if so.
-    #[allow(clippy::option_option, reason = "told apart by the caller at once")]
-    fn round_sites(
-        &mut self,
+    /// Where two levels of crests are to be looked at, in the direction's axes: their boxes. `None`:
+    /// they do not face each other.
+    fn facing(
+        &self,
         closing: DVec3,
         top: &[Crest],
         bottom: &[Crest],
-        loose: &[u32],
-        sites: &mut Vec<Site>,
-    ) -> Result<Option<Option<Rejection>>> {
-        let heights = [top[0].height, -bottom[0].height];
-        let width = heights[0] - heights[1];
+    ) -> std::result::Result<Option<[Bounds2; 2]>, Rejection> {
+        let width = top[0].height + bottom[0].height;
         let flat = |level: &[Crest]| level.iter().any(|crest| crest.radius.is_infinite());
         let reach = self.gripper.pad_reach();
         let around = |level: &[Crest], flip: bool| {
@@ -369,14 +364,27 @@ impl Finder<'_> {
         {
             return Ok(None);
         }
-        let stroke = Stroke::new(PairKind::External, self.gripper, self.options);
-        if let Err(reason) = stroke.check(width) {
-            return Ok(Some(Some(reason)));
-        }
+        Stroke::new(PairKind::External, self.gripper, self.options).check(width)?;
         let radius = |level: &[Crest]| level.iter().map(|crest| crest.radius).fold(0.0, f64::max);
         if radius(top) + radius(bottom) < width * (1.0 - ON_ONE_AXIS) {
-            return Ok(Some(Some(Rejection::RollsApart)));
+            return Err(Rejection::RollsApart);
         }
+        Ok(Some(boxes))
+    }
+
+    /// Adds the sites of two levels of crests. `None`: pads touch nothing there; else the reason
+    /// for which there is no site, if so.
+    #[allow(clippy::option_option, reason = "told apart by the caller at once")]
+    fn round_sites(
+        &mut self,
+        closing: DVec3,
+        [top, bottom]: [&[Crest]; 2],
+        boxes: [Bounds2; 2],
+        loose: &[u32],
+        sites: &mut Vec<Site>,
+    ) -> Result<Option<Option<Rejection>>> {
+        let heights = [top[0].height, -bottom[0].height];
+        let (width, reach) = (heights[0] - heights[1], self.gripper.pad_reach());
         let direction = self.direction(closing);
         let common =
             Bounds2 { min: boxes[0].min.max(boxes[1].min), max: boxes[0].max.min(boxes[1].max) };

@@ -36,22 +36,24 @@ impl Skyline {
         (place * (CELLS / self.half)).floor().as_ivec2().to_array()
     }
 
-    /// Whether corners of the part rise above `place` (in the direction's axes; `side` 1: seen from
-    /// above, -1: from below) by more than `slack` wherever a rectangular pad may lie that covers
-    /// it. Such a pad holds a quarter of a disc about it with half its shorter side, and so two
-    /// neighbouring sectors of twelve.
-    pub(super) fn buries(&self, place: DVec3, side: f64, slack: f64) -> bool {
-        let at = place.truncate();
-        let ([left, low], [right, high]) = (self.cell(at - self.half), self.cell(at + self.half));
+    /// Whether corners of the part rise above the first of the `heights`, or lie below the second,
+    /// wherever rectangular pads may lie that cover `at` (in the direction's axes). Such a pad holds
+    /// a quarter of a disc about it with half its shorter side, and so two neighbouring sectors of
+    /// twelve.
+    pub(super) fn buries(&self, at: DVec2, [high, low]: [f64; 2]) -> bool {
+        let ([left, near], [right, far]) = (self.cell(at - self.half), self.cell(at + self.half));
         let mut blocked = [false; SECTORS as usize];
         for x in left..=right {
-            for y in low..=high {
-                let Some(ends) = self.cells.get(&[x, y]) else { continue };
-                let point = ends[usize::from(side < 0.0)];
-                let away = point.truncate() - at;
-                if side * (point.z - place.z) > slack && away.length() < self.half {
-                    let turn = away.to_angle() / std::f64::consts::TAU + 0.5;
-                    blocked[((turn * f64::from(SECTORS)) as usize).min(blocked.len() - 1)] = true;
+            for y in near..=far {
+                let Some([top, bottom]) = self.cells.get(&[x, y]) else { continue };
+                let over = [top].into_iter().filter(|point| point.z > high);
+                for point in over.chain([bottom].into_iter().filter(|point| point.z < low)) {
+                    let away = point.truncate() - at;
+                    if away.length() < self.half {
+                        let turn = away.to_angle() / std::f64::consts::TAU + 0.5;
+                        let sector = (turn * f64::from(SECTORS)) as usize;
+                        blocked[sector.min(blocked.len() - 1)] = true;
+                    }
                 }
             }
         }
@@ -72,16 +74,21 @@ mod tests {
                 .collect()
         };
         let turn = std::f64::consts::TAU;
-        let buried = |vertices: &[DVec3], side: f64| {
-            Skyline::new(vertices, &DMat3::IDENTITY, 1.0).buries(DVec3::ZERO, side, 0.01)
+        let buried = |vertices: &[DVec3]| {
+            Skyline::new(vertices, &DMat3::IDENTITY, 1.0).buries(DVec2::ZERO, [0.01, -0.01])
         };
-        assert!(buried(&wall(0.0, turn), 1.0));
-        assert!(!buried(&wall(0.0, turn), -1.0));
-        assert!(buried(&wall(0.0, 0.9 * turn), 1.0));
-        assert!(!buried(&wall(0.0, 0.5 * turn), 1.0));
+        assert!(buried(&wall(0.0, turn)));
+        assert!(buried(&wall(0.0, 0.9 * turn)));
+        assert!(!buried(&wall(0.0, 0.5 * turn)));
+        // One half above, the other below.
+        let mut both = wall(0.0, 0.5 * turn);
+        both.extend(wall(0.5 * turn, turn).iter().map(|point| *point * DVec3::new(1.0, 1.0, -1.0)));
+        assert!(buried(&both));
+        let level: Vec<DVec3> = both.iter().map(|point| point.truncate().extend(0.0)).collect();
+        assert!(!buried(&level));
         // Too far away for the pad.
         let far: Vec<DVec3> =
             wall(0.0, turn).iter().map(|p| *p * DVec3::new(2.0, 2.0, 1.0)).collect();
-        assert!(!buried(&far, 1.0));
+        assert!(!buried(&far));
     }
 }
