@@ -320,7 +320,7 @@ impl Rejection {
             Self::RollsApart => "face_pair_rolls_apart".into(),
             Self::LeansTooMuch => "face_pair_leans_too_much".into(),
             Self::PadTooWide => "bore_too_narrow_for_pads".into(),
-            Self::OutOfReach => "round_face_out_of_reach".into(),
+            Self::OutOfReach => "face_pair_out_of_reach".into(),
             Self::PairTooSmall => "face_pair_too_small".into(),
             Self::ContactTooSmall => "contact_too_small".into(),
             Self::PadShareTooSmall => "pad_share_too_small".into(),
