@@ -295,6 +295,14 @@ impl Plan {
         for remark in proposer.tally().remarks(&self.gripper, &self.propose) {
             observer.note(&remark);
         }
+        let curved = self.part.curved.iter().filter(|face| face.outside && face.reachable).count();
+        let plane_only = proposer.tally().pairs > 0 && !proposer.tries_curved();
+        if self.propose.curved.is_none() && plane_only && curved > 0 {
+            observer.note(&format!(
+                "the part has {curved} curved faces that pads can close on: they are tried when the \
+                 option curved is set, which takes long with many loads"
+            ));
+        }
         let (complete, checkpoint) = (found.complete, found.checkpoint.clone());
         let lost = found.collector.take_lost();
         let misses = self.misses(proposer, &lost);

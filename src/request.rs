@@ -97,8 +97,10 @@ pub struct Candidates {
     pub angle_step: Angle,
     /// Approach along and across the edges of the gripped faces as well.
     pub edge_angles: bool,
-    /// Close on curved faces, and on opposite planes that are not parallel, as well.
-    pub curved: bool,
+    /// Close on curved faces from outside; absent: only where no two plane faces lie within the
+    /// stroke, because such a grip takes several times as long as one between planes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub curved: Option<bool>,
     /// Smallest contact area on either face, as a share of the most that a pad can touch there: the
     /// area in which the two faces overlap, or that of a pad over the middle of its bounds, at the
     /// grip's angle, whichever is smaller.
@@ -269,7 +271,7 @@ impl Default for Candidates {
             spacing: None,
             angle_step: Angle(15_f64.to_radians()),
             edge_angles: true,
-            curved: true,
+            curved: None,
             min_contact: 0.25,
             min_pad_share: 0.02,
             max_offset: None,

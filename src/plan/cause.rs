@@ -47,7 +47,7 @@ pub(super) fn causes(
         };
         let why = if let Err(why) = within(across, gripper) {
             why
-        } else if !options.curved {
+        } else if options.curved == Some(false) {
             "not tried, as the option curved is off".to_owned()
         } else if turn < HALF_TURN {
             format!("it covers {:.0} deg: no two of its sides are opposite", turn.to_degrees())

@@ -28,8 +28,9 @@ pub struct ProposeOptions {
     pub angle_step: f64,
     /// Approach along and across the edges of the gripped faces as well.
     pub edge_angles: bool,
-    /// Propose grips on curved faces, and on opposite planes that are not parallel.
-    pub curved: bool,
+    /// Propose grips on curved faces, and on opposite planes that are not parallel; `None`: where no
+    /// two parallel plane faces lie within the stroke.
+    pub curved: Option<bool>,
     /// Smallest contact area on either face, as a share of the most that a pad can touch there: the
     /// area in which the two faces overlap, or that of a pad over the middle of its bounds, at the
     /// grip's angle, whichever is smaller. Of curved faces what is pressed without a load counts.
@@ -80,7 +81,7 @@ setters!(ProposeOptions {
     with_spacing: spacing: Option<f64>,
     with_angle_step: angle_step: f64,
     with_edge_angles: edge_angles: bool,
-    with_curved: curved: bool,
+    with_curved: curved: Option<bool>,
     with_min_contact: min_contact: f64,
     with_min_pad_share: min_pad_share: f64,
     with_max_offset: max_offset: Option<f64>,

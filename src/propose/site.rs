@@ -159,7 +159,9 @@ pub(super) fn sites(
     }
     let plane = sites.len();
     let mut round = Round::default();
-    if options.curved {
+    let named = |faces: &Vec<u32>| faces.iter().any(|&face| face as usize >= part.faces.len());
+    let asked = options.faces.as_ref().is_some_and(named) || sites.is_empty();
+    if options.curved.unwrap_or(asked) {
         let curved;
         (curved, round) = finder.round()?;
         sites.extend(curved);

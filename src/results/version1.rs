@@ -180,7 +180,6 @@ impl Settings {
         let candidates = &mut request.candidates;
         // These had no flag; what ran stood in the program.
         candidates.edge_angles = true;
-        candidates.curved = false;
         candidates.min_pad_share = 0.02;
         candidates.min_opening = Length(0.25e-3);
         candidates.approach_distance = Length(0.1);

@@ -51,7 +51,7 @@ fn planned(part: Part, loads: Vec<LoadCase>) -> GripSet {
     request.mass = Some(Mass(0.2));
     request.force = Some(Force(60.0));
     request.candidates.spacing = Some(Length(0.010));
-    request.candidates.curved = true;
+    request.candidates.curved = Some(true);
     request.candidates.angle_step = Angle(45_f64.to_radians());
     request.scoring.backend = Choice::Cpu;
     let plan = Plan::builder(request).part(part).loads(loads).build().unwrap();
@@ -170,7 +170,7 @@ fn turning_the_part_about_its_axis_gives_the_same_grips() {
 fn a_grip_on_a_barrel_is_explained_as_it_was_proposed() {
     let (part, gripper) = (shaft(0.1), gripper::find("robotiq-2f85").unwrap());
     let options = ProposeOptions::default()
-        .with_curved(true)
+        .with_curved(Some(true))
         .with_spacing(Some(0.012))
         .with_angle_step(0.8)
         .with_force(Some(60.0));
@@ -227,7 +227,7 @@ fn screened_as_solved(name: &str, part: &Part, count: usize) -> [usize; 2] {
     let gripper = gripper::find("robotiq-2f85").unwrap();
     let force = 40.0;
     let options = ProposeOptions::default()
-        .with_curved(true)
+        .with_curved(Some(true))
         .with_spacing(Some(0.008))
         .with_angle_step(0.8)
         .with_force(Some(force));

@@ -83,7 +83,7 @@ fn planned(
     request.mass = Some(Mass(0.2));
     request.force = Some(Force(FORCE));
     request.candidates.spacing = Some(Length(spacing));
-    request.candidates.curved = true;
+    request.candidates.curved = Some(true);
     request.candidates.grips = grips;
     request.candidates.angle_step = Angle(step.to_radians());
     request.scoring.backend = Choice::Cpu;
@@ -149,7 +149,7 @@ fn parallel_faces_stay_as_they_are_beside_drafted_ones() {
     for degrees in [0.2_f64, 1.0] {
         let part = wedge([degrees.to_radians(); 2]);
         let grips = |curved: bool| -> Vec<_> {
-            let options = options.clone().with_curved(curved);
+            let options = options.clone().with_curved(Some(curved));
             let proposer = Proposer::new(&part, &gripper, &options).unwrap();
             proposer.flat_map(|chunk| chunk.grips).collect()
         };
@@ -168,7 +168,7 @@ fn parallel_faces_stay_as_they_are_beside_drafted_ones() {
 fn what_the_layer_does_not_take_is_told_with_its_angle() {
     let part = wedge([14_f64.to_radians(); 2]);
     let gripper = gripper::find("robotiq-2f85").unwrap();
-    let options = ProposeOptions::default().with_curved(true).with_force(Some(235.0));
+    let options = ProposeOptions::default().with_curved(Some(true)).with_force(Some(235.0));
     let proposer = Proposer::new(&part, &gripper, &options).unwrap();
     let tally = proposer.tally();
     assert_eq!(tally.rejections.get("face_pair_leans_too_much"), Some(&1), "{tally:?}");
@@ -188,7 +188,7 @@ fn what_the_layer_does_not_take_is_told_with_its_angle() {
 fn a_grip_on_a_row_is_explained_as_it_was_proposed() {
     let gripper = gripper::find("robotiq-2f85").unwrap();
     let options = ProposeOptions::default()
-        .with_curved(true)
+        .with_curved(Some(true))
         .with_spacing(Some(0.004))
         .with_force(Some(FORCE));
     let part = wedge([2_f64.to_radians(); 2]);
@@ -261,7 +261,8 @@ fn a_bore_is_gripped_from_inside_about_its_axis() {
     // Too narrow for the pads.
     let narrow = lathe([0.02; 2], 0.04, 68, true);
     let gripper = gripper::find("generic").unwrap();
-    let options = ProposeOptions::default().with_outside(false).with_inside(true).with_curved(true);
+    let options =
+        ProposeOptions::default().with_outside(false).with_inside(true).with_curved(Some(true));
     let proposer = Proposer::new(&narrow, &gripper, &options).unwrap();
     assert_eq!(proposer.tally().rejections.get("bore_too_narrow_for_pads"), Some(&1));
     assert!(!proposer.tries_curved());
@@ -276,7 +277,7 @@ fn a_cone_needs_the_tangent_of_its_half_angle_and_more_to_be_turned() {
     let tangent = (radii[0] - radii[1]) / 0.05;
     let gripper = gripper::find("robotiq-2f85").unwrap();
     let options = ProposeOptions::default()
-        .with_curved(true)
+        .with_curved(Some(true))
         .with_spacing(Some(0.008))
         .with_angle_step(std::f64::consts::FRAC_PI_2)
         .with_force(Some(FORCE));
@@ -322,7 +323,7 @@ fn grips_that_mark_the_part_are_rejected_and_counted() {
         request.mass = Some(Mass(0.2));
         request.force = Some(Force(FORCE));
         request.candidates.spacing = Some(Length(0.006));
-        request.candidates.curved = true;
+        request.candidates.curved = Some(true);
         request.candidates.angle_step = Angle(90_f64.to_radians());
         request.scoring.backend = Choice::Cpu;
         request.scoring.max_pressure = limit.map(Pressure);

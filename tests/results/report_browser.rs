@@ -75,7 +75,7 @@ fn curved() -> GripSet {
     let mut request = Request::new("shaft.stl", "generic");
     request.mass = Some(Mass(0.2));
     request.loads = vec!["ball:12:20N".to_owned()];
-    request.candidates.curved = true;
+    request.candidates.curved = Some(true);
     request.candidates.spacing = Some(Length(0.01));
     request.candidates.angle_step = Angle(1.6);
     request.scoring.backend = Choice::Cpu;

@@ -113,7 +113,8 @@ struct CandidateArgs {
     /// Approach along and across the edges of the gripped faces as well.
     #[arg(long, value_name = "true|false", hide_possible_values = true)]
     edge_angles: Option<bool>,
-    /// Closes on curved faces, and on opposite planes that are not parallel, as well.
+    /// Closes on curved faces from outside, too. Such a grip takes several times as long as one
+    /// between planes [default: only where no two plane faces lie within the stroke].
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
     curved: Option<bool>,
     /// Smallest contact area on either face, as a share of the most that the face pair allows (pad
@@ -474,7 +475,7 @@ mod tests {
 
     /// Every flag that is a field, with a value that is not its default.
     const LINE: &str = "gripfast plan part.stl --gripper my.toml --mass 350g --force 40N --unit in --max-memory 2GB --outside-buffers \
-        --accel 2g --loads gravity,ball:3 --spacing 2mm --angle-step 7deg --edge-angles false --curved=false \
+        --accel 2g --loads gravity,ball:3 --spacing 2mm --angle-step 7deg --edge-angles false --curved \
         --min-contact 0.3 --min-pad-share 0.1 --max-offset 9mm --approach -z:45deg --ground +z:1mm \
         --keep-out 0mm,0mm,0mm:1mm,1mm,1mm --scene cell.toml --faces 0,2 --faces-in 0mm,0mm,0mm:1mm,1mm,1mm \
         --grips both --flips --opening 4mm --min-opening 1mm --clearance 1mm \
