@@ -76,7 +76,7 @@ impl<'a> Comparer<'a> {
     }
 
     /// What is asked about the `mu_s` of a load, which must have an in-plane part and press both
-    /// pads, from the state `near` or from the pressure without coupling. `None` where that does
+    /// pads, from the state `near` or else from the pressure without coupling. `None` where that does
     /// not succeed: the load is then to be solved.
     pub(crate) fn compare(
         &mut self,
@@ -98,12 +98,13 @@ impl<'a> Comparer<'a> {
             Separation::Discard => Question { value: 0.0, sharp: 0.0 },
             Separation::Solve => question,
         };
-        let found = match near {
-            Some(Neighbour(near)) => solver.approach(near, question),
-            None => solver
-                .without_coupling(options.seed.map(|twist| self.pads.scaled_twist(twist)))
-                .and_then(|start| solver.approach(&start, question)),
-        };
+        let seed = options.seed.map(|twist| self.pads.scaled_twist(twist));
+        let found = near.and_then(|Neighbour(near)| solver.approach(near, question));
+        // From a state far away Newton's method may get lost.
+        let found = found.or_else(|| {
+            let start = solver.without_coupling(seed)?;
+            solver.approach(&start, question)
+        });
         let evaluations = solver.evaluations;
         self.scratch = solver.scratch;
         let (state, bounds, integrals) = found?;
