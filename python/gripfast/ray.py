@@ -67,11 +67,8 @@ def run(
     threads = max(1, int(num_cpus))
     ordered = sorted(store.pending(), key=lambda number: (jobs[number].request["part"], number))
     #: Job, and share; None: the whole job.
-    waiting: list[tuple[int, int | None]] = [
-        (number, share)
-        for number in reversed(ordered)
-        for share in (reversed(range(split)) if split > 1 else [None])
-    ]
+    parts: list[int | None] = list(range(split)) if split > 1 else [None]
+    waiting = [(number, share) for number in reversed(ordered) for share in reversed(parts)]
     running: dict[Any, tuple[int, int | None]] = {}
     shares: dict[int, dict[int, bytes]] = {}
     parcels: dict[str, Any] = {}
@@ -113,6 +110,8 @@ def run(
                     take(number, share, state)
                 else:
                     start(number, share, "share", (share, split))
+            if not running:
+                continue  # shares of jobs that have failed
             done, _ = ray.wait(list(running), num_returns=1, timeout=1.0)
             for reference in done:
                 number, share = running.pop(reference)
