@@ -55,6 +55,8 @@ pub(super) fn native(place: &str, bytes: &[u8]) -> Result<Vec<Pose>> {
 
 /// A cell of a table.
 enum Cell {
+    /// Of a format that keeps numbers as such.
+    #[cfg_attr(not(feature = "parquet"), expect(dead_code, reason = "CSV is text"))]
     Number(f64),
     /// As written; empty where there is nothing.
     Text(String),

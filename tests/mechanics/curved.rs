@@ -808,7 +808,8 @@ fn many_random_bodies_agree_with_forces_on_points() {
 #[test]
 fn the_force_needed_is_where_mu_meets_the_friction() {
     let (mut met, mut at_the_end, mut never) = (0, 0, 0);
-    for number in 0..24 {
+    // Of the last one `mu_s` hardly falls with the force.
+    for number in (0..24).chain([149]) {
         let posed = posed(number);
         let pads = Pads::new(&posed.surfaces).unwrap();
         let mu = |force: f64| {

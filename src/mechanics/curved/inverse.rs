@@ -13,6 +13,10 @@ const STEPS: u32 = 120;
 const MOST: f64 = 1e9;
 /// Slopes of the logarithm of `mu_s` over that of the force that are taken for one.
 const SLOPES: std::ops::Range<f64> = -2.0..-0.2;
+/// Steps in one direction after which they grow, each by this factor more: where `mu_s` hardly
+/// changes with the force, what is foretold falls short again and again.
+const PATIENCE: i32 = 5;
+const GROWTH: f64 = 4.0;
 
 /// The gripping force \[N\] at which the pads just hold `wrench` with the friction `friction`, looked
 /// for from `start` \[N\] on; `None` where no force holds it. `mu_s` falls with the force: what
@@ -95,6 +99,9 @@ impl Search {
         let mut high: Option<(f64, f64)> = None;
         let mut last: Option<(f64, f64)> = None;
         let mut force = start;
+        let mut one_way = 0;
+        // Widths of the bracket one and two steps ago, as logarithms.
+        let mut widths = [f64::INFINITY; 2];
         let end =
             |found: Option<f64>, low: Option<(f64, f64)>| End { found, low: low.map(|x| x.0) };
         for _ in 0..STEPS {
@@ -114,15 +121,21 @@ impl Search {
                 .unwrap_or(-1.0);
             let foretold = force * (-here / slope).exp();
             last = here.is_finite().then_some((force, here));
+            one_way += 1;
+            let late = one_way > PATIENCE;
+            let push = if late { 1.0 + FOUND * GROWTH.powi(one_way - PATIENCE) } else { 1.0 };
             force = match (low, high) {
                 (Some((a, over)), Some((b, under))) => {
                     if b - a <= FOUND * b {
                         return end(Some(b), low);
                     }
+                    let width = (b / a).ln();
+                    let slow = width > 0.5 * widths[1];
+                    widths = [width, widths[0]];
                     let step = if over.is_finite() { over / (over - under) } else { 0.5 };
-                    let step = if step > 0.001 && step < 0.999 { step } else { 0.5 };
+                    let step = if step > 0.001 && step < 0.999 && !slow { step } else { 0.5 };
                     let guess = a * (b / a).powf(step);
-                    if foretold.is_finite() && foretold > a && foretold < b {
+                    if !slow && foretold.is_finite() && foretold > a && foretold < b {
                         foretold
                     } else {
                         guess
@@ -132,14 +145,18 @@ impl Search {
                     if a > self.most {
                         return end(None, low);
                     }
-                    if over.is_finite() { foretold.clamp(a, 1e3 * a) } else { 2.0 * a }
+                    if over.is_finite() {
+                        foretold.clamp(push.min(1e3) * a, 1e3 * a)
+                    } else {
+                        2.0 * a
+                    }
                 }
                 (None, Some((b, under))) => {
                     let least = self.size / MOST;
                     if under == f64::NEG_INFINITY || b < least {
                         return end(Some(b.min(least)), low);
                     }
-                    foretold.clamp(1e-3 * b, b)
+                    foretold.clamp(1e-3 * b, b / push.min(1e3))
                 }
                 (None, None) => return end(None, low),
             };
