@@ -156,7 +156,8 @@ impl Solver<'_> {
                 let [least, most] =
                     [-WITHIN, WITHIN].map(|by| (next.mu_over_size + by * after) * self.load.size);
                 let weak = most * 2.0 * self.load.half_distance.abs() <= COUPLING_SEARCH;
-                if weak && (most < value || most - least <= sharp * most) {
+                let sharp_enough = sharp > 0.0 && most - least <= sharp * most;
+                if weak && (most < value || sharp_enough) {
                     return Some((None, [least, most], integrals));
                 }
                 if sharp == 0.0 && next.mu_over_size * self.load.size >= value {
