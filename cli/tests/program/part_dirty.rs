@@ -655,7 +655,10 @@ fn files_that_are_no_mesh_are_refused_with_place_and_remedy() {
     } else {
         assert!(step.contains("cascadio") && step.contains("feature `step`"), "{step}");
     }
-    assert!(refused("part.igs", b"").contains("cascadio"));
+    for name in ["part.igs", "part.brep"] {
+        let text = refused(name, b"");
+        assert!(text.contains("in a format that is not read") && text.contains("export"), "{text}");
+    }
     assert!(refused("part.xyz", b"1 2 3").contains("unknown mesh format"));
     assert!(refused("part", b"1 2 3").contains("suffix"));
     assert!(refused("bad.obj", b"v 0 0 0\nv 1 0 0\nv 0 x 0\nf 1 2 3\n").contains("line 3"));
