@@ -168,7 +168,7 @@ def batch_run(
     texts: list[str],
     folder: _Path,
     resume: bool = False,
-    workers: tuple[int | None, int | None, int | None] = (None, None, None),
+    workers: tuple[int | None, int | None, int | None] = ...,
     listener: _Listener = None,
 ) -> str: ...
 def lost_job(text: str, problem: str) -> str: ...
