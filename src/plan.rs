@@ -298,9 +298,13 @@ impl Plan {
         let curved = self.part.curved.iter().filter(|face| face.outside && face.reachable).count();
         let plane_only = proposer.tally().pairs > 0 && !proposer.tries_curved();
         if self.propose.curved.is_none() && plane_only && curved > 0 {
+            let these = match curved {
+                1 => "a curved face that pads can close on: it is".to_owned(),
+                many => format!("{many} curved faces that pads can close on: they are"),
+            };
             observer.note(&format!(
-                "the part has {curved} curved faces that pads can close on: they are tried when the \
-                 option curved is set, which takes long with many loads"
+                "the part has {these} tried when the option curved is set, which takes long with many \
+                 loads"
             ));
         }
         let (complete, checkpoint) = (found.complete, found.checkpoint.clone());
