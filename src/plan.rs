@@ -44,7 +44,7 @@ use std::sync::atomic::AtomicBool;
 use glam::{DVec2, DVec3};
 use rayon::ThreadPool;
 
-use crate::backend::{Backend, SeedSet, select};
+use crate::backend::{Backend, SeedSet, Selection, select};
 use crate::error::{Error, Result};
 use crate::export::Format;
 use crate::file::Lock;
@@ -247,7 +247,7 @@ impl Plan {
             return Ok(outcome);
         }
         let scoring = &self.request.scoring;
-        let selection = select(scoring.backend, scoring.adapter.as_deref())?;
+        let selection = self.select_backend()?;
         // Of a machine without a graphics processor there is nothing to say.
         if scoring.backend != Choice::Auto || !matches!(selection.backend, Backend::Cpu) {
             observer.note(&format!("backend {}", selection.reason));
@@ -265,6 +265,11 @@ impl Plan {
             partial.remove()?;
         }
         Ok(outcome)
+    }
+
+    fn select_backend(&self) -> Result<Selection> {
+        let scoring = &self.request.scoring;
+        select(scoring.backend, scoring.adapter.as_deref())
     }
 
     fn search<'a>(

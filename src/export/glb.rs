@@ -65,7 +65,7 @@ impl Colour {
 /// The growing file.
 struct Scene {
     root: json::Root,
-    buffer: Index<json::Buffer>,
+    /// The one buffer.
     bytes: Vec<u8>,
 }
 
@@ -74,14 +74,13 @@ impl Scene {
         let mut root = json::Root::default();
         root.asset.generator = Some(format!("gripfast {}", env!("CARGO_PKG_VERSION")));
         root.materials = Colour::ALL.map(Colour::material).into();
-        let buffer = Index::new(0);
-        Self { root, buffer, bytes: Vec::new() }
+        Self { root, bytes: Vec::new() }
     }
 
     /// A piece of the buffer, from this byte to its end.
     fn view(&mut self, start: usize, target: buffer::Target) -> Index<buffer::View> {
         self.root.push(buffer::View {
-            buffer: self.buffer,
+            buffer: Index::new(0),
             byte_length: USize64::from(self.bytes.len() - start),
             byte_offset: Some(USize64::from(start)),
             byte_stride: None,

@@ -7,7 +7,6 @@ use std::sync::atomic::AtomicBool;
 use super::checkpoint::Checkpoint;
 use super::search::Found;
 use super::{Collector, Observer, Outcome, Plan};
-use crate::backend::select;
 use crate::error::{Error, Result};
 use crate::propose::Proposer;
 use crate::request::Polish;
@@ -31,8 +30,7 @@ impl Plan {
         }
         self.check_shares()?;
         self.threads.install(|| {
-            let scoring = &self.request.scoring;
-            let selection = select(scoring.backend, scoring.adapter.as_deref())?;
+            let selection = self.select_backend()?;
             let assessor = self.assessor(&selection.backend);
             let mut proposer = Proposer::new(&self.part, &self.gripper, &self.propose)?;
             proposer.take_share(number, of);
@@ -55,8 +53,7 @@ impl Plan {
         self.check_shares()?;
         self.threads.install(|| {
             self.warnings.iter().for_each(|text| observer.warning(text));
-            let scoring = &self.request.scoring;
-            let selection = select(scoring.backend, scoring.adapter.as_deref())?;
+            let selection = self.select_backend()?;
             let assessor = self.assessor(&selection.backend);
             let mut proposer = Proposer::new(&self.part, &self.gripper, &self.propose)?;
             let inputs = self.inputs();

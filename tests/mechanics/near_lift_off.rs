@@ -18,6 +18,16 @@ fn only_case(name: &str) -> Option<case::Case> {
     Some(case::read(&path).unwrap().remove(0))
 }
 
+/// `mu_s` of all limit states of a case whose answer must say that there are several.
+fn states_of_an_ambiguous_one(case: &case::Case, name: &str) -> Vec<f64> {
+    let (contact, d, force, wrench) = (&case.contact, case.distance, case.force, &case.wrench);
+    let options = Options::default();
+    let answer = mechanics::solve(contact, d, force, wrench, &options).unwrap();
+    assert_eq!(answer.status, Status::Ambiguous, "{name}: {answer:?}");
+    let all = mechanics::limit_states(contact, d, force, wrench, &options).unwrap();
+    all.iter().filter_map(|score| score.mu_s).collect()
+}
+
 /// A second limit state was found by other means: the answer is not called the only one, and the
 /// list has both.
 #[test]
@@ -29,12 +39,7 @@ fn a_second_state_is_seen() {
         ("m102-4155", 2.9904),
     ] {
         let Some(case) = only_case(name) else { return };
-        let (contact, d, force, wrench) = (&case.contact, case.distance, case.force, &case.wrench);
-        let options = Options::default();
-        let answer = mechanics::solve(contact, d, force, wrench, &options).unwrap();
-        assert_eq!(answer.status, Status::Ambiguous, "{name}: {answer:?}");
-        let all = mechanics::limit_states(contact, d, force, wrench, &options).unwrap();
-        let found: Vec<f64> = all.iter().filter_map(|score| score.mu_s).collect();
+        let found = states_of_an_ambiguous_one(&case, name);
         let near = |mu: &f64| (mu / second - 1.0).abs() < 3e-5;
         assert!(found.len() > 1 && found.iter().any(near), "{name}: {found:?}");
     }
@@ -46,12 +51,7 @@ fn a_second_state_is_seen() {
 fn two_states_on_the_last_of_a_contact_are_seen() {
     let path = crate::support::root().join("tests/mechanics/cases/two_states.json");
     let case = case::read(&path).unwrap().remove(0);
-    let (contact, d, force, wrench) = (&case.contact, case.distance, case.force, &case.wrench);
-    let options = Options::default();
-    let answer = mechanics::solve(contact, d, force, wrench, &options).unwrap();
-    assert_eq!(answer.status, Status::Ambiguous, "{answer:?}");
-    let all = mechanics::limit_states(contact, d, force, wrench, &options).unwrap();
-    let found: Vec<f64> = all.iter().filter_map(|score| score.mu_s).collect();
+    let found = states_of_an_ambiguous_one(&case, "two_states");
     for mu in [0.1679805660842801, 0.1694572464368676] {
         assert!(found.iter().any(|other| (other / mu - 1.0).abs() < 1e-6), "{found:?}");
     }

@@ -8,14 +8,14 @@ const FOUND: f64 = 1e-9;
 /// The same on the way, so that what is found is right to [`FOUND`].
 const CLOSER: f64 = 1e-11;
 /// Solves at most.
-const STEPS: u32 = 120;
+const STEPS: i32 = 120;
 /// Force over the load's size beyond which none is enough.
 const MOST: f64 = 1e9;
 /// Slopes of the logarithm of `mu_s` over that of the force that are taken for one.
 const SLOPES: std::ops::Range<f64> = -2.0..-0.2;
-/// Steps in one direction after which they grow, each by this factor more: where `mu_s` hardly
+/// Steps without a bracket after which they grow, each by this factor more: where `mu_s` hardly
 /// changes with the force, what is foretold falls short again and again.
-const PATIENCE: i32 = 5;
+const PATIENCE: i32 = 4;
 const GROWTH: f64 = 4.0;
 
 /// The gripping force \[N\] at which the pads just hold `wrench` with the friction `friction`, looked
@@ -99,12 +99,11 @@ impl Search {
         let mut high: Option<(f64, f64)> = None;
         let mut last: Option<(f64, f64)> = None;
         let mut force = start;
-        let mut one_way = 0;
         // Widths of the bracket one and two steps ago, as logarithms.
         let mut widths = [f64::INFINITY; 2];
         let end =
             |found: Option<f64>, low: Option<(f64, f64)>| End { found, low: low.map(|x| x.0) };
-        for _ in 0..STEPS {
+        for done in 0..STEPS {
             let here = excess(force);
             if here.abs() <= within {
                 return end(Some(force), low);
@@ -121,9 +120,8 @@ impl Search {
                 .unwrap_or(-1.0);
             let foretold = force * (-here / slope).exp();
             last = here.is_finite().then_some((force, here));
-            one_way += 1;
-            let late = one_way > PATIENCE;
-            let push = if late { 1.0 + FOUND * GROWTH.powi(one_way - PATIENCE) } else { 1.0 };
+            let late = done > PATIENCE;
+            let push = if late { 1.0 + FOUND * GROWTH.powi(done - PATIENCE) } else { 1.0 };
             force = match (low, high) {
                 (Some((a, over)), Some((b, under))) => {
                     if b - a <= FOUND * b {
