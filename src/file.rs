@@ -28,6 +28,7 @@ pub fn write(
         let mut writer = BufWriter::new(File::options().write(true).open(path).map_err(failed)?);
         return content(&mut writer).and_then(|()| writer.flush()).map_err(failed);
     }
+    folder_of(path, &path.display().to_string())?;
     if path.is_dir() {
         return Err(failed(std::io::ErrorKind::IsADirectory.into()));
     }
@@ -49,6 +50,22 @@ pub fn write(
     #[cfg(unix)]
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
     Ok(())
+}
+
+/// Makes sure that the folder of a file is there; `place` names the file.
+///
+/// # Errors
+/// [`ErrorKind::NotFound`] when it is not.
+pub(crate) fn folder_of(path: &Path, place: &str) -> Result<()> {
+    match path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
+        None => Ok(()),
+        Some(folder) => Err(Error::new(
+            ErrorKind::NotFound,
+            place,
+            format!("the folder '{}' is not there", folder.display()),
+            "make it first",
+        )),
+    }
 }
 
 /// Held while a run works on an output: a second run on it is refused. The system frees it when
@@ -233,7 +250,8 @@ mod tests {
     #[test]
     fn a_missing_folder_and_a_folder_as_name_are_errors() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(write(&folder.path().join("no/such/out.txt"), |_| Ok(())).is_err());
+        let error = write(&folder.path().join("no/such/out.txt"), |_| Ok(())).unwrap_err();
+        assert!(error.to_string().contains("no/such' is not there"), "{error}");
         assert!(write(folder.path(), |_| Ok(())).is_err());
     }
 

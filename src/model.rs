@@ -367,9 +367,9 @@ pub struct Miss {
     /// them the id is 0 and names nothing.
     pub pose: Negative,
     /// What it lacks, where a number says it: how deep a body lies in what stops it, how far a
-    /// width or a place is beyond its limit, of one that does not hold how far it is from the
-    /// centre of mass \[m\]; how far an approach lies outside the cone \[rad\]; which share of the
-    /// contact area asked for is missing (0..1).
+    /// width or a place is beyond its limit \[m\]; how far an approach lies outside the cone
+    /// \[rad\]; which share of the contact area asked for is missing, or, of one that does not hold,
+    /// which share of the load that tilts it most is not held (0..1).
     pub by: Option<f64>,
     /// Where a body meets what stops it, part frame \[m\].
     pub place: Option<DVec3>,

@@ -315,15 +315,22 @@ impl Plan {
         let (complete, checkpoint) = (found.complete, found.checkpoint.clone());
         let lost = found.collector.take_lost();
         let misses = self.misses(proposer, &lost);
+        let none = complete && found.collector.is_empty();
+        let nearest = none.then(|| self.nearest_lost(proposer, &lost)).flatten();
         let (set, shown) = self.finish(proposer, assessor, found, lost)?;
         if complete && set.grips.is_empty() {
             let rejections = &set.summary.rejections;
             let tally = proposer.tally();
             let causes = cause::causes(&self.part, &self.gripper, &self.propose, tally, rejections);
             causes.iter().for_each(|cause| observer.note(cause));
+            nearest.iter().for_each(|text| observer.note(text));
             if let Some(cause) = cause::overpowered(&self.loads, self.settings.force, rejections) {
                 observer.note(&cause);
             }
+        }
+        let asked = self.request.selection.ids.as_deref().unwrap_or_default();
+        if complete && let Some(text) = cause::no_grips(asked, &set) {
+            observer.warning(&text);
         }
         let written = self.write(&set, complete, &misses)?;
         Ok(Outcome { set, shown, checkpoint, written })

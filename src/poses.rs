@@ -10,6 +10,10 @@ use crate::export::{Convention, Format, Origin, Stated};
 use crate::file::guarded;
 use crate::gripper::Gripper;
 use crate::model::Frame;
+use crate::part::Part;
+
+/// Poses farther away than so many sizes of the part and so many metres hardly belong to it.
+const FAR: [f64; 2] = [5.0, 1.0];
 
 /// A pose of the gripper on the part.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,7 +75,7 @@ pub fn read(path: &Path, options: &Options, gripper: &Gripper) -> Result<Vec<Pos
     let bytes = || crate::file::read(path);
     let found = match format {
         Format::Json | Format::JsonLines => return formats::native(&place, &bytes()?),
-        Format::Csv => formats::csv(&place, &bytes()?),
+        Format::Csv | Format::Robot => formats::csv(&place, &bytes()?),
         Format::Parquet => guarded(&place, || formats::parquet(&place, path)),
         Format::IsaacGrasp => formats::isaac(&place, &bytes()?),
         Format::MoveIt => formats::moveit(&place, &bytes()?),
@@ -81,11 +85,12 @@ pub fn read(path: &Path, options: &Options, gripper: &Gripper) -> Result<Vec<Pos
             let bytes = bytes()?;
             guarded(&place, || formats::acronym(&place, bytes))
         }
-        Format::Glb | Format::Usd | Format::Intrinsic | Format::Robot => {
+        Format::Glb | Format::Usd | Format::Intrinsic => {
             return Err(Error::input(
                 place,
                 "poses are not read from this format",
-                "give CSV, Parquet, isaac_grasp, moveit, graspgen, graspnet, acronym, or a result file",
+                "give CSV (also of a robot), Parquet, isaac_grasp, moveit, graspgen, graspnet, acronym, \
+                 or a result file",
             ));
         }
     };
@@ -102,6 +107,23 @@ pub fn read(path: &Path, options: &Options, gripper: &Gripper) -> Result<Vec<Pos
         gap: raw.gap,
     };
     Ok(raw.into_iter().map(pose).collect())
+}
+
+/// A warning where most poses lie so far from the part that their unit or frame is another one.
+pub fn doubt(poses: &[Pose], part: &Part) -> Option<String> {
+    let (low, high) = part.mesh.bounding_box();
+    let (middle, size) = ((low + high) / 2.0, (high - low).length());
+    let mut far: Vec<f64> =
+        poses.iter().map(|pose| pose.part_from_tool.origin.distance(middle)).collect();
+    far.sort_by(f64::total_cmp);
+    let typical = *far.get(far.len() / 2)?;
+    (typical > FAR[0] * size + FAR[1]).then(|| {
+        format!(
+            "the poses lie {typical:.1} m away from a part that measures {size:.3} m: lengths are \
+             read in metres (in millimetres where a table's columns are named x_mm, y_mm, z_mm), in \
+             the part's frame"
+        )
+    })
 }
 
 /// Every convention that an export can have.

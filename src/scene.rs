@@ -166,7 +166,7 @@ struct ConeTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RobotTable {
-    base: [String; 3],
+    base: Option<[String; 3]>,
     reach: [String; 2],
 }
 
@@ -263,8 +263,9 @@ impl Scene {
                 let [least, most] = [0, 1].map(|index| {
                     positive(&field("robot.reach"), Quantity::Length, &robot.reach[index])
                 });
+                let base = robot.base.as_ref().map(|base| vector(&field("robot.base"), base));
                 let reach = Reach {
-                    base: vector(&field("robot.base"), &robot.base)?,
+                    base: base.transpose()?.unwrap_or(DVec3::ZERO),
                     least: least?,
                     most: most?,
                 };

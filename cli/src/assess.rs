@@ -25,7 +25,7 @@ const LISTED: usize = 50;
     after_help = "EXAMPLES:\n  gripfast assess bracket.stl --poses taught.csv --gripper robotiq-2f85 --mass 350g\n  \
 gripfast assess bracket.stl --poses grasps.h5 --origin 103.4mm --gripper franka-hand --mass 350g --accel 2g -o good.json\n  \
 gripfast assess bracket.stl --poses lab.isaac_grasp.yaml --origin flange --gripper generic --mass 350g --json\n\n\
-FILES: CSV or Parquet (columns x_m, y_m, z_m, qx, qy, qz, qw; id), isaac_grasp, moveit, graspgen, graspnet (.npz, .npy), acronym, or a \
+FILES: CSV or Parquet (columns x_m, y_m, z_m or x_mm, y_mm, z_mm; qx, qy, qz, qw or the angles of a robot; id), isaac_grasp, moveit, graspgen, graspnet (.npz, .npy), acronym, or a \
 result file of gripfast. Axes and origin are those that exports of the format hold (docs/formats.md), or as the file itself or \
 --convention and --origin say. Everything else is asked as of `gripfast plan`.\n\nEXIT CODES:\n  0  at least one pose is a grip    1  none is    2  bad input or usage"
 )]
@@ -71,6 +71,9 @@ pub(crate) fn run(args: AssessArgs) -> anyhow::Result<ExitCode> {
         terminal::say(&format!("warning: {}", crate::flags::warning(text)));
     }
     let list = poses::read(&args.poses, &options, plan.gripper())?;
+    if let Some(text) = poses::doubt(&list, plan.part()) {
+        terminal::say(&format!("warning: {text}"));
+    }
     let assessment = plan.assess(&list, turn)?;
     if as_json {
         let mut out = std::io::stdout().lock();
@@ -83,6 +86,15 @@ pub(crate) fn run(args: AssessArgs) -> anyhow::Result<ExitCode> {
         writeln!(out)?;
     } else {
         print(&mut terminal::output(), &assessment.poses, &assessment.set)?;
+        let strange = assessment.poses.iter().all(|pose| pose.fit.is_err());
+        if let Some(one) = list.first().filter(|_| strange && !quiet) {
+            terminal::say(&format!(
+                "no pose has faces between its pads: the poses were read with {}, origin {} \
+                 (--convention, --origin)",
+                one.convention.axes(),
+                one.origin
+            ));
+        }
     }
     if let Some(path) = &output {
         plan.save(&assessment.set)?;
@@ -147,7 +159,7 @@ fn print(out: &mut impl Write, poses: &[Assessed], set: &GripSet) -> anyhow::Res
     for pose in poses {
         // Without the numbers.
         let word = pose.verdict(set);
-        let word = word.split(": the nearest").next().unwrap_or_default().to_owned();
+        let word = word.split(": the ").next().unwrap_or_default().to_owned();
         *counts.entry(word).or_default() += 1;
     }
     let counts: Vec<String> =

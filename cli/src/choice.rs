@@ -9,7 +9,7 @@ use gripfast::request::Cone;
 #[command(next_help_heading = "Choice of grips")]
 pub(crate) struct ChoiceArgs {
     /// Only these grips, by their ids, e.g. 3,17.
-    #[arg(long, value_delimiter = ',', value_name = "IDS")]
+    #[arg(long, value_delimiter = ',', value_name = "IDS", value_parser = crate::plan::id)]
     ids: Option<Vec<u64>>,
     /// Only grips both of whose faces are among these, e.g. 2,3.
     #[arg(long, value_delimiter = ',', value_name = "FACES")]

@@ -92,13 +92,28 @@ impl Asker {
             anyhow::bail!(Error::input(
                 flag,
                 format!("{question}: not given, and there is no terminal to ask on"),
-                format!("give it, e.g. {flag} {example}")
+                format!("give it, e.g. {flag} {}", quoted(example))
             ));
         };
         terminal::say(&format!("{question}, e.g. {example}:"));
         let mut line = String::new();
         input.read_line(&mut line).context("the answer")?;
         Ok(line.trim().to_owned())
+    }
+
+    /// The friction of the pads, which may stay open.
+    fn friction(&mut self) -> anyhow::Result<Option<f64>> {
+        let Some(input) = &mut self.input else { return Ok(None) };
+        terminal::say("friction of the pads on the part, e.g. 0.5 (nothing: not known):");
+        let mut line = String::new();
+        input.read_line(&mut line).context("the answer")?;
+        match line.trim() {
+            "" => Ok(None),
+            text => text.parse().map(Some).map_err(|_| {
+                let remedy = "give a number without a unit, e.g. 0.5";
+                Error::input("--friction", format!("'{text}' is no number"), remedy).into()
+            }),
+        }
     }
 
     /// So many values of a quantity.
@@ -133,6 +148,11 @@ impl Asker {
     }
 }
 
+/// A value as a shell takes it for one word.
+fn quoted(text: &str) -> String {
+    if text.contains(' ') { format!("\"{text}\"") } else { text.to_owned() }
+}
+
 /// Runs the subcommand.
 pub(crate) fn run(args: NewArgs) -> anyhow::Result<()> {
     if args.file.exists() && !args.overwrite {
@@ -150,11 +170,12 @@ pub(crate) fn run(args: NewArgs) -> anyhow::Result<()> {
     let finger = asker.values::<3>(args.finger, FINGER, Quantity::Length)?;
     let [throat] = asker.values::<1>(args.throat, THROAT, Quantity::Length)?;
     let palm = asker.values::<3>(args.palm, PALM, Quantity::Length)?;
+    let friction = args.friction.map_or_else(|| asker.friction(), |friction| Ok(Some(friction)))?;
     let mm = |value: f64| format!("{}mm", gripfast::units::decimal(value * 1e3, 4));
     // The finger's tip is flush with the pad's front edge.
     let finger_at = pad[0] / 2.0 - finger[0] / 2.0;
     let front = -pad[0] / 2.0 - throat;
-    let friction = match args.friction {
+    let friction = match friction {
         Some(friction) => {
             format!("friction = {friction}                      # of the pads on the part\n")
         }

@@ -122,13 +122,13 @@ fn version() -> &'static str {
 fn parse(line: Vec<std::ffi::OsString>) -> Cli {
     let mut command = command();
     let matches =
-        command.try_get_matches_from_mut(line).unwrap_or_else(|error| plain(error).exit());
+        command.try_get_matches_from_mut(&line).unwrap_or_else(|error| plain(error, &line).exit());
     Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut command).exit())
 }
 
 /// An error of the command line with advice that helps: a value that begins with a dash is joined to
 /// its flag, a file is no subcommand, and a gripper or a scene comes from somewhere.
-fn plain(mut error: clap::Error) -> clap::Error {
+fn plain(mut error: clap::Error, line: &[std::ffi::OsString]) -> clap::Error {
     use clap::error::{ContextKind, ContextValue, ErrorKind};
     let text = |error: &clap::Error, kind| match error.get(kind) {
         Some(ContextValue::String(text)) => text.clone(),
@@ -142,7 +142,7 @@ fn plain(mut error: clap::Error) -> clap::Error {
             });
             error.remove(ContextKind::Suggested);
             match value {
-                true => "join a value that begins with a dash to its flag, e.g. --mass=-350g",
+                true => joined(&argument, line),
                 false => return error,
             }
         }
@@ -153,6 +153,7 @@ fn plain(mut error: clap::Error) -> clap::Error {
             error.remove(ContextKind::SuggestedSubcommand);
             "say what to do with this file, e.g. gripfast plan PART --gripper generic --mass 350g, \
              or gripfast part PART"
+                .to_owned()
         }
         ErrorKind::MissingRequiredArgument => {
             let missing = match error.get(ContextKind::InvalidArg) {
@@ -163,8 +164,10 @@ fn plain(mut error: clap::Error) -> clap::Error {
             if lacks("--gripper") {
                 "gripfast gripper list names the grippers that come with it, e.g. --gripper generic; \
                  gripfast gripper new FILE describes your own"
+                    .to_owned()
             } else if lacks("--scene") {
                 "a scene file says where the part lies and what stands around it: see docs/formats.md"
+                    .to_owned()
             } else {
                 return error;
             }
@@ -174,6 +177,16 @@ fn plain(mut error: clap::Error) -> clap::Error {
     let advice = clap::builder::StyledStr::from(advice);
     error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice]));
     error
+}
+
+/// How the value that was taken for the flag `argument` is joined to the flag before it.
+fn joined(argument: &str, line: &[std::ffi::OsString]) -> String {
+    let words: Vec<_> = line.iter().map(|word| word.to_string_lossy()).collect();
+    let own = words.windows(2).find(|pair| {
+        pair[0].starts_with("--") && !pair[0].contains('=') && pair[1].starts_with(argument)
+    });
+    let example = own.map_or("--mass=-350g".to_owned(), |pair| format!("{}={}", pair[0], pair[1]));
+    format!("join a value that begins with a dash to its flag, e.g. {example}")
 }
 
 /// Parses the command line and runs the subcommand.

@@ -20,7 +20,7 @@ use super::why;
 use crate::terminal;
 use watch::Watch;
 
-pub(crate) use flags::{Args, JobArgs, share, with_defaults};
+pub(crate) use flags::{Args, JobArgs, id, share, with_defaults};
 pub(crate) use watch::Interrupt;
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {

@@ -240,7 +240,7 @@ fn print_curved(
         None => writeln!(out, "no answer: {}", reason(score.status))?,
     }
     if let Some(slip) = score.slip {
-        print_slip(out, slip)?;
+        print_slip(out, as_good_as(slip, score))?;
     }
     let mm = 1e3;
     if let Some(faces) = answer.faces {
@@ -319,6 +319,18 @@ fn print_curved(
     Ok(())
 }
 
+/// A turn about a centre beyond a million sizes of the contact is a slide: rounding alone turns it.
+fn as_good_as(slip: Slip, score: &Score) -> Slip {
+    let far = 1e6 * score.contact_area_i.max(score.contact_area_ii).sqrt();
+    match slip {
+        Slip::Rotation { c: [x, y], sense } if x.hypot(y) > far => {
+            let (size, sense) = (x.hypot(y), f64::from(sense));
+            Slip::Translation { direction: [sense * y / size, -sense * x / size] }
+        }
+        slip => slip,
+    }
+}
+
 /// The incipient motion in words.
 fn print_slip(out: &mut impl Write, slip: Slip) -> anyhow::Result<()> {
     let mm = 1e3;
@@ -375,7 +387,7 @@ fn print(
         None => writeln!(out, "no answer: {}", reason(score.status))?,
     }
     if let Some(slip) = score.slip {
-        print_slip(out, slip)?;
+        print_slip(out, as_good_as(slip, score))?;
     }
     if let Some(p) = score.pressure {
         let per_mm = 1e-3;

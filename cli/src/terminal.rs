@@ -15,6 +15,15 @@ pub(crate) fn answer(data: bool) -> Box<dyn Write> {
     if data { Box::new(std::io::stdout().lock()) } else { Box::new(output()) }
 }
 
+/// Signs in a line of the terminal that standard output goes to, where it is one. Some terminals
+/// report no width, or one in which nothing can be read.
+pub(crate) fn width() -> Option<usize> {
+    /// Narrower ones are not believed, and this is taken instead.
+    const BELIEVED: [usize; 2] = [40, 80];
+    let width = usize::from(comfy_table::Table::new().width()?);
+    Some(if width < BELIEVED[0] { BELIEVED[1] } else { width })
+}
+
 /// A line on standard error. Where that cannot be written there is no one to tell.
 pub(crate) fn say(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{}", shown_lines(text));

@@ -7,6 +7,9 @@ use super::table::{Column, Table, Values, positive};
 use crate::error::{Error, Result};
 use crate::results::RankedGrip;
 
+/// Largest departure of a quaternion's length from 1 that is taken for rounding.
+const UNIT: f64 = 1e-3;
+
 /// Whose angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Dialect {
@@ -65,6 +68,28 @@ impl Dialect {
             }
         }
     }
+    /// The rotation that angles of this dialect stand for, in the order of [`Dialect::columns`];
+    /// nothing where they are not as many or make none.
+    pub fn rotation(self, angles: &[f64]) -> Option<DMat3> {
+        let quaternion = |xyzw| {
+            let quaternion = DQuat::from_array(xyzw);
+            let unit = (quaternion.length() - 1.0).abs() < UNIT;
+            unit.then(|| DMat3::from_quat(quaternion.normalize()))
+        };
+        let turns = |[a, b, c]: [f64; 3]| {
+            let [a, b, c] = [a, b, c].map(f64::to_radians);
+            DMat3::from_rotation_z(a) * DMat3::from_rotation_y(b) * DMat3::from_rotation_x(c)
+        };
+        let rotation = match (self, angles) {
+            (Self::Ur, &[x, y, z]) => {
+                Some(DMat3::from_quat(DQuat::from_scaled_axis(glam::DVec3::new(x, y, z))))
+            }
+            (Self::Kuka, &[a, b, c]) | (Self::Fanuc, &[c, b, a]) => Some(turns([a, b, c])),
+            (Self::Abb, &[w, x, y, z]) => quaternion([x, y, z, w]),
+            _ => None,
+        };
+        rotation.filter(DMat3::is_finite)
+    }
 }
 
 /// The turns `[about z, about the new y, about the new x]` \[rad\] that make a rotation; where the
@@ -110,6 +135,12 @@ pub(super) fn table(view: &View<'_>) -> Table {
         numbers("jaw_gap_mm", &|grip| Some(view.gap(grip) * 1e3)),
         numbers("opened_gap_mm", &|grip| Some(view.opened(grip) * 1e3)),
         numbers("mu_s", &|grip| grip.worst.mu_s),
+        Column {
+            name: "verdict",
+            values: Values::Text(
+                grips.iter().map(|grip| view.verdict(grip).name().to_owned()).collect(),
+            ),
+        },
         text("part_file", &view.set.part.file),
         text("gripper_name", view.name()),
         text("tool_frame", &view.tool_frame()),
@@ -160,7 +191,12 @@ mod tests {
             // Of half a turn it is zero but for rounding, on either side.
             assert!(q1 >= -1e-9);
             same(DMat3::from_quat(DQuat::from_xyzw(q2, q3, q4, q1)), "abb");
+            for (dialect, name) in Dialect::ALL {
+                same(dialect.rotation(&dialect.angles(&rotation)).unwrap(), name);
+            }
         }
+        assert_eq!(Dialect::Abb.rotation(&[0.0; 4]), None);
+        assert_eq!(Dialect::Ur.rotation(&[f64::NAN, 0.0, 0.0]), None);
         assert!(Dialect::parse("dialect", "KUKA").is_ok());
         assert!(Dialect::parse("dialect", "denso").unwrap_err().to_string().contains("fanuc"));
     }

@@ -20,7 +20,9 @@ pub(super) fn write(
 ) -> std::io::Result<()> {
     let grips = view.grips();
     writeln!(writer, "#usda 1.0\n(\n    defaultPrim = \"part\"\n    metersPerUnit = 1")?;
-    writeln!(writer, "    upAxis = \"Z\"\n    doc = {}\n)\n", string(&view.tool_frame()))?;
+    let warnings = view.warnings().map(|text| format!("; warning: {text}"));
+    let doc = view.tool_frame() + &warnings.collect::<String>();
+    writeln!(writer, "    upAxis = \"Z\"\n    doc = {}\n)\n", string(&doc))?;
     writeln!(writer, "def Xform \"part\" (\n    kind = \"component\"\n)\n{{")?;
     text(writer, 1, "gripfast:part_file", &view.set.part.file)?;
     text(writer, 1, "gripfast:gripper", view.name())?;

@@ -93,8 +93,10 @@ impl Hand {
             let at = model.positions(&drives, t);
             model.place(palm_link, &at).inverse().compose(&model.place(link, &at))
         };
-        let groups = links.map(|link| model.rigid(link, true));
-        let points = [0, 1].map(|jaw: usize| model.points(links[jaw], &groups[jaw]));
+        // The pads are those of the named link; the finger is all that moves with it.
+        let pads = links.map(|link| model.rigid(link, true));
+        let groups = links.map(|link| model.finger(link, palm_link));
+        let points = [0, 1].map(|jaw: usize| model.points(links[jaw], &pads[jaw]));
         let mut notes = model.notes();
         for (jaw, points) in points.iter().enumerate() {
             if points.iter().all(|(_, list)| list.is_empty()) {
@@ -105,11 +107,7 @@ impl Hand {
             }
         }
         let axes = axes(model, &place, links, &points)?;
-        let turned = links.map(|link| {
-            let [from, to] = [0.0, 1.0].map(|t| place(link, t).rotation);
-            let turn = from.transpose() * to;
-            ((turn.x_axis.x + turn.y_axis.y + turn.z_axis.z - 1.0) / 2.0).clamp(-1.0, 1.0).acos()
-        });
+        let turned = links.map(|link| turned(place(link, 0.0), place(link, 1.0)));
         if turned[0].max(turned[1]) > PARALLEL {
             notes.push(format!(
                 "the jaws turn by up to {:.1} deg while they close: gripfast takes pads as parallel; keep the stroke to where they are",
@@ -196,10 +194,13 @@ impl Hand {
             let to_grip = |point: &DVec3| {
                 (axes.transpose() * frame.point(*point)) - origin.with_z(faces[jaw])
             };
-            blocks(&points[jaw], to_grip, "box round a shape of this link")
+            let whole = model.points(links[jaw], &groups[jaw]);
+            blocks(&whole, to_grip, "box round a shape of this link")
         });
         let mut palm = Vec::new();
-        let fixed = model.rigid(palm_link, false);
+        let mut fixed = model.rigid(palm_link, false);
+        // A fixed jaw is a finger, and not the palm as well.
+        fixed.retain(|link| !groups.iter().any(|group| group.contains(link)));
         for (name, list) in model.points(palm_link, &fixed) {
             let to_grip = |point: &DVec3| axes.transpose() * *point - origin;
             palm.extend(blocks(&[(name, list)], to_grip, "box round a shape of this link"));
@@ -244,6 +245,12 @@ impl Hand {
     }
 }
 
+/// The angle between two frames \[rad\].
+fn turned(from: Frame, to: Frame) -> f64 {
+    let turn = from.rotation.transpose() * to.rotation;
+    ((turn.x_axis.x + turn.y_axis.y + turn.z_axis.z - 1.0) / 2.0).clamp(-1.0, 1.0).acos()
+}
+
 /// Axes of the grip as columns in the palm link's frame: approach, across, closing.
 fn axes(
     model: &Model,
@@ -255,10 +262,23 @@ fn axes(
     let way = apart(1.0) - apart(0.0);
     let Some(mut closing) = Some(way).filter(|way| way.length() > NONE).map(DVec3::normalize)
     else {
-        return Err(model.wrong(
-            "the two links do not move towards each other",
-            "name the links that touch the part, one of each jaw",
-        ));
+        let turns = [0, 1].map(|jaw: usize| turned(place(links[jaw], 0.0), place(links[jaw], 1.0)));
+        return Err(match turns.iter().position(|&turn| turn > PARALLEL) {
+            Some(jaw) => model.wrong(
+                format!(
+                    "'{}' turns by {:.0} deg about a joint of its own: a jaw whose pad does not stay \
+                     parallel cannot be described",
+                    model.name(links[jaw]),
+                    turns[jaw].to_degrees()
+                ),
+                "describe the gripper by hand as it stands at the width that you grip: \
+                 `gripfast gripper new`",
+            ),
+            None => model.wrong(
+                "the two links do not move towards each other",
+                "name the links that touch the part, one of each jaw",
+            ),
+        });
     };
     let middle = |jaw: usize| {
         let frame = place(links[jaw], 0.5);

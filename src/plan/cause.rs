@@ -7,7 +7,7 @@ use crate::model::Status;
 use crate::part::{CurvedFace, Part, Shape};
 use crate::propose::{ProposeOptions, Tally};
 use crate::rank;
-use crate::results::LoadCase;
+use crate::results::{GripSet, LoadCase};
 
 /// Round faces that are spoken of, the largest ones.
 const MOST_ROUND: usize = 3;
@@ -15,6 +15,25 @@ const MOST_ROUND: usize = 3;
 const SAME_WIDTH: f64 = 1e-5;
 /// An arc that covers less has no two sides opposite each other \[rad\].
 const HALF_TURN: f64 = 3.1;
+
+/// Which of the ids asked for are none of the grips found, where all of these are known.
+pub(super) fn no_grips(asked: &[u64], set: &GripSet) -> Option<String> {
+    if set.grips.len() as u64 != set.summary.ranked {
+        return None;
+    }
+    let found = |id: &u64| {
+        set.grips.iter().any(|one| one.grip.id == *id || one.merged.iter().any(|other| other == id))
+    };
+    let missing: Vec<String> =
+        asked.iter().filter(|id| !found(id)).map(ToString::to_string).collect();
+    (!missing.is_empty()).then(|| {
+        format!(
+            "of the ids asked for, no grip is {}: rejected for one of the reasons counted, or not a \
+             number of this search (part, gripper and options of the places decide them)",
+            missing.join(", ")
+        )
+    })
+}
 
 /// What kept each of the part's opposite and round faces from being gripped, a sentence each.
 pub(super) fn causes(

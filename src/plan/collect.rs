@@ -112,6 +112,11 @@ impl Collector {
         std::mem::take(&mut self.lost)
     }
 
+    /// Whether no grip that was added has a limit state.
+    pub fn is_empty(&self) -> bool {
+        self.ranked == 0
+    }
+
     /// Counts grips of a chunk that were left unsolved because they cannot be among the best.
     pub fn outrank(&mut self, grips: u64) {
         if grips > 0 {

@@ -3,23 +3,63 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::Plan;
 use super::outside::of_run;
 use crate::error::Result;
-use crate::model::{Miss, Negative};
+use crate::load::wrench_in_grip;
+use crate::mechanics::inverse::load_multiple;
+use crate::mechanics::twist_out::TwistOut;
+use crate::mechanics::{Options, Pads};
+use crate::model::{LoadCase, Miss, Negative};
 use crate::part::Part;
 use crate::propose::Proposer;
 use crate::results::GripSet;
 
 /// Rejected candidates of each reason that a page shows, at most.
 const SHOWN: usize = 60;
+/// Grips that do not hold of each reason that are looked at where none holds.
+const TOLD: usize = 20;
+/// Friction of pads of which none is stated: the most that a gripper file may state.
+const MOST_FRICTION: f64 = 10.0;
+/// A pose found again on its faces is off by rounding only \[rad\].
+const SAME: f64 = 1e-6;
 
 impl Plan {
     /// Grips that do not hold to keep of each reason, for the result file and for the page.
     pub(super) fn sample(&self) -> usize {
-        let page = if self.request.output.report.is_some() { SHOWN } else { 0 };
+        let page = if self.request.output.report.is_some() { SHOWN } else { TOLD };
         self.request.selection.negatives.max(page)
+    }
+
+    /// How much of the load is held at best where every place loses it, in words; of those that
+    /// `lost` has.
+    pub(super) fn nearest_lost(
+        &self,
+        proposer: &Proposer<'_>,
+        lost: &BTreeMap<String, Vec<Negative>>,
+    ) -> Option<String> {
+        let poses: Vec<&Negative> =
+            lost.values().flat_map(|list| list.iter().take(SHOWN)).collect();
+        let misses = self.run(proposer).lost(&poses);
+        let best = misses.iter().filter_map(|miss| miss.by).min_by(f64::total_cmp)?;
+        Some(format!(
+            "of the load that tilts it most the best of {} such places holds {:.0} % at {} N per jaw",
+            poses.len(),
+            (1.0 - best) * 100.0,
+            self.settings.force
+        ))
+    }
+
+    fn run<'a>(&'a self, proposer: &'a Proposer<'a>) -> Run<'a> {
+        Run {
+            proposer,
+            loads: &self.loads,
+            centre_of_mass: self.mass.centre_of_mass,
+            force: self.settings.force,
+            friction: self.settings.pads.value,
+        }
     }
 
     /// The rejected candidates that the page shows, where the request asks for one. `lost`: grips
@@ -33,8 +73,8 @@ impl Plan {
             return Vec::new();
         }
         let mut misses = proposer.misses(SHOWN);
-        let lost = lost.values().flat_map(|list| list.iter().take(SHOWN));
-        misses.extend(lost.map(|pose| lost_grip(pose, self.mass.centre_of_mass)));
+        let lost: Vec<&Negative> = lost.values().flat_map(|list| list.iter().take(SHOWN)).collect();
+        misses.extend(self.run(proposer).lost(&lost));
         misses
     }
 
@@ -68,17 +108,67 @@ impl Plan {
 /// cannot be read.
 pub fn near_misses(set: &GripSet, part: &Part) -> Result<Vec<Miss>> {
     let (part, gripper, options) = of_run(set, part)?;
-    let mut misses = Proposer::new(&part, &gripper, &options)?.misses(SHOWN);
+    let proposer = Proposer::new(&part, &gripper, &options)?;
+    let mut misses = proposer.misses(SHOWN);
     let proposed: Vec<String> = misses.iter().map(|miss| miss.pose.reason.clone()).collect();
-    let others = set.negatives.iter().filter(|pose| !proposed.contains(&pose.reason));
-    misses.extend(others.map(|pose| lost_grip(pose, set.part.mass.centre_of_mass)));
+    let others: Vec<&Negative> =
+        set.negatives.iter().filter(|pose| !proposed.contains(&pose.reason)).collect();
+    let run = Run {
+        proposer: &proposer,
+        loads: &set.loads,
+        centre_of_mass: set.part.mass.centre_of_mass,
+        force: set.provenance.resolved.force.0,
+        friction: set.pads().value,
+    };
+    misses.extend(run.lost(&others));
     Ok(misses)
 }
 
-/// A grip that does not hold.
-fn lost_grip(pose: &Negative, centre_of_mass: DVec3) -> Miss {
-    let away = pose.part_from_grip.origin.distance(centre_of_mass);
-    Miss::new(pose.clone(), Some(away), None)
+/// What decides whether a grip holds.
+struct Run<'a> {
+    proposer: &'a Proposer<'a>,
+    loads: &'a [LoadCase],
+    centre_of_mass: DVec3,
+    force: f64,
+    friction: Option<f64>,
+}
+
+impl Run<'_> {
+    /// Grips that do not hold.
+    fn lost(&self, poses: &[&Negative]) -> Vec<Miss> {
+        let miss = |pose: &&Negative| Miss::new((*pose).clone(), self.not_held(pose), None);
+        poses.par_iter().map(miss).collect()
+    }
+
+    /// The share of a load that a grip does not hold, of the load that tilts the part most. Of
+    /// contacts that are not plane nobody asks: the answer takes long.
+    fn not_held(&self, pose: &Negative) -> Option<f64> {
+        let fit = self.proposer.fit(&pose.part_from_grip, SAME).ok()?;
+        let grip = self.proposer.grip_at(&fit, pose.id);
+        if grip.surfaces.is_some() {
+            return None;
+        }
+        let (pads, lever) = (Pads::new(&grip.contact)?, TwistOut::new(&grip.contact));
+        let wrench = |load: &LoadCase| {
+            wrench_in_grip(&load.wrench, self.centre_of_mass, &grip.part_from_grip)
+        };
+        let (_, worst) = self
+            .loads
+            .iter()
+            .map(wrench)
+            .map(|wrench| (lever.margin(self.force, &wrench), wrench))
+            .min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let friction = self.friction.filter(|value| *value > 0.0).unwrap_or(MOST_FRICTION);
+        let held = load_multiple(
+            &pads,
+            grip.distance(),
+            self.force,
+            &worst,
+            friction,
+            &Options::default(),
+        );
+        Some((1.0 - held).max(0.0))
+    }
 }
 
 /// The first ones of each list, `count` in all, as evenly as the lengths of the lists allow.

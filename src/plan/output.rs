@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::{Assessor, Plan, Settings};
 use crate::backend::{Backend, ScoreOptions, SeedSet};
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::{Error, Result};
 use crate::export::{self, Format};
 use crate::gripper::Gripper;
 use crate::model::Miss;
@@ -79,16 +79,7 @@ fn interrupted(path: &Path) -> PathBuf {
 
 /// Refuses a file whose folder is not there now rather than after the search; `place` names it.
 pub(super) fn folder(path: &Path, place: String, option: &'static str) -> Result<()> {
-    match path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
-        None => Ok(()),
-        Some(folder) => Err(Error::new(
-            ErrorKind::NotFound,
-            place,
-            format!("the folder '{}' is not there", folder.display()),
-            "make it first",
-        )
-        .with_options(&[option])),
-    }
+    crate::file::folder_of(path, &place).map_err(|error| error.with_options(&[option]))
 }
 
 /// The format of a result file by its ending, refused now rather than after the search.

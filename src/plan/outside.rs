@@ -69,7 +69,15 @@ impl Assessed {
                     None => "free".into(),
                 }
             }
-            (.., Some(ranked)) => format!("{:?}", ranked.worst.status).to_lowercase(),
+            (.., Some(ranked)) => {
+                let name = rank::status_name(ranked.worst.status).replace('_', " ");
+                match ranked.load_multiple {
+                    Some(held) if held < 1.0 => {
+                        format!("{name}: the worst load is held to {:.0} %", held * 100.0)
+                    }
+                    _ => name,
+                }
+            }
             _ => "no contact".into(),
         }
     }

@@ -13,6 +13,7 @@ use crate::part::{MassProperties, Part, ReadOptions};
 use crate::propose::ProposeOptions;
 use crate::request::{Polish, Request};
 use crate::results::LoadCase;
+use crate::units::Unit;
 
 /// Density at which a part is taken where no load depends on its mass [kg/m^3].
 const ANY_DENSITY: f64 = 1000.0;
@@ -221,22 +222,41 @@ fn checked(loads: Vec<LoadCase>) -> Result<Vec<LoadCase>> {
 /// foams some 10.
 const DENSITIES: [f64; 2] = [10.0, 23_000.0];
 
+/// Densities of what parts are mostly made of, and the middle of these [kg/m^3].
+const USUAL: [f64; 3] = [500.0, 2700.0, 20_000.0];
+
+/// The unit in which the file's numbers make a part of a usual density, and that density [kg/m^3];
+/// `unit_m`: the one in which they were read.
+fn likely_unit(density: f64, unit_m: f64) -> Option<(Unit, f64)> {
+    let off = |density: f64| (density / USUAL[1]).ln().abs();
+    Unit::ALL
+        .into_iter()
+        .filter(|unit| unit.metres() != unit_m)
+        .map(|unit| (unit, density * (unit_m / unit.metres()).powi(3)))
+        .filter(|&(_, density)| (USUAL[0]..=USUAL[2]).contains(&density))
+        .min_by(|a, b| off(a.1).total_cmp(&off(b.1)))
+}
+
 /// What is doubtful about mass and centre of mass.
 fn doubts(request: &Request, part: &Part, mass: &MassProperties) -> Vec<String> {
     let mut doubts = Vec::new();
     let density = mass.mass / mass.volume;
     let stated = request.mass.is_some() || request.density.is_some();
+    let unit = request.mass.and_then(|_| likely_unit(density, part.unit_m));
+    let remedy = unit.map_or(String::new(), |(unit, density)| {
+        format!("; the unit {unit} would give {:.1} g/cm3", density / 1e3)
+    });
     if stated && density > DENSITIES[1] {
         doubts.push(format!(
             "the part would be {:.*} g/cm3 dense, more than any metal: check its mass and the unit \
-             of its file",
+             of its file{remedy}",
             usize::from(density < 1e6),
             density / 1e3
         ));
     } else if stated && density < DENSITIES[0] {
         doubts.push(format!(
             "the part would be {density:.3} kg/m3 dense, less than any foam: check its mass and the \
-             unit of its file"
+             unit of its file{remedy}"
         ));
     }
     let (low, high) = part.mesh.bounding_box();

@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use super::{Pose, Raw};
 use crate::error::{Error, Result};
+use crate::export::Dialect;
 use crate::model::Frame;
 use crate::results::GripSet;
 
@@ -62,11 +63,17 @@ enum Cell {
     Text(String),
 }
 
-/// A table of poses by its columns: `x_m`, `y_m`, `z_m`, `qx`, `qy`, `qz`, `qw`, and, where there
-/// are, `id` or `name`, `jaw_gap_m`, `tool_frame`.
+/// A table of poses by its columns: place `x_m`, `y_m`, `z_m` or the same in `_mm`; orientation `qx`,
+/// `qy`, `qz`, `qw` or the angles of a robot; and, where there are, `id` or `name`, `jaw_gap_m` (or
+/// `_mm`), `tool_frame`.
 struct Columns {
     names: Vec<String>,
-    pose: [usize; 7],
+    /// Metres per unit of the lengths.
+    unit: f64,
+    place: [usize; 3],
+    turn: Vec<usize>,
+    /// Whose angles; nobody's where it is a quaternion, scalar part last.
+    dialect: Option<Dialect>,
     name: Option<usize>,
     gap: Option<usize>,
     words: Option<usize>,
@@ -75,15 +82,26 @@ struct Columns {
 impl Columns {
     fn new(place: &str, names: Vec<String>) -> Result<Self> {
         let column = |name: &str| names.iter().position(|known| known.trim() == name);
-        let needed = ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"]
-            .map(|name| column(name).ok_or_else(|| wrong(place, format!("has no column {name}"))));
-        let mut pose = [0; 7];
-        for (slot, found) in pose.iter_mut().zip(needed) {
-            *slot = found?;
+        let needed =
+            |name: &str| column(name).ok_or_else(|| wrong(place, format!("has no column {name}")));
+        let in_mm = ["x_mm", "y_mm", "z_mm"].into_iter().all(|name| column(name).is_some());
+        let (suffix, unit) = match in_mm && column("x_m").is_none() {
+            true => ("mm", 1e-3),
+            false => ("m", 1.0),
+        };
+        let mut at = [0; 3];
+        for (slot, axis) in at.iter_mut().zip(["x", "y", "z"]) {
+            *slot = needed(&format!("{axis}_{suffix}"))?;
         }
-        let (name, gap) = (column("id").or(column("name")), column("jaw_gap_m"));
+        let dialect = Dialect::ALL
+            .into_iter()
+            .map(|known| known.0)
+            .find(|dialect| column(dialect.columns()[0]).is_some() && column("qx").is_none());
+        let turn = dialect.map_or(&["qx", "qy", "qz", "qw"][..], Dialect::columns);
+        let turn = turn.iter().map(|name| needed(name)).collect::<Result<_>>()?;
+        let (name, gap) = (column("id").or(column("name")), column(&format!("jaw_gap_{suffix}")));
         let words = column("tool_frame");
-        Ok(Self { pose, name, gap, words, names })
+        Ok(Self { unit, place: at, turn, dialect, name, gap, words, names })
     }
 
     /// The pose of row `row`, and the frame that it states.
@@ -103,15 +121,24 @@ impl Columns {
             Cell::Number(number) => number.to_string(),
             Cell::Text(text) => text,
         };
-        let mut values = [0.0; 7];
-        for (value, column) in values.iter_mut().zip(self.pose) {
-            *value = number(column)?;
+        let mut origin = DVec3::ZERO;
+        for (axis, column) in self.place.into_iter().enumerate() {
+            origin[axis] = number(column)? * self.unit;
         }
-        let [x, y, z, quaternion @ ..] = values;
+        let turn = self.turn.iter().map(|&column| number(column)).collect::<Result<Vec<_>>>()?;
+        let frame = match (self.dialect, &turn[..]) {
+            (None, &[x, y, z, w]) => from_quaternion(place, [x, y, z, w], origin)?,
+            (dialect, angles) => {
+                let rotation = dialect.and_then(|dialect| dialect.rotation(angles));
+                let rotation = rotation.ok_or_else(|| wrong(place, "is not a rotation"))?;
+                frame(place, rotation, origin)?
+            }
+        };
+        let gap = self.gap.filter(|column| !text(*column).is_empty()).map(number).transpose()?;
         let raw = Raw {
             name: self.name.map_or_else(|| row.to_string(), text),
-            frame: from_quaternion(place, quaternion, DVec3::new(x, y, z))?,
-            gap: self.gap.filter(|column| !text(*column).is_empty()).map(number).transpose()?,
+            frame,
+            gap: gap.map(|gap| gap * self.unit),
         };
         Ok((raw, self.words.map(text)))
     }
@@ -337,7 +364,7 @@ pub(super) fn graspgen(place: &str, bytes: &[u8]) -> Result<Found> {
 
 /// GraspNet's rows of 17 numbers, alone (`.npy`) or as `grasps` (or the only array) of an archive.
 pub(super) fn graspnet(place: &str, bytes: Vec<u8>) -> Result<Found> {
-    let (mut rows, mut words) = (None, None);
+    let (mut rows, mut words, mut ids) = (None, None, Vec::new());
     if bytes.starts_with(b"\x93NUMPY") {
         rows = Some(npy(place, &bytes)?);
     } else {
@@ -348,16 +375,16 @@ pub(super) fn graspnet(place: &str, bytes: Vec<u8>) -> Result<Found> {
             let mut member = archive.by_index(index).map_err(failed)?;
             let name = member.name().trim_end_matches(".npy").to_owned();
             budget.room(place, member.size())?;
-            if !matches!(name.as_str(), "grasps" | "tool_frame" | "arr_0" | "preds") {
+            if !matches!(name.as_str(), "grasps" | "tool_frame" | "ids" | "arr_0" | "preds") {
                 continue;
             }
             let mut bytes = Vec::new();
             std::io::Read::read_to_end(&mut member, &mut bytes)
                 .map_err(|error| wrong(place, error.to_string()))?;
-            if name == "tool_frame" {
-                words = npy_text(&bytes);
-            } else {
-                rows = Some(npy(&format!("{place}, {name}"), &bytes)?);
+            match name.as_str() {
+                "tool_frame" => words = npy_text(&bytes),
+                "ids" => ids = npy_ids(&bytes),
+                _ => rows = Some(npy(&format!("{place}, {name}"), &bytes)?),
             }
         }
     }
@@ -366,7 +393,7 @@ pub(super) fn graspnet(place: &str, bytes: Vec<u8>) -> Result<Found> {
         let rotation = DMat3::from_cols_slice(&row[4..13]).transpose();
         let place = format!("{place}, row {index}");
         Ok(Raw {
-            name: index.to_string(),
+            name: ids.get(index).map_or_else(|| index.to_string(), u64::to_string),
             frame: frame(&place, rotation, DVec3::from_slice(&row[13..16]))?,
             gap: None,
         })
@@ -386,6 +413,14 @@ fn npy_parts(bytes: &[u8]) -> Option<(&str, &[u8])> {
         (u32::from_le_bytes(rest.get(..4)?.try_into().ok()?) as usize, rest.get(4..)?)
     };
     Some((std::str::from_utf8(rest.get(..length)?).ok()?, rest.get(length..)?))
+}
+
+/// Whole numbers from an array in NumPy's format; none where it holds others.
+fn npy_ids(bytes: &[u8]) -> Vec<u64> {
+    let whole = |header: &str| header.contains("<u8") || header.contains("<i8");
+    let data =
+        npy_parts(bytes).filter(|(header, _)| whole(header)).map_or(&[][..], |parts| parts.1);
+    data.as_chunks().0.iter().map(|&bytes| u64::from_le_bytes(bytes)).collect()
 }
 
 /// Rows of 17 numbers from an array in NumPy's format, in single or double precision.

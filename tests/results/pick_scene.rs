@@ -737,3 +737,14 @@ fn a_large_mesh_agrees_with_brute_force_and_with_any_number_of_threads() {
         .install(|| pick(&list, &blocked));
     assert_eq!(one, many);
 }
+
+#[test]
+fn a_robot_stands_at_the_origin_unless_its_base_is_given() {
+    let read = |text: &str| {
+        let reach = "[robot]\nreach = [\"100mm\", \"200mm\"]\n";
+        let scene = Scene::parse("scene", &format!("{reach}{text}"), std::path::Path::new(""));
+        scene.unwrap().reach.unwrap().base
+    };
+    assert_eq!(read(""), DVec3::ZERO);
+    assert_eq!(read("base = [\"0mm\", \"5mm\", \"0mm\"]"), DVec3::new(0.0, 5e-3, 0.0));
+}

@@ -4,14 +4,16 @@
 use std::sync::atomic::AtomicBool;
 
 use glam::{DMat3, DVec3};
-use gripfast::export::{self, Convention, Format, Options, Origin, Stated};
-use gripfast::model::Frame;
-use gripfast::plan::{Plan, Standing};
+use gripfast::export::{self, Convention, Dialect, Format, Options, Origin, Stated};
+use gripfast::load::wrench_in_grip;
+use gripfast::mechanics;
+use gripfast::model::{Frame, Wrench};
+use gripfast::plan::{Plan, Standing, near_misses};
 use gripfast::poses::{self, Pose};
 use gripfast::propose::{Misfit, Rejection};
 use gripfast::request::{Choice, Request};
-use gripfast::results::GripSet;
-use gripfast::units::{Angle, Density, Length};
+use gripfast::results::{GripSet, RankedGrip};
+use gripfast::units::{Angle, Density, Length, Mass};
 
 const TILT: f64 = 0.05;
 /// Grips that are exported and read back.
@@ -41,8 +43,7 @@ fn exports_read_back_are_the_same_grips() {
         assert!(set.grips.len() > 50);
         for (format, _, endings) in Format::ALL {
             // Those that are written only.
-            let unread =
-                matches!(format, Format::Glb | Format::Usd | Format::Intrinsic | Format::Robot);
+            let unread = matches!(format, Format::Glb | Format::Usd | Format::Intrinsic);
             if unread || export::check(format).is_err() {
                 continue;
             }
@@ -53,6 +54,12 @@ fn exports_read_back_are_the_same_grips() {
                 // What the file states about its frame is enough.
                 let list = poses::read(&path, &poses::Options::default(), plan.gripper()).unwrap();
                 assert_eq!(list.len(), TOP, "{format:?}");
+                let named = |(pose, ranked): (&Pose, &RankedGrip)| {
+                    pose.name.trim_start_matches("grasp_") == ranked.grip.id.to_string()
+                };
+                // ACRONYM's readers take poses by their places.
+                let all = list.iter().zip(&set.grips).all(named);
+                assert!(all || format == Format::Acronym, "{format:?}: {}", list[0].name);
                 let assessed = plan.assess(&list, TILT).unwrap();
                 for (pose, ranked) in assessed.poses.iter().zip(&set.grips) {
                     assert!(pose.is_grip(), "{format:?} {origin:?}: {pose:?}");
@@ -69,6 +76,34 @@ fn exports_read_back_are_the_same_grips() {
                 assert_eq!(assessed.set.summary.ranked, TOP as u64, "{format:?}");
             }
         }
+    }
+}
+
+/// Taught poses come as robots show them: millimetres, and angles of the maker.
+#[test]
+fn poses_of_every_robot_are_read_and_another_unit_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = plan("robotiq-2f85");
+    let set = found(&plan);
+    for (dialect, name) in Dialect::ALL {
+        let options = Options::default().with_dialect(dialect).with_top(Some(TOP));
+        let path = folder.path().join("taught.csv");
+        export::write(&set, Format::Robot, &path, &options, None).unwrap();
+        let list = poses::read(&path, &poses::Options::default(), plan.gripper()).unwrap();
+        assert_eq!(poses::doubt(&list, plan.part()), None);
+        let assessed = plan.assess(&list, TILT).unwrap();
+        for (pose, ranked) in assessed.poses.iter().zip(&set.grips) {
+            let again = pose.ranked.as_ref().unwrap();
+            let [one, two] = [again, ranked].map(|one| one.grip.part_from_grip.origin);
+            assert!(one.distance(two) < 1e-9 && pose.is_grip(), "{name}: {pose:?}");
+        }
+        // Millimetres in columns that promise metres.
+        let text = std::fs::read_to_string(&path).unwrap();
+        let wrong = folder.path().join("wrong.csv");
+        std::fs::write(&wrong, text.replace("x_mm,y_mm,z_mm", "x_m,y_m,z_m")).unwrap();
+        let list = poses::read(&wrong, &poses::Options::default(), plan.gripper()).unwrap();
+        let doubt = poses::doubt(&list, plan.part()).unwrap();
+        assert!(doubt.contains("x_mm"), "{doubt}");
     }
 }
 
@@ -171,4 +206,53 @@ fn files_that_hold_no_poses_are_refused_with_their_place() {
     let list = poses::read(&path, &options, plan.gripper()).unwrap();
     let message = plan.assess(&list, TILT).unwrap_err().to_string();
     assert!(message.contains("states no tool"), "{message}");
+}
+
+/// A load too heavy for the pads: told by the share of it that is held, which bisection over the
+/// load's size finds too.
+#[test]
+fn what_twists_out_is_told_by_the_share_of_the_load_that_is_held() {
+    let root = crate::support::root();
+    let mut request = Request::new(root.join("data/parts/t_slot_bar.stl"), "franka-hand");
+    request.mass = Some(Mass(6.0));
+    request.candidates.spacing = Some(Length(0.02));
+    request.candidates.angle_step = Angle(90_f64.to_radians());
+    request.scoring.backend = Choice::Cpu;
+    request.selection.negatives = 40;
+    let plan = Plan::new(request).unwrap();
+    let set = found(&plan);
+    let misses = near_misses(&set, plan.part()).unwrap();
+    let lost: Vec<_> = misses.iter().filter(|miss| miss.pose.reason == "twisted_out").collect();
+    assert!(lost.len() > 10, "{}", lost.len());
+    let friction = plan.gripper().pad_friction.unwrap();
+    let force = set.provenance.resolved.force.0;
+    for miss in lost.into_iter().step_by(3) {
+        let pose = Pose::of_grip("lost", miss.pose.part_from_grip);
+        let assessed = plan.assess(&[pose], TILT).unwrap();
+        let ranked = assessed.poses[0].ranked.clone().unwrap();
+        let word = assessed.poses[0].verdict(&assessed.set);
+        assert!(word.starts_with("twisted out: the worst load is held to "), "{word}");
+        let held = |wrench: &Wrench, share: f64| {
+            let scaled = Wrench { force: wrench.force * share, moment: wrench.moment * share };
+            let options = mechanics::Options::default();
+            let grip = &ranked.grip;
+            let score = mechanics::solve(&grip.contact, grip.width, force, &scaled, &options);
+            let score = score.unwrap();
+            score.status.holds() && score.mu_s.is_some_and(|mu| mu <= friction)
+        };
+        let shares = plan.loads().iter().map(|load| {
+            let centre = plan.mass().centre_of_mass;
+            let wrench = wrench_in_grip(&load.wrench, centre, &ranked.grip.part_from_grip);
+            let (mut low, mut high) = (0.0, 1.0);
+            for _ in 0..20 {
+                let middle = f64::midpoint(low, high);
+                if held(&wrench, middle) { low = middle } else { high = middle }
+            }
+            low
+        });
+        let told = 1.0 - miss.by.unwrap();
+        let shares: Vec<f64> = shares.collect();
+        let near = |share: &f64| (share - told).abs() < 1e-3;
+        assert!(told < 1.0 && shares.iter().any(near), "{told}: {shares:?}");
+    }
 }

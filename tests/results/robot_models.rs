@@ -6,7 +6,7 @@ use std::path::Path;
 
 use glam::{DMat3, DVec3};
 use gripfast::export::{self, Format, Joint, Options, Origin, Stated};
-use gripfast::gripper::{self, Gripper, Travel};
+use gripfast::gripper::{self, Gripper, Jaw, Travel};
 use gripfast::model::Frame;
 use serde_json::{Value, json};
 
@@ -176,5 +176,10 @@ fn a_gripper_imported_from_the_model_follows_it_too() {
     }
     let [pad, _] = imported.pad_sizes();
     assert!((pad - glam::DVec2::new(0.0375, 0.022)).length() < 1e-6, "{pad}");
+    // The inner finger carries the pad: a finger body, not one of the palm that stops every grip.
+    let finger = imported.bodies(Jaw::I).iter().find(|body| body.name == "left_inner_finger");
+    let [low, high] = finger.unwrap().bounds();
+    assert!(low.z > 0.0 && low.x > -0.04 && high.x < 0.04, "{low} {high}");
+    assert!(imported.palm.iter().all(|body| !body.name.contains("inner_finger")));
     assert!(imported.is_symmetric() && imported.sources.values().any(|source| !source.verified));
 }

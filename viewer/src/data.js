@@ -251,7 +251,8 @@ export class Report {
       const by = this.column.miss_by[k];
       const name = this.header.reasons[this.column.miss_reason[k]];
       const known = best.get(name);
-      if (known === undefined || by < this.column.miss_by[known]) best.set(name, k);
+      // Where no number says what is lacking, another one tells more.
+      if (known === undefined || by < this.column.miss_by[known] || (Number.isNaN(this.column.miss_by[known]) && by >= 0)) best.set(name, k);
     }
     return best;
   }

@@ -115,6 +115,7 @@ export function missWords(report, k) {
   const [kind, of] = name.split(':');
   const body = upper((of ?? '').replaceAll('_', ' '));
   const free = by > 0 ? `; about ${mm(by, 2)} beside it would be free` : '';
+  const force = asked.force ? ` at ${newtons(asked.force)}` : '';
   const missing = by < 1e-3 ? 'less than 0.1\u00a0%' : percent(by);
   const words = {
     face_pair_outside_stroke: () => `faces ${faces[0]} and ${faces[1]} are ${mm(width)} apart, ${mm(by, 2)} ${width > (gripper?.stroke[0] ?? 0) ? 'more' : 'less'} than the jaws reach`,
@@ -125,8 +126,8 @@ export function missWords(report, k) {
     ground: () => `${body} would reach ${mm(by, 2)} below the ground${at}`,
     part_interference: () => `${body} meets the part${at}${free}`,
     approach_blocked: () => `${body} meets the part on its way${at}${free}`,
-    twisted_out: () => `the one nearest to the centre of mass, ${mm(by, 2)} away, twists out all the same${asked.force ? ` at ${newtons(asked.force)}` : ''}`,
-    no_normal_force: () => `a load pulls the part off a pad${asked.force ? ` at ${newtons(asked.force)}` : ''}`,
+    twisted_out: () => (by < 1 ? `it holds ${percent(1 - by)} of the load that tilts it most${force}` : `a load tilts the part out of its pads${force}`),
+    no_normal_force: () => (by < 1 ? `it holds ${percent(1 - by)} of the load that pulls hardest${force}` : `a load pulls the part off a pad${force}`),
     keep_out: () => `${body} would enter a box to keep out of${at}${free}`,
     scene: () => `${body} stops it`,
   }[kind];
@@ -221,7 +222,7 @@ export function drawWhy(root, report, show) {
     root.append(node('h3', 'What would help'), items);
   }
   if (summary.candidates > 0) {
-    const hint = told('p', 'gripfast plan with --why X,Y,ANGLE,PAIR explains a single pose, test by test.');
+    const hint = told('p', 'gripfast plan with --why X,Y,Z:APPROACH:CLOSING explains a single pose, test by test.');
     hint.className = 'quiet';
     root.append(hint);
   }

@@ -235,7 +235,7 @@ struct ChoiceArgs {
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
     merge_symmetric: Option<bool>,
     /// Only the candidates with these ids, e.g. 3,17 from an earlier table of the same search.
-    #[arg(long, value_delimiter = ',', value_name = "IDS")]
+    #[arg(long, value_delimiter = ',', value_name = "IDS", value_parser = id)]
     ids: Option<Vec<u64>>,
 }
 
@@ -304,6 +304,12 @@ struct MoreArgs {
     /// evenly as their counts allow: negatives for training and tests.
     #[arg(long, value_name = "N")]
     negatives: Option<usize>,
+}
+
+/// The number of a grip.
+pub(crate) fn id(text: &str) -> Result<u64, String> {
+    let wrong = |_| "give numbers (ids) of grips as the table lists them, e.g. 3,17".to_owned();
+    text.trim().parse().map_err(wrong)
 }
 
 /// A share as a number or in percent.

@@ -40,7 +40,7 @@ pub(super) fn words<'a>(
 
 /// Signs in a line of standard output: the terminal's, or 120.
 pub(super) fn width() -> usize {
-    Table::new().width().map_or(WIDTH, usize::from)
+    crate::terminal::width().unwrap_or(WIDTH)
 }
 
 /// The table of the grips in at most `width` signs, and the names of the columns left out for it.

@@ -88,6 +88,7 @@ pub(super) fn run(request: &Request, variants: &[Variant]) -> anyhow::Result<Exi
     }
     let interrupt = Interrupt::watched()?;
     let mut outcomes: Vec<Compared> = Vec::new();
+    let mut watch = Watch::new(request.output.quiet);
     for variant in variants {
         let mut request = request.clone();
         if let Some(gripper) = &variant.gripper {
@@ -99,14 +100,14 @@ pub(super) fn run(request: &Request, variants: &[Variant]) -> anyhow::Result<Exi
         for path in [&mut request.output.output, &mut request.output.report].into_iter().flatten() {
             *path = tagged(path, &variant.tag);
         }
-        let mut watch = Watch::new(request.output.quiet);
         let plan = Plan::builder(request.clone()).command(std::env::args().collect()).build()?;
+        let name = format!("{}{}", plan.gripper().name, variant.label);
+        watch.about(&name);
         if !request.output.yes && !agreed(&plan.ahead()?)? {
             return Ok(ExitCode::from(2));
         }
         let outcome = plan.run(&mut watch, &interrupt.stop);
         watch.end();
-        let name = format!("{}{}", plan.gripper().name, variant.label);
         outcomes.push(Compared { name, plan, outcome: outcome? });
         if interrupt.code().is_some() {
             break;
@@ -132,8 +133,16 @@ struct Compared {
 
 fn print(outcomes: &[Compared]) -> anyhow::Result<()> {
     let (mut out, width) = (terminal::output(), width());
+    if let Some(compared) = outcomes.first() {
+        writeln!(out, "{}", table::part(&compared.outcome.set))?;
+    }
     for Compared { name, outcome, .. } in outcomes {
         writeln!(out, "{name}: {}", table::verdict(&outcome.set))?;
+        if !outcome.set.any_holds()
+            && let Some(reasons) = table::reasons(&outcome.set)
+        {
+            writeln!(out, "  rejected: {reasons}")?;
+        }
     }
     let found = |compared: &&Compared| !compared.outcome.set.grips.is_empty();
     let (mut columns, mut rows) = (Vec::new(), Vec::new());

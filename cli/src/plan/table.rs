@@ -126,19 +126,7 @@ fn range_note(set: &GripSet, shown: &[&RankedGrip], gripper: &Gripper) -> String
 }
 
 fn summary(out: &mut impl Write, set: &GripSet, gripper: &Gripper) -> std::io::Result<()> {
-    let mass = &set.part.mass;
-    let size = (set.part.bbox_max - set.part.bbox_min) * 1e3;
-    writeln!(
-        out,
-        "{}: {} x {} x {} mm, {} triangles, {:.4} kg, centre of mass {} mm",
-        set.part.file,
-        length(size.x),
-        length(size.y),
-        length(size.z),
-        set.part.triangles,
-        mass.mass,
-        tuple(&(mass.centre_of_mass * 1e3).to_array(), 2)
-    )?;
+    writeln!(out, "{}", part(set))?;
     writeln!(
         out,
         "{} at {} N per jaw, {} loads, {} face pairs, {} candidates",
@@ -156,21 +144,36 @@ fn summary(out: &mut impl Write, set: &GripSet, gripper: &Gripper) -> std::io::R
             set.grips.len()
         )?;
     }
-    let mut reasons: Vec<_> =
-        set.summary.rejections.iter().filter(|(reason, _)| *reason != OUTRANKED).collect();
-    if !reasons.is_empty() {
-        reasons.sort_by(|a, b| b.1.cmp(a.1));
-        writeln!(
-            out,
-            "rejected: {}",
-            reasons
-                .iter()
-                .map(|(reason, count)| format!("{count} {}", reason.replace('_', " ")))
-                .collect::<Vec<_>>()
-                .join(", ")
-        )?;
+    if let Some(reasons) = reasons(set) {
+        writeln!(out, "rejected: {reasons}")?;
     }
     Ok(())
+}
+
+/// The part: size, mesh and mass.
+pub(super) fn part(set: &GripSet) -> String {
+    let mass = &set.part.mass;
+    let size = (set.part.bbox_max - set.part.bbox_min) * 1e3;
+    format!(
+        "{}: {} x {} x {} mm, {} triangles, {:.4} kg, centre of mass {} mm",
+        set.part.file,
+        length(size.x),
+        length(size.y),
+        length(size.z),
+        set.part.triangles,
+        mass.mass,
+        tuple(&(mass.centre_of_mass * 1e3).to_array(), 2)
+    )
+}
+
+/// Why candidates fell and how many, the commonest first; nothing where none did.
+pub(super) fn reasons(set: &GripSet) -> Option<String> {
+    let mut reasons: Vec<_> =
+        set.summary.rejections.iter().filter(|(reason, _)| *reason != OUTRANKED).collect();
+    reasons.sort_by(|a, b| b.1.cmp(a.1));
+    let texts =
+        reasons.iter().map(|(reason, count)| format!("{count} {}", reason.replace('_', " ")));
+    (!reasons.is_empty()).then(|| texts.collect::<Vec<_>>().join(", "))
 }
 
 /// A length in millimetres to 0.1 mm, or to two digits where it is less than a millimetre.

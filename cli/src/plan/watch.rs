@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use gripfast::plan::{Observer, Progress};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{HumanCount, ProgressBar, ProgressState, ProgressStyle};
 
 use crate::{flags, terminal};
 
@@ -13,11 +13,20 @@ use crate::{flags, terminal};
 pub(super) struct Watch {
     quiet: bool,
     bar: Option<ProgressBar>,
+    /// What the notes are about, where there are several plans.
+    about: String,
+    /// Warnings that were given.
+    given: Vec<String>,
 }
 
 impl Watch {
     pub(super) fn new(quiet: bool) -> Self {
-        Self { quiet, bar: None }
+        Self { quiet, bar: None, about: String::new(), given: Vec::new() }
+    }
+
+    /// From now on notes are about this plan.
+    pub(super) fn about(&mut self, name: &str) {
+        self.about = format!("{name}: ");
     }
 
     /// Takes the bar away.
@@ -50,12 +59,16 @@ impl Observer for Watch {
 
     fn note(&mut self, text: &str) {
         if !self.quiet {
-            self.line(text);
+            self.line(&format!("{}{text}", self.about));
         }
     }
 
     fn warning(&mut self, text: &str) {
-        self.line(&format!("warning: {}", flags::warning(text)));
+        // Of several plans the same part is warned of once.
+        if !self.given.iter().any(|known| known == text) {
+            self.given.push(text.to_owned());
+            self.line(&format!("warning: {}", flags::warning(text)));
+        }
     }
 }
 
@@ -66,9 +79,13 @@ fn progress_bar(total: u64, quiet: bool) -> ProgressBar {
     }
     let bar = ProgressBar::new(total);
     if let Ok(style) = ProgressStyle::with_template(
-        "{bar:32} {human_pos}/{human_len} candidates  {per_sec}  {eta} left  {msg}",
+        "{bar:32} {human_pos}/{human_len} candidates  {rate}/s  {eta} left  {msg}",
     ) {
-        bar.set_style(style);
+        let rate = |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+            // Nobody reads decimals of it.
+            let _ = write!(out, "{}", HumanCount(state.per_sec() as u64));
+        };
+        bar.set_style(style.with_key("rate", rate));
     }
     bar
 }

@@ -162,3 +162,11 @@ fn shapes_other_than_boxes_are_read_and_drawn() {
             .any(|warning| warning.contains("friction is not stated"))
     );
 }
+
+#[test]
+fn new_says_how_a_name_of_two_words_is_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mine.toml");
+    let (code, _, error) = gripfast(&["gripper", "new", path.to_str().unwrap()]);
+    assert!(code == 2 && error.contains("--name \"Bench gripper\""), "{error}");
+}

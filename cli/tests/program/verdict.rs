@@ -338,6 +338,20 @@ fn grippers_are_compared_and_flags_given_twice_are_refused() {
         let err = text(&output.stderr);
         assert!(output.status.code() == Some(2) && err.contains(word), "{line}: {err}");
     }
+    // Where none holds the part and the reasons are told, notes by the gripper that they are about,
+    // and warnings once.
+    let wide = format!("plan {} --mass 5kg --spacing 20mm --backend cpu", part("pocket_plate.stl"));
+    let output = gripfast(at, &format!("{wide} -g robotiq-hande -g robotiq-2f85 --force 30N"));
+    let (out, err) = (text(&output.stdout), text(&output.stderr));
+    assert_eq!(output.status.code(), Some(1), "{out}");
+    assert!(out.contains("pocket_plate.stl: 120.0 x 80.0 x 16.0 mm"), "{out}");
+    assert_eq!(out.lines().filter(|line| line.starts_with("  rejected: ")).count(), 2, "{out}");
+    assert_eq!(
+        err.lines().filter(|line| line.starts_with("warning: the part")).count(),
+        1,
+        "{err}"
+    );
+    assert!(err.lines().any(|line| line.starts_with("Robotiq ")), "{err}");
     // A project's default gives way to the flag.
     std::fs::write(
         at.join("gripfast.toml"),
@@ -486,6 +500,8 @@ fn small_mistakes_are_told_plainly() {
         (format!("{base} --mass 0,35kg"), "write a point: 0.35kg"),
         (format!("{base} --mass 20g --safety 0"), "above zero"),
         (format!("{base} --mass -350g"), "--mass=-350g"),
+        (format!("{base} --mass 20g --force -3N"), "--force=-3N"),
+        (format!("{base} --mass 20g --ids 3,b"), "as the table lists them"),
         (format!("{base} --mass 20g --min-contact half"), "or 50%"),
         (part("hex_nut.stl"), "say what to do with this file"),
         (format!("{base} --mass 20g --report nowhere/page.html"), "'nowhere' is not there"),
@@ -502,6 +518,17 @@ fn small_mistakes_are_told_plainly() {
         let err = text(&output.stderr);
         assert!(output.status.code() == Some(2) && err.contains(word), "{gripper}: {err}");
     }
+    // Grips that this search does not have are named, whatever else is quiet.
+    let output = gripfast(at, &format!("{base} --mass 20g --spacing 10mm --ids 99999999 -q"));
+    let err = text(&output.stderr);
+    assert!(output.status.code() == Some(1) && err.contains("no grip is 99999999"), "{err}");
+    // The unit that would give a usual density.
+    let bracket = format!("plan {} -g generic --spacing 20mm --mass 186g", part("l_bracket.stl"));
+    for (unit, fits) in [("in", true), ("mm", false)] {
+        let err = text(&gripfast(at, &format!("{bracket} --unit {unit} -q")).stderr);
+        let named = err.contains("the unit mm would give 7.9 g/cm3 (--unit mm)");
+        assert_eq!(named, fits, "{unit}: {err}");
+    }
     // A file in metres read as millimetres: the warning comes also when it is quiet.
     let Some(battery) = crate::support::reference("trials/verdict/battery_in_metres.stl") else {
         return;
@@ -510,4 +537,24 @@ fn small_mistakes_are_told_plainly() {
     let output = gripfast(at, &line);
     let err = text(&output.stderr);
     assert!(output.status.code() == Some(1) && err.contains("--unit m"), "{err}");
+}
+
+#[test]
+fn a_turn_about_a_centre_beyond_all_measure_is_told_as_a_slide() {
+    let folder = tempfile::tempdir().unwrap();
+    let square = "[{\"outer\":[[0,0],[0.01,0],[0.01,0.01],[0,0.01]],\"holes\":[]}]";
+    for (moment, words) in [
+        (1e-6, "counter-clockwise about"),
+        (1e-13, "about to slide                            along (0.6000, 0.8000)"),
+    ] {
+        // About the middle of the square.
+        let m3 = 0.005 * 0.8 - 0.005 * 0.6 + moment;
+        let case = format!(
+            "{{\"A_I\":{square},\"A_II\":{square},\"d\":0.02,\"Fn\":50,\"F\":[0.6,0.8,0],\"M\":[0,0,{m3:e}]}}"
+        );
+        std::fs::write(folder.path().join("case.json"), case).unwrap();
+        let output = gripfast(folder.path(), "solve case.json");
+        let out = text(&output.stdout);
+        assert!(output.status.code() == Some(0) && out.contains(words), "{moment}: {out}");
+    }
 }

@@ -258,6 +258,13 @@ impl Model {
         group
     }
 
+    /// The links of a finger: what moves with this one. Of a jaw that is fixed to the palm these are
+    /// the link and what hangs from it.
+    pub(super) fn finger(&self, link: usize, palm: usize) -> Vec<usize> {
+        let group = self.rigid(link, false);
+        if group.contains(&palm) { self.rigid(link, true) } else { group }
+    }
+
     /// The uppermost link of a group.
     pub(super) fn top(&self, group: &[usize]) -> usize {
         group.iter().copied().min_by_key(|&link| self.ancestors(link).len()).unwrap_or(0)

@@ -147,6 +147,8 @@ fn a_fixed_jaw_is_told() {
     assert_eq!((gripper.moving, gripper.stroke), (Moving::I, [0.0, 0.05]));
     assert!(gripper.pad_ii.is_some() && gripper.fingers_ii.is_some());
     assert!(found.notes.iter().any(|note| note.contains("force is not in the model")));
+    let palm: Vec<&str> = gripper.palm.iter().map(|body| body.name.as_str()).collect();
+    assert_eq!(palm, ["wrist"], "a fixed jaw is a finger only");
     // The other way round the other jaw moves.
     assert_eq!(imported(&text, ["fixed", "moving"]).0.moving, Moving::II);
     let folder = tempfile::tempdir().unwrap();
@@ -161,4 +163,56 @@ fn a_fixed_jaw_is_told() {
     }
     std::fs::write(&path, "no model").unwrap();
     assert!(import(&path, ["a", "b"], None).unwrap_err().to_string().contains("no URDF"));
+}
+
+/// A finger whose pad is a link of its own, as in most models: what carries it belongs to the finger,
+/// and not to the palm, where it would stop every grip.
+#[test]
+fn what_carries_the_pad_is_finger() {
+    let limit = "<limit lower=\"0\" upper=\"0.03\" effort=\"40\" velocity=\"1\"/>";
+    let mimic = format!("{limit}<mimic joint=\"slide_l\" multiplier=\"-1\"/>");
+    let mut text =
+        format!("<robot name=\"pads\">{}", link("palm", [0.05, 0.12, 0.04], [0.0, 0.0, 0.02]));
+    // The mimic comes before the joint that it follows.
+    for (side, sign, rest) in [("r", -1.0, &mimic), ("l", 1.0, &limit.to_owned())] {
+        let [finger, pad] = ["finger", "pad"].map(|name| format!("{name}_{side}"));
+        text += &link(&finger, [0.02, 0.01, 0.06], [0.0, sign * 0.009, 0.01]);
+        text += &link(&pad, [0.016, 0.004, 0.02], [0.0, sign * 0.002, 0.0]);
+        let slide = format!("slide_{side}");
+        text += &joint(&slide, "prismatic", "palm", &finger, [0.0, 0.0, 0.07], "0 1 0", rest);
+        let glue = format!("glue_{side}");
+        text += &joint(&glue, "fixed", &finger, &pad, [0.0, 0.0, 0.03], "1 0 0", "");
+    }
+    text += "</robot>";
+    let (gripper, _) = imported(&text, ["pad_l", "pad_r"]);
+    assert!(gripper.is_symmetric() && gripper.stroke == [0.0, 0.06]);
+    let [pad, _] = gripper.pad_sizes();
+    assert!((pad - DVec2::new(0.02, 0.016)).length() < 1e-9, "{pad}");
+    let names = |bodies: &[crate::gripper::Body]| -> Vec<String> {
+        bodies.iter().map(|body| body.name.clone()).collect()
+    };
+    assert_eq!(names(gripper.bodies(Jaw::I)), ["pad_l", "finger_l"]);
+    assert_eq!(names(&gripper.palm), ["palm"]);
+    // 4 to 14 mm behind the pad's face, 20 mm below to 10 mm above its middle.
+    let [low, high] = gripper.bodies(Jaw::I)[1].bounds();
+    assert!((low - DVec3::new(-0.05, -0.01, 0.004)).length() < 1e-9, "{low}");
+    assert!((high - DVec3::new(0.01, 0.01, 0.014)).length() < 1e-9, "{high}");
+}
+
+#[test]
+fn a_jaw_that_turns_on_the_spot_is_told() {
+    let limit = "<limit lower=\"0\" upper=\"1\" effort=\"5\" velocity=\"1\"/>";
+    let text = format!(
+        "<robot name=\"arm\">{}{}{}{}{}</robot>",
+        link("wrist", [0.05, 0.05, 0.04], [0.0, 0.0, 0.02]),
+        link("fixed", [0.02, 0.01, 0.06], [0.0, -0.005, 0.03]),
+        link("moving", [0.015, 0.008, 0.06], [0.0, 0.004, 0.03]),
+        joint("weld", "fixed", "wrist", "fixed", [0.0, 0.0, 0.04], "1 0 0", ""),
+        joint("hinge", "revolute", "wrist", "moving", [0.0, 0.0, 0.04], "-1 0 0", limit),
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("arm.urdf");
+    std::fs::write(&path, &text).unwrap();
+    let message = import(&path, ["moving", "fixed"], None).unwrap_err().to_string();
+    assert!(message.contains("'moving' turns by 57 deg"), "{message}");
 }
