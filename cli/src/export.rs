@@ -46,7 +46,7 @@ pub(crate) struct Args {
     choice: ChoiceArgs,
     /// Distance of the pads before closing; as planned when not given.
     #[arg(long, value_name = "LENGTH")]
-    opening: Option<String>,
+    opened_gap: Option<String>,
     /// A joint of the gripper as NAME:SCALE:OFFSET, position = SCALE x distance of the pads in
     /// metres + OFFSET (isaac_grasp, moveit). Give it once for each joint.
     #[arg(long, value_name = "JOINT", allow_hyphen_values = true)]
@@ -133,7 +133,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             args.origin.as_deref().map(|text| Origin::parse("--origin", text)).transpose()?,
         )
         .with_top((format == Format::Glb && args.choice.top.is_none()).then_some(GLB_TOP))
-        .with_opening(args.opening.as_deref().map(|text| length("--opening", text)).transpose()?)
+        .with_opening(
+            args.opened_gap.as_deref().map(|text| length("--opened-gap", text)).transpose()?,
+        )
         .with_joints(if joints.is_empty() { vec![Joint::default()] } else { joints })
         .with_pad_friction(args.pad_friction)
         .with_safety(args.safety)

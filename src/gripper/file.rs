@@ -151,6 +151,8 @@ fn shape(message: &str) -> String {
         "bodies stand in double brackets, one table for each: [[finger]], [[palm]]"
     } else if message.contains("expected a string") {
         "give a text with its unit, e.g. \"12mm\""
+    } else if message.contains("expected f64") {
+        "give a plain number, without unit and quotes, e.g. 0.5"
     } else {
         return message.to_string();
     };

@@ -223,7 +223,7 @@ fn what_twists_out_is_told_by_the_share_of_the_load_that_is_held() {
     let set = found(&plan);
     let misses = near_misses(&set, plan.part()).unwrap();
     let lost: Vec<_> = misses.iter().filter(|miss| miss.pose.reason == "twisted_out").collect();
-    assert!(lost.len() > 10, "{}", lost.len());
+    assert!(lost.len() > 5, "{}", lost.len());
     let friction = plan.gripper().pad_friction.unwrap();
     let force = set.provenance.resolved.force.0;
     for miss in lost.into_iter().step_by(3) {

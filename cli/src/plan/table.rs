@@ -55,22 +55,26 @@ fn legend(
     width: usize,
 ) -> Vec<String> {
     let pads = set.pads();
-    let mut texts = vec![
+    let has = |column: &str| !left_out.contains(&column);
+    let place = if has("position mm") { " and position of the grip's middle" } else { "" };
+    let mut texts = vec![format!(
         "mu_s: smallest friction coefficient that holds the worst load. pad: share of the pad that \
-         touches; left: share of that contact left under the worst load. approach and position of \
-         the grip's middle in the part frame."
-            .to_owned(),
-    ];
+         touches; left: share of that contact left under the worst load. approach{place} in the \
+         part frame."
+    )];
     match pads.value {
         Some(friction) => {
             let usable = match pads.safety {
                 1.0 => "just holds".to_owned(),
                 safety => format!("holds with a safety of {safety}"),
             };
+            let multiple = match has("multiple") {
+                true => " multiple: factor by which all of the worst load can grow.",
+                false => "",
+            };
             texts.push(format!(
                 "safety: the pads' friction {friction} over mu_s; a grip holds where it is at least \
-                 {}. force N: gripping force per jaw with which it {usable}{}. multiple: factor by \
-                 which all of the worst load can grow.",
+                 {}. force N: gripping force per jaw with which it {usable}{}.{multiple}",
                 pads.safety,
                 range_note(set, shown, gripper)
             ));

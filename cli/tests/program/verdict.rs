@@ -510,9 +510,11 @@ fn small_mistakes_are_told_plainly() {
         let err = text(&output.stderr);
         assert!(output.status.code() == Some(2) && err.contains(word), "{line}: {err}");
     }
-    for (gripper, word) in
-        [("stroke = 10", "stroke = [\"0mm\", \"85mm\"]"), ("[finger]\nname = \"x\"", "[[finger]]")]
-    {
+    for (gripper, word) in [
+        ("stroke = 10", "stroke = [\"0mm\", \"85mm\"]"),
+        ("[finger]\nname = \"x\"", "[[finger]]"),
+        ("[pad]\nfriction = \"0.5\"", "plain number"),
+    ] {
         std::fs::write(at.join("g.toml"), format!("name = \"x\"\n{gripper}\n")).unwrap();
         let output = gripfast(at, "gripper check g.toml");
         let err = text(&output.stderr);
