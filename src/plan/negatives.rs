@@ -42,7 +42,7 @@ impl Plan {
     ) -> Option<String> {
         let poses: Vec<&Negative> =
             lost.values().flat_map(|list| list.iter().take(SHOWN)).collect();
-        let misses = self.run(proposer).lost(&poses);
+        let misses = self.judge(proposer).lost(&poses);
         let best = misses.iter().filter_map(|miss| miss.by).min_by(f64::total_cmp)?;
         Some(format!(
             "of the load that tilts it most the best of {} such places holds {:.0} % at {} N per jaw",
@@ -52,8 +52,8 @@ impl Plan {
         ))
     }
 
-    fn run<'a>(&'a self, proposer: &'a Proposer<'a>) -> Run<'a> {
-        Run {
+    fn judge<'a>(&'a self, proposer: &'a Proposer<'a>) -> Judge<'a> {
+        Judge {
             proposer,
             loads: &self.loads,
             centre_of_mass: self.mass.centre_of_mass,
@@ -74,7 +74,7 @@ impl Plan {
         }
         let mut misses = proposer.misses(SHOWN);
         let lost: Vec<&Negative> = lost.values().flat_map(|list| list.iter().take(SHOWN)).collect();
-        misses.extend(self.run(proposer).lost(&lost));
+        misses.extend(self.judge(proposer).lost(&lost));
         misses
     }
 
@@ -113,19 +113,19 @@ pub fn near_misses(set: &GripSet, part: &Part) -> Result<Vec<Miss>> {
     let proposed: Vec<String> = misses.iter().map(|miss| miss.pose.reason.clone()).collect();
     let others: Vec<&Negative> =
         set.negatives.iter().filter(|pose| !proposed.contains(&pose.reason)).collect();
-    let run = Run {
+    let judge = Judge {
         proposer: &proposer,
         loads: &set.loads,
         centre_of_mass: set.part.mass.centre_of_mass,
         force: set.provenance.resolved.force.0,
         friction: set.pads().value,
     };
-    misses.extend(run.lost(&others));
+    misses.extend(judge.lost(&others));
     Ok(misses)
 }
 
 /// What decides whether a grip holds.
-struct Run<'a> {
+struct Judge<'a> {
     proposer: &'a Proposer<'a>,
     loads: &'a [LoadCase],
     centre_of_mass: DVec3,
@@ -133,7 +133,7 @@ struct Run<'a> {
     friction: Option<f64>,
 }
 
-impl Run<'_> {
+impl Judge<'_> {
     /// Grips that do not hold.
     fn lost(&self, poses: &[&Negative]) -> Vec<Miss> {
         let miss = |pose: &&Negative| Miss::new((*pose).clone(), self.not_held(pose), None);
