@@ -369,7 +369,7 @@ pub struct Miss {
     /// What it lacks, where a number says it: how deep a body lies in what stops it, how far a
     /// width or a place is beyond its limit \[m\]; how far an approach lies outside the cone
     /// \[rad\]; which share of the contact area asked for is missing, or, of one that does not hold,
-    /// which share of the load that tilts it most is not held (0..1).
+    /// which share of the load that it loses, the one that tilts it most, is not held (0..1).
     pub by: Option<f64>,
     /// Where a body meets what stops it, part frame \[m\].
     pub place: Option<DVec3>,

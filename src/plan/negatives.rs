@@ -11,8 +11,8 @@ use crate::error::Result;
 use crate::load::wrench_in_grip;
 use crate::mechanics::inverse::load_multiple;
 use crate::mechanics::twist_out::TwistOut;
-use crate::mechanics::{Options, Pads};
-use crate::model::{LoadCase, Miss, Negative};
+use crate::mechanics::{Options, Pads, solve_pads};
+use crate::model::{LoadCase, Miss, Negative, Wrench};
 use crate::part::Part;
 use crate::propose::Proposer;
 use crate::results::GripSet;
@@ -21,6 +21,8 @@ use crate::results::GripSet;
 const SHOWN: usize = 60;
 /// Grips that do not hold of each reason that are looked at where none holds.
 const TOLD: usize = 20;
+/// Loads among which the one is sought that a grip loses, those that tilt the part most.
+const TRIED: usize = 12;
 /// Friction of pads of which none is stated: the most that a gripper file may state.
 const MOST_FRICTION: f64 = 10.0;
 /// A pose found again on its faces is off by rounding only \[rad\].
@@ -45,7 +47,8 @@ impl Plan {
         let misses = self.judge(proposer).lost(&poses);
         let best = misses.iter().filter_map(|miss| miss.by).min_by(f64::total_cmp)?;
         Some(format!(
-            "of the load that tilts it most the best of {} such places holds {:.0} % at {} N per jaw",
+            "the best of {} places looked at holds {:.0} % of the load that is the first to tilt or pull \
+             the part out, at {} N per jaw",
             poses.len(),
             (1.0 - best) * 100.0,
             self.settings.force
@@ -140,8 +143,8 @@ impl Judge<'_> {
         poses.par_iter().map(miss).collect()
     }
 
-    /// The share of a load that a grip does not hold, of the load that tilts the part most. Of
-    /// contacts that are not plane nobody asks: the answer takes long.
+    /// The share of a load that a grip does not hold, of the load that tilts the part most among
+    /// those that are lost. Of contacts that are not plane nobody asks: the answer takes long.
     fn not_held(&self, pose: &Negative) -> Option<f64> {
         let fit = self.proposer.fit(&pose.part_from_grip, SAME).ok()?;
         let grip = self.proposer.grip_at(&fit, pose.id);
@@ -152,21 +155,21 @@ impl Judge<'_> {
         let wrench = |load: &LoadCase| {
             wrench_in_grip(&load.wrench, self.centre_of_mass, &grip.part_from_grip)
         };
-        let (_, worst) = self
+        let mut wrenches: Vec<(f64, Wrench)> = self
             .loads
             .iter()
             .map(wrench)
             .map(|wrench| (lever.margin(self.force, &wrench), wrench))
-            .min_by(|a, b| a.0.total_cmp(&b.0))?;
+            .collect();
+        wrenches.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let options = Options::default();
+        // Friction may hold a load that tilts the part more.
+        let is_lost = |wrench: &&Wrench| {
+            !solve_pads(&pads, grip.distance(), self.force, wrench, &options).status.holds()
+        };
+        let worst = wrenches.iter().map(|(_, wrench)| wrench).take(TRIED).find(is_lost)?;
         let friction = self.friction.filter(|value| *value > 0.0).unwrap_or(MOST_FRICTION);
-        let held = load_multiple(
-            &pads,
-            grip.distance(),
-            self.force,
-            &worst,
-            friction,
-            &Options::default(),
-        );
+        let held = load_multiple(&pads, grip.distance(), self.force, worst, friction, &options);
         Some((1.0 - held).max(0.0))
     }
 }

@@ -225,14 +225,22 @@ const DENSITIES: [f64; 2] = [10.0, 23_000.0];
 /// Densities of what parts are mostly made of, and the middle of these [kg/m^3].
 const USUAL: [f64; 3] = [500.0, 2700.0, 20_000.0];
 
-/// The unit in which the file's numbers make a part of a usual density, and that density [kg/m^3];
-/// `unit_m`: the one in which they were read.
-fn likely_unit(density: f64, unit_m: f64) -> Option<(Unit, f64)> {
+/// Sizes between which a part is usual for a gripper \[m\].
+const USUAL_SIZES: [f64; 2] = [2e-3, 0.5];
+
+/// The unit in which the file's numbers make a part of a usual density and size, and that density
+/// [kg/m^3]; `density`: that in the unit in which they were read.
+fn likely_unit(density: f64, part: &Part) -> Option<(Unit, f64)> {
     let off = |density: f64| (density / USUAL[1]).ln().abs();
+    let (low, high) = part.mesh.bounding_box();
+    let size = (high - low).max_element();
     Unit::ALL
         .into_iter()
-        .filter(|unit| unit.metres() != unit_m)
-        .map(|unit| (unit, density * (unit_m / unit.metres()).powi(3)))
+        .map(|unit| (unit, unit.metres() / part.unit_m))
+        .filter(|&(_, times)| {
+            times != 1.0 && (USUAL_SIZES[0]..=USUAL_SIZES[1]).contains(&(size * times))
+        })
+        .map(|(unit, times)| (unit, density / times.powi(3)))
         .filter(|&(_, density)| (USUAL[0]..=USUAL[2]).contains(&density))
         .min_by(|a, b| off(a.1).total_cmp(&off(b.1)))
 }
@@ -242,7 +250,7 @@ fn doubts(request: &Request, part: &Part, mass: &MassProperties) -> Vec<String> 
     let mut doubts = Vec::new();
     let density = mass.mass / mass.volume;
     let stated = request.mass.is_some() || request.density.is_some();
-    let unit = request.mass.and_then(|_| likely_unit(density, part.unit_m));
+    let unit = request.mass.and_then(|_| likely_unit(density, part));
     let remedy = unit.map_or(String::new(), |(unit, density)| {
         format!("; the unit {unit} would give {:.1} g/cm3", density / 1e3)
     });

@@ -126,8 +126,8 @@ export function missWords(report, k) {
     ground: () => `${body} would reach ${mm(by, 2)} below the ground${at}`,
     part_interference: () => `${body} meets the part${at}${free}`,
     approach_blocked: () => `${body} meets the part on its way${at}${free}`,
-    twisted_out: () => (by < 1 ? `it holds ${percent(1 - by)} of the load that tilts it most${force}` : `a load tilts the part out of its pads${force}`),
-    no_normal_force: () => (by < 1 ? `it holds ${percent(1 - by)} of the load that pulls hardest${force}` : `a load pulls the part off a pad${force}`),
+    twisted_out: () => (by < 1 ? `it holds ${percent(1 - by)} of a load that tilts it out${force}` : `a load tilts the part out of its pads${force}`),
+    no_normal_force: () => (by < 1 ? `it holds ${percent(1 - by)} of a load that pulls it off a pad${force}` : `a load pulls the part off a pad${force}`),
     keep_out: () => `${body} would enter a box to keep out of${at}${free}`,
     scene: () => `${body} stops it`,
   }[kind];
