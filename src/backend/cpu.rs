@@ -45,7 +45,7 @@ pub(crate) fn run(chunk: &Chunk, seeds: &SeedSet) -> Vec<SeedRecord> {
 
 /// Searches with the widest vectors that the processor has. Both ways do the same operations in the
 /// same order.
-fn search(field: &Field<'_>, loads: &[LoadRecord], out: &mut [SeedRecord]) {
+pub(super) fn search(field: &Field<'_>, loads: &[LoadRecord], out: &mut [SeedRecord]) {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         #[allow(

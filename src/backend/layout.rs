@@ -56,7 +56,7 @@ pub const LEAST_DISSIPATION: f32 = 1e-6;
 pub const DEGENERATE: f32 = 1e-12;
 
 /// Below this `l / (r1 + r2)` an edge's logarithm is a series: its argument would be rounded to
-/// near 1. Six terms leave 6e-9 there.
+/// near 1.
 pub const SERIES_LIMIT: f32 = 0.25;
 
 /// [`SeedRecord::status`]: the kernel did not write this record. Anything left so after a run is an

@@ -27,6 +27,7 @@ pub mod layout;
 mod prepare;
 mod problem;
 mod score;
+mod screen;
 mod search;
 mod seeds;
 mod table;

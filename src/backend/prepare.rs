@@ -26,7 +26,7 @@ use crate::model::{Contact, Wrench};
 const RESOLVED: f64 = 60.0;
 
 /// Scaled numbers beyond this are not computed with: the load gets no bounds.
-const RANGE: f64 = 1e6;
+pub(super) const RANGE: f64 = 1e6;
 
 /// In-plane load over the gripping force below which there is no load: the square of less is not a
 /// number of f64.
@@ -209,6 +209,12 @@ impl Records {
             spread: spread as f32,
         };
         Some(Self { header, edges, origin: pads.origin, unit })
+    }
+
+    /// Edges of face I and of face II (none where it is congruent).
+    pub(super) fn faces(&self) -> [&[EdgeRecord]; 2] {
+        let (i, ii) = self.edges.split_at(self.header.edges_ii as usize);
+        [i, ii]
     }
 
     /// The scaled record of a load, and the length of its in-plane wrench over the gripping force

@@ -9,13 +9,14 @@ use rayon::prelude::*;
 use super::job::Backend;
 use super::prepare::Contacts;
 use super::problem::{Batch, F32_TOLERANCE, Problem, Seed, SeedStatus};
+use super::screen::Survivors;
 use super::seeds::SeedSet;
 use super::worst::{Ended, Work};
 use crate::contact::{PlaneWrench, Twist};
 use crate::error::Result;
 use crate::mechanics::twist_out::TwistOut;
 use crate::mechanics::{Options, Pads, Search, refused, solve_pads};
-use crate::model::{Score, Status};
+use crate::model::{Score, Status, Wrench};
 use crate::request::{Polish, Refiner, Separation};
 
 /// Values of `mu_s` that differ by less than this share count as equal, and the first load is taken
@@ -68,19 +69,20 @@ impl Backend {
         seeds: &SeedSet,
         options: &ScoreOptions,
     ) -> Result<Vec<Scored>> {
-        self.by_blocks(BLOCK, batch, seeds, |Block { range, contacts, seeds }| {
-            cases(&contacts, &batch.problems[range], &seeds, options)
+        let all = options.polish == Polish::All;
+        self.by_blocks((BLOCK, all), batch, seeds, |Block { range, contacts, survivors }| {
+            cases(&contacts, &batch.problems[range], &survivors, options)
                 .into_par_iter()
                 .map(|case| case.score(None))
                 .collect()
         })
     }
 
-    /// Seeds one block of the batch, of `most` loads or one problem, after another. While a block is
-    /// seeded, the one before is solved.
+    /// Seeds one block of the batch, of `most` loads or one problem, after another; `all` loads, or
+    /// those that can be the worst. While a block is seeded, the one before is solved.
     pub(super) fn by_blocks(
         &self,
-        most: usize,
+        (most, all): (usize, bool),
         batch: &Batch<'_>,
         seeds: &SeedSet,
         mut solve: impl FnMut(Block) -> Vec<Scored> + Send,
@@ -97,8 +99,8 @@ impl Backend {
             let part = Batch { problems: batch.problems[range.clone()].to_vec() };
             let seed = || -> Result<Block> {
                 let contacts = Contacts::new(&part.problems)?;
-                let seeds = self.seed_on(&contacts, &part, seeds)?;
-                Ok(Block { range, contacts, seeds })
+                let survivors = self.survivors_on(&contacts, &part, seeds, all)?;
+                Ok(Block { range, contacts, survivors })
             };
             let (block, before) = rayon::join(seed, || waiting.take().map(&mut solve));
             scored.extend(before.into_iter().flatten());
@@ -115,8 +117,8 @@ pub(super) struct Block {
     pub(super) range: Range<usize>,
     /// Their contacts.
     pub(super) contacts: Contacts,
-    /// The seeds of all their loads, one problem after the other.
-    pub(super) seeds: Vec<Seed>,
+    /// Their loads that can be the worst, with their seeds.
+    pub(super) survivors: Survivors,
 }
 
 /// Cuts the problems so that each block has at most `most` loads (or one problem).
@@ -139,28 +141,43 @@ fn blocks(problems: &[Problem<'_>], most: usize) -> Vec<Range<usize>> {
 pub(super) fn cases<'a>(
     contacts: &'a Contacts,
     problems: &'a [Problem<'a>],
-    seeds: &'a [Seed],
+    survivors: &'a Survivors,
     options: &'a ScoreOptions,
 ) -> Vec<Case<'a>> {
-    let mut rest = seeds;
-    let ready = problems.iter().zip(&contacts.slots).map(|(problem, &slot)| {
-        let (seeds, others) = rest.split_at(problem.wrenches.len());
-        rest = others;
-        Case { problem, pads: contacts.ready[slot].pads.as_ref(), seeds, options }
-    });
-    ready.collect()
+    let ready = problems.iter().zip(&contacts.slots).zip(survivors.by_problem());
+    ready
+        .map(|((problem, &slot), (loads, seeds))| Case {
+            problem,
+            pads: contacts.ready[slot].pads.as_ref(),
+            loads,
+            seeds,
+            options,
+        })
+        .collect()
 }
 
-/// One grip with the seeds of its loads.
+/// One grip with the seeds of its loads that can be the worst. In what follows a load goes by its
+/// place among these; only the answer has its number among all.
 #[derive(Clone, Copy)]
 pub(super) struct Case<'a> {
     pub(super) problem: &'a Problem<'a>,
     pub(super) pads: Option<&'a Pads>,
+    /// The loads' numbers, rising.
+    loads: &'a [u32],
     pub(super) seeds: &'a [Seed],
     pub(super) options: &'a ScoreOptions,
 }
 
 impl Case<'_> {
+    pub(super) fn wrench(&self, load: usize) -> &Wrench {
+        &self.problem.wrenches[self.loads[load] as usize]
+    }
+
+    /// The answer with the load's number among all.
+    pub(super) fn numbered(&self, (load, score): (usize, Score)) -> (usize, Score) {
+        (self.loads[load] as usize, score)
+    }
+
     /// Nothing less than this is the `mu_s` of the grip's worst load, if all its loads are held.
     pub(super) fn lower(&self) -> f64 {
         (0..self.seeds.len()).map(|load| self.lower_of(load)).fold(0.0, f64::max)
@@ -173,8 +190,7 @@ impl Case<'_> {
         let (SeedStatus::Unbounded, Some(pads)) = (seed.status, self.pads) else {
             return seed.lower;
         };
-        let load =
-            pads.load(self.problem.distance, self.problem.force, &self.problem.wrenches[load]);
+        let load = pads.load(self.problem.distance, self.problem.force, self.wrench(load));
         let bound = |v: Twist| {
             let speed = |x: &DVec2| v.velocity(*x).length_squared();
             let fastest = |k: usize| pads.hulls[k].iter().map(speed).fold(0.0, f64::max).sqrt();
@@ -220,7 +236,7 @@ impl Case<'_> {
             .map(|load| self.solve(load))
             .collect();
         let answers: Vec<(usize, Score)> = all.iter().copied().enumerate().collect();
-        let worst = self.settle(self.worst(&answers));
+        let worst = self.settle(self.worst(&answers)).map(|worst| self.numbered(worst));
         Scored { worst, solved: all.len(), compared: 0, all, outranked: false }
     }
 
@@ -244,10 +260,7 @@ impl Case<'_> {
             return Vec::new();
         }
         let lever = TwistOut::new(self.problem.contact);
-        loads
-            .iter()
-            .map(|&load| lever.margin(self.problem.force, &self.problem.wrenches[load]))
-            .collect()
+        loads.iter().map(|&load| lever.margin(self.problem.force, self.wrench(load))).collect()
     }
 
     pub(super) fn options(&self, load: usize, search: Search) -> Options {
@@ -271,7 +284,7 @@ impl Case<'_> {
                 pads,
                 self.problem.distance,
                 self.problem.force,
-                &self.problem.wrenches[load],
+                self.wrench(load),
                 &options,
             ),
             None => refused(Status::NoContact, 0),

@@ -3,11 +3,11 @@
 //! by side through plain loops, which the compiler turns into vector instructions. No product is
 //! fused with a sum, so the instruction set changes no bit.
 
-use super::lanes::{LANES, Lanes, Loads, cross, dot, larger, pick, pick_number, smaller};
+use super::lanes::{LANES, Lanes, Loads, cross, dot, larger, pick_number, smaller};
 use super::layout::{
     BASIS, BOUNDED, CONTACT_MARGIN, COUPLED, COUPLED_SHARE, COUPLING_MARGIN, ContactHeader,
-    DEGENERATE, EdgeRecord, LEAST_DISSIPATION, LEAST_VARIATION, LoadRecord, OUT_OF_RANGE,
-    SeedRecord, TILT_LIMIT, UNBOUNDED,
+    DEGENERATE, EdgeRecord, LEAST_VARIATION, LoadRecord, OUT_OF_RANGE, SeedRecord, TILT_LIMIT,
+    UNBOUNDED,
 };
 use super::seeds::{NEGATED, RING};
 use super::table::{CORNER, SLOTS, Table};
@@ -202,7 +202,7 @@ impl Field<'_> {
     /// equation for the share; its smaller root cannot be left on the way from no coupling to all
     /// of it.
     #[inline(always)]
-    fn coupled_share(&self, loads: &Loads, planes: &Planes, upper: &Lanes) -> Lanes {
+    pub(super) fn coupled_share(&self, loads: &Loads, planes: &Planes, upper: &Lanes) -> Lanes {
         let header = self.header;
         let zero = [0.0; LANES];
         // Largest relative change of pressure at a vertex per change of slope, as the squares of
@@ -401,38 +401,7 @@ impl Field<'_> {
     pub(crate) fn search(&self, loads: &[LoadRecord], out: &mut [SeedRecord]) {
         let loads = Loads::new(loads);
         let planes = self.planes(&loads);
-        let (mut best, mut value) = ([0_u32; LANES], [-1.0_f32; LANES]);
-        let w = &loads.wrench;
-        if self.header.faces == 1 {
-            for (k, n) in self.table.parts().enumerate() {
-                for lane in 0..LANES {
-                    let mu = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
-                    let better = mu > value[lane];
-                    best[lane] = pick(better, k as u32, best[lane]);
-                    value[lane] = larger(mu, value[lane]);
-                }
-            }
-        } else {
-            // The largest of the quotients power / dissipation, without a division for each.
-            let mut least = [1.0_f32; LANES];
-            for (k, n) in self.table.parts().enumerate() {
-                for lane in 0..LANES {
-                    let power = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
-                    let d = planes.at_i[lane] * n[3]
-                        + planes.at_ii[lane] * n[4]
-                        + planes.slope[0][lane] * n[5]
-                        + planes.slope[1][lane] * n[6];
-                    let d = larger(d, LEAST_DISSIPATION);
-                    let better = power * least[lane] > value[lane] * d;
-                    best[lane] = pick(better, k as u32, best[lane]);
-                    value[lane] = pick_number(better, power, value[lane]);
-                    least[lane] = pick_number(better, d, least[lane]);
-                }
-            }
-            for lane in 0..LANES {
-                value[lane] /= least[lane];
-            }
-        }
+        let (best, value) = self.strongest(&loads, &planes);
         self.finish(&loads, &planes, &best, &value, out);
     }
 }

@@ -64,8 +64,8 @@ impl Backend {
         best: &mut Best,
         merit: &(dyn Fn(usize, f64) -> f64 + Sync),
     ) -> Result<Vec<Scored>> {
-        self.by_blocks(BLOCK, batch, seeds, |Block { range, contacts, seeds }| {
-            let cases = cases(&contacts, &batch.problems[range.clone()], &seeds, options);
+        self.by_blocks((BLOCK, false), batch, seeds, |Block { range, contacts, survivors }| {
+            let cases = cases(&contacts, &batch.problems[range.clone()], &survivors, options);
             let merit = |index: usize, mu: f64| merit(range.start + index, mu);
             let lower = |(index, case): (usize, &Case<'_>)| merit(index, case.lower());
             let promise = cases.par_iter().enumerate().map(lower).collect();

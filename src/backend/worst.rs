@@ -1,9 +1,9 @@
 //! The worst load of one grip, found with as few loads solved as bounds allow: loads without bounds
 //! get some from Newton's first steps, and only those that can be the worst are solved.
 
-use super::problem::{F32_TOLERANCE, Problem, SeedStatus};
+use super::problem::{F32_TOLERANCE, SeedStatus};
 use super::score::{Case, Scored, TIE, usable};
-use crate::contact::{Field, PlaneWrench, Twist};
+use crate::contact::{Field, PlaneWrench};
 use crate::mechanics::{
     Comparer, Comparison, Load, Neighbour, Pads, Question, Search, slip, solve_next,
 };
@@ -74,15 +74,15 @@ struct Neighbours {
 }
 
 /// States kept of one grip.
-const MOST: usize = 256;
+const MOST: usize = 128;
 /// Square of the distance in units of the gripping force from which on a load's state is kept.
 const UNLIKE: f32 = 0.05 * 0.05;
 /// Square of the distance up to which a state helps.
 const LIKE: f32 = 0.5 * 0.5;
 
 impl Neighbours {
-    /// The nearest state, with the square of its distance.
-    fn nearest(&mut self, place: &[f32; 6]) -> Option<(f32, &Neighbour)> {
+    /// The index of the nearest state, with the square of its distance.
+    fn nearest(&mut self, place: &[f32; 6]) -> Option<(f32, usize)> {
         self.apart.clear();
         self.apart.resize(self.states.len(), 0.0);
         for (all, x) in self.places.iter().zip(place) {
@@ -91,8 +91,11 @@ impl Neighbours {
             }
         }
         let least = self.apart.iter().fold(f32::INFINITY, |least, &apart| least.min(apart));
-        let index = self.apart.iter().position(|&apart| apart == least)?;
-        Some((least, &self.states[index]))
+        // Eight at a time, without a way out between them.
+        let has = |some: &[f32]| some.iter().fold(false, |has, &apart| has | (apart == least));
+        let first = 8 * self.apart.chunks(8).position(has)?;
+        let within = self.apart[first..].iter().position(|&apart| apart == least)?;
+        Some((least, first + within))
     }
 
     fn add(&mut self, place: [f32; 6], state: Neighbour) {
@@ -217,7 +220,7 @@ impl Work<'_> {
                 break;
             }
             if let (SeedStatus::Bounded, Some(pads)) = (case.seeds[load].status, case.pads) {
-                let mu = slip_only(pads, case.problem, load, case.seeds[load].twist);
+                let mu = slip_only(pads, case, load);
                 largest = largest.max(mu);
                 slips.push((load, mu));
             } else if self.look(load).is_err() {
@@ -259,37 +262,38 @@ impl Work<'_> {
             return self.answer(load, case.solve(load));
         };
         let (problem, options) = (case.problem, case.options(load, Search::Off));
-        let scaled = pads.load(problem.distance, problem.force, &problem.wrenches[load]);
+        let scaled = pads.load(problem.distance, problem.force, case.wrench(load));
         let here = place(&scaled);
         let nearest = self.neighbours.nearest(&here);
         let apart = nearest.map_or(f32::INFINITY, |(apart, _)| apart);
-        let near = nearest.map(|(_, state)| state).filter(|_| apart < LIKE);
-        let keep = |neighbours: &mut Neighbours, state: Neighbour| {
-            if apart > UNLIKE && neighbours.states.len() < MOST {
-                neighbours.add(here, state);
-            }
-        };
+        let near =
+            nearest.filter(|_| apart < LIKE).map(|(_, index)| &self.neighbours.states[index]);
+        let unlike = apart > UNLIKE && self.neighbours.states.len() < MOST;
         match comparer.compare(&scaled, &options, near, question) {
-            Some(Comparison::Between(bounds, state)) => {
+            Some(Comparison::Between(bounds)) => {
                 self.compared += 1;
-                keep(&mut self.neighbours, state);
+                if unlike && let Some(state) = comparer.reached() {
+                    self.neighbours.add(here, state);
+                }
                 let below = bounds[1] < question.value;
                 return if below { Compared::Below } else { Compared::Between(bounds) };
             }
-            Some(Comparison::Solved(score, state)) if usable(&score).is_some() => {
-                keep(&mut self.neighbours, state);
+            Some(Comparison::Solved(score)) if usable(&score).is_some() => {
+                if unlike && let Some(state) = comparer.reached() {
+                    self.neighbours.add(here, state);
+                }
                 return self.answer(load, score);
             }
             _ => {}
         }
         let mut start = near.map(Neighbour::start);
-        let wrench = &problem.wrenches[load];
+        let wrench = case.wrench(load);
         let score = solve_next(pads, problem.distance, problem.force, wrench, &options, &mut start);
         if usable(&score).is_none() {
             return self.answer(load, case.solve(load));
         }
-        if let Some(start) = start {
-            keep(&mut self.neighbours, Neighbour::at(pads, &scaled, start));
+        if unlike && let Some(state) = start.and_then(|start| Neighbour::at(pads, &scaled, start)) {
+            self.neighbours.add(here, state);
         }
         self.answer(load, score)
     }
@@ -307,7 +311,7 @@ impl Work<'_> {
 
     fn end(self, worst: Option<(usize, Score)>, outranked: bool) -> Scored {
         Scored {
-            worst,
+            worst: worst.map(|worst| self.case.numbered(worst)),
             all: Vec::new(),
             solved: self.solved.len(),
             compared: self.compared,
@@ -333,8 +337,9 @@ impl Work<'_> {
 }
 
 /// `mu_s` of congruent faces in full contact: their summed pressure is constant.
-fn slip_only(pads: &Pads, problem: &Problem<'_>, load: usize, seed: Twist) -> f64 {
-    let load = pads.load(problem.distance, problem.force, &problem.wrenches[load]);
+fn slip_only(pads: &Pads, case: &Case<'_>, load: usize) -> f64 {
+    let (problem, seed) = (case.problem, case.seeds[load].twist);
+    let load = pads.load(problem.distance, problem.force, case.wrench(load));
     let field = Field { area: &pads.areas[0], p: [2.0 / pads.moments[0][0], 0.0, 0.0] };
     slip::solve(&[field], load.direction, Some(pads.scaled_twist(seed)), Refiner::Newton).mu
         * load.size

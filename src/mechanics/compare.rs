@@ -8,29 +8,137 @@
 //! correction can change of the dissipation, and so of `mu_s`, at most: `D` is a norm of the twist
 //! and linear in the pressure.
 
+use nalgebra::{Matrix3, SMatrix, Vector2, Vector3, Vector4};
+
 use super::branch::{COUPLING_SEARCH, strong};
 use super::equilibrium::{Integrals, Matrix7, Solver, State, Vector7, solve_newton, unknowns};
 use super::pads::{Load, Pads};
 use super::pressure;
 use super::slip;
 use super::solve::{Options, Search, Start, finish};
-use crate::contact::{Loops, Twist};
+use crate::contact::Twist;
 use crate::model::Score;
 use crate::request::{Refiner, Separation};
 
 /// A state of a contact near the limit state of some load.
 #[derive(Debug, Clone)]
-pub(crate) struct Neighbour(Integrals);
+pub(crate) struct Neighbour {
+    z: Vector7,
+    first: FirstStep,
+}
 
 impl Neighbour {
     /// The state of a load where another one's solution begins.
-    pub(crate) fn at(pads: &Pads, load: &Load, start: Start) -> Self {
-        Self(Solver::new(pads, *load, Refiner::Newton).integrate(&start.0))
+    pub(crate) fn at(pads: &Pads, load: &Load, start: Start) -> Option<Self> {
+        let mut solver = Solver::new(pads, *load, Refiner::Newton);
+        let integrals = solver.integrate(&start.0);
+        Self::new(&mut solver, &integrals)
+    }
+
+    /// `None` where the equations are singular.
+    fn new(solver: &mut Solver<'_>, integrals: &Integrals) -> Option<Self> {
+        let first = FirstStep::new(solver, integrals)?;
+        Some(Self { z: integrals.z, first })
     }
 
     /// For [`super::solve_next`].
     pub(crate) fn start(&self) -> Start {
-        Start(self.0.z)
+        Start(self.z)
+    }
+}
+
+/// Newton's first step from a state, for whatever load: all of the equations' solution that does
+/// not depend on it. Of the load's part in the Jacobian only the lever of the friction, half the
+/// distance times the load's size, is left, in the two rows of the moments.
+#[derive(Debug, Clone)]
+struct FirstStep {
+    /// Residuals without a load, and those of the moments' rows for each unit of lever.
+    residual: Vector7,
+    by_lever: Vector2<f64>,
+    /// Inverse of the slip's rows by the twist, and times what these rows have by the pressure.
+    turn: Matrix3<f64>,
+    turn_pressure: SMatrix<f64, 3, 4>,
+    /// One over what the normal forces' rows have by their own offset, and the offsets' change by
+    /// the slopes.
+    offset: [f64; 2],
+    slope: [[f64; 2]; 2],
+    /// Rows of the moments once the twist is put in: by the slip's right-hand sides and by the
+    /// pressure for each unit of lever, and by the pressure without it.
+    lever_slip: SMatrix<f64, 2, 3>,
+    lever_pressure: SMatrix<f64, 2, 4>,
+    pressure: SMatrix<f64, 2, 4>,
+}
+
+impl FirstStep {
+    fn new(solver: &mut Solver<'_>, at: &Integrals) -> Option<Self> {
+        let load = solver.load;
+        // No load, and a lever of one where the coupling counts.
+        solver.load = Load {
+            direction: Default::default(),
+            size: 1.0,
+            normal: [0.0; 2],
+            moment: [0.0; 2],
+            half_distance: 1.0,
+        };
+        let (mut without, mut with) = (Matrix7::zeros(), Matrix7::zeros());
+        let residual = solver.equations(at, 0.0, Some(&mut without)).residual;
+        let coupled = solver.equations(at, 1.0, Some(&mut with)).residual;
+        solver.load = load;
+        let turn = without.fixed_view::<3, 3>(0, 0).try_inverse()?;
+        let by_pressure = without.fixed_view::<3, 4>(0, 3);
+        let lever = with.fixed_view::<2, 7>(5, 0) - without.fixed_view::<2, 7>(5, 0);
+        let lever_slip = lever.fixed_view::<2, 3>(0, 0) * turn;
+        let offset = [without[(3, 3)], without[(4, 4)]].map(|x| 1.0 / x);
+        Some(Self {
+            residual,
+            by_lever: coupled.fixed_rows::<2>(5) - residual.fixed_rows::<2>(5),
+            turn_pressure: turn * by_pressure,
+            turn,
+            slope: [0, 1].map(|k| [5, 6].map(|column| -without[(3 + k, column)] * offset[k])),
+            offset,
+            lever_pressure: lever.fixed_view::<2, 4>(0, 3) - lever_slip * by_pressure,
+            lever_slip,
+            pressure: without.fixed_view::<2, 4>(5, 3).into_owned(),
+        })
+    }
+
+    /// The residuals under a load, and the step. Not finite where the equations are singular.
+    fn of(&self, load: &Load) -> (Vector7, Vector7) {
+        let lever = load.half_distance * load.size;
+        let mut residual = self.residual;
+        let wanted = [
+            load.direction.f1,
+            load.direction.f2,
+            load.direction.m3,
+            load.normal[0],
+            load.normal[1],
+            load.moment[0] + lever * self.by_lever[0],
+            load.moment[1] + lever * self.by_lever[1],
+        ];
+        for (r, wanted) in residual.iter_mut().zip(wanted) {
+            *r += wanted;
+        }
+        let slip = -Vector3::new(residual[0], residual[1], residual[2]);
+        let base = [0, 1].map(|k| -residual[3 + k] * self.offset[k]);
+        let rows = lever * self.lever_pressure + self.pressure;
+        let turned = lever * (self.lever_slip * slip);
+        let row = |r: usize| {
+            let by = |column: usize| {
+                rows[(r, 2 + column)]
+                    + rows[(r, 0)] * self.slope[0][column]
+                    + rows[(r, 1)] * self.slope[1][column]
+            };
+            let known = turned[r] + rows[(r, 0)] * base[0] + rows[(r, 1)] * base[1];
+            [by(0), by(1), -residual[5 + r] - known]
+        };
+        let ([a, b, e], [c, d, f]) = (row(0), row(1));
+        let inverse = 1.0 / (a * d - b * c);
+        let tilt = [(e * d - b * f) * inverse, (a * f - e * c) * inverse];
+        let offset =
+            [0, 1].map(|k| base[k] + self.slope[k][0] * tilt[0] + self.slope[k][1] * tilt[1]);
+        let q = Vector4::new(offset[0], offset[1], tilt[0], tilt[1]);
+        let v = self.turn * slip - self.turn_pressure * q;
+        (residual, Vector7::from([v.x, v.y, v.z, q.x, q.y, q.z, q.w]))
     }
 }
 
@@ -48,9 +156,9 @@ pub(crate) struct Question {
 pub(crate) enum Comparison {
     /// Its limit state is the only one near and its `mu_s` lies between these: below the value asked
     /// about, or as close together as asked for.
-    Between([f64; 2], Neighbour),
+    Between([f64; 2]),
     /// Its answer, as [`super::solve_next`] gives it.
-    Solved(Score, Neighbour),
+    Solved(Score),
 }
 
 /// Ratio of two corrections up to which Newton's method converges for certain.
@@ -61,18 +169,31 @@ const WITHIN: f64 = 2.0;
 const CORRECTIONS: u32 = 6;
 
 /// Compares loads on one contact.
-#[derive(Debug)]
 pub(crate) struct Comparer<'a> {
-    pads: &'a Pads,
     /// Gripping force \[N\].
     force: f64,
-    scratch: [Loops; 2],
+    solver: Solver<'a>,
+    /// Where the last load was left, or somewhere near.
+    reached: Integrals,
 }
 
 impl<'a> Comparer<'a> {
     /// For loads on these pads at this gripping force \[N\].
     pub(crate) fn new(pads: &'a Pads, force: f64) -> Self {
-        Self { pads, force, scratch: Default::default() }
+        let none = Load {
+            direction: Default::default(),
+            size: 0.0,
+            normal: [1.0; 2],
+            moment: [0.0; 2],
+            half_distance: 0.0,
+        };
+        let solver = Solver::new(pads, none, Refiner::Newton);
+        Self { force, solver, reached: Integrals::default() }
+    }
+
+    /// The state near the last load's on which something was found out.
+    pub(crate) fn reached(&mut self) -> Option<Neighbour> {
+        Neighbour::new(&mut self.solver, &self.reached)
     }
 
     /// What is asked about the `mu_s` of a load, which must have an in-plane part and press both
@@ -91,30 +212,35 @@ impl<'a> Comparer<'a> {
         if load.normal.iter().any(|&n| n <= 0.0) {
             return None;
         }
-        let mut solver = Solver::new(self.pads, *load, Refiner::Newton);
-        solver.scratch = std::mem::take(&mut self.scratch);
+        let solver = &mut self.solver;
+        (solver.load, solver.evaluations) = (*load, 0);
         // A pad that lifts ends the grip: that is for the solution to say.
         let question = match options.separation {
             Separation::Discard => Question { value: 0.0, sharp: 0.0 },
             Separation::Solve => question,
         };
-        let seed = options.seed.map(|twist| self.pads.scaled_twist(twist));
-        let found = near.and_then(|Neighbour(near)| solver.approach(near, question));
+        let seed = options.seed.map(|twist| solver.pads.scaled_twist(twist));
+        let found = near.and_then(|near| {
+            let (residual, step) = near.first.of(load);
+            let known = step.iter().all(|x| x.is_finite());
+            known.then(|| solver.approach(near.z, residual, step, question, &mut self.reached))?
+        });
         // From a state far away Newton's method may get lost.
         let found = found.or_else(|| {
             let start = solver.without_coupling(seed)?;
-            solver.approach(&start, question)
+            let mut jacobian = Matrix7::zeros();
+            let at = solver.equations(&start, 1.0, Some(&mut jacobian));
+            let step = -solve_newton(&jacobian, &at.residual)?;
+            solver.approach(at.z, at.residual, step, question, &mut self.reached)
         });
-        let evaluations = solver.evaluations;
-        self.scratch = solver.scratch;
-        let (state, bounds, integrals) = found?;
-        let near = Neighbour(integrals);
+        let (state, bounds) = found?;
         Some(match state {
-            None => Comparison::Between(bounds, near),
+            None => Comparison::Between(bounds),
             Some(state) => {
                 let options = &Options { search: Search::Off, ..*options };
-                let score = finish(self.pads, self.force, load, &state, true, evaluations, options);
-                Comparison::Solved(score, near)
+                let (pads, evaluations) = (solver.pads, solver.evaluations);
+                let score = finish(pads, self.force, load, &state, true, evaluations, options);
+                Comparison::Solved(score)
             }
         })
     }
@@ -131,45 +257,47 @@ impl Solver<'_> {
         Some(self.integrate(&unknowns(v, q)))
     }
 
-    /// Newton's method from `start` until bounds on `mu_s` answer the question, or else to the limit
-    /// state; with the integrals reached.
+    /// Newton's method from `z`, where the equations leave `residual`, and its first `step` until
+    /// bounds on `mu_s` answer the question, or else to the limit state; with the integrals
+    /// `reached`.
     fn approach(
         &mut self,
-        start: &Integrals,
+        mut z: Vector7,
+        mut residual: Vector7,
+        mut step: Vector7,
         Question { value, sharp }: Question,
-    ) -> Option<(Option<State>, [f64; 2], Integrals)> {
+        reached: &mut Integrals,
+    ) -> Option<(Option<State>, [f64; 2])> {
         let mut jacobian = Matrix7::zeros();
-        let mut at = self.equations(start, 1.0, Some(&mut jacobian));
-        let mut step = -solve_newton(&jacobian, &at.residual)?;
-        let mut integrals = *start;
         for _ in 0..CORRECTIONS {
-            integrals = self.integrate(&(at.z + step));
-            let next = self.equations(&integrals, 1.0, Some(&mut jacobian));
+            *reached = self.integrate(&(z + step));
+            let next = self.equations(reached, 1.0, Some(&mut jacobian));
             let pressed = next.moments.iter().all(|m| m[0] > 0.0) && next.mu_over_size > 0.0;
-            let falls = next.residual.norm() <= 0.9 * at.residual.norm();
+            let falls = next.residual.norm() <= 0.9 * residual.norm();
             if !(pressed && falls) {
                 return None;
             }
             let correction = -solve_newton(&jacobian, &next.residual)?;
             let (before, after) = (self.change(&next, &step), self.change(&next, &correction));
+            (z, residual) = (next.z, next.residual);
             if after <= CONTRACTION * before {
                 let [least, most] =
                     [-WITHIN, WITHIN].map(|by| (next.mu_over_size + by * after) * self.load.size);
                 let weak = most * 2.0 * self.load.half_distance.abs() <= COUPLING_SEARCH;
                 let sharp_enough = sharp > 0.0 && most - least <= sharp * most;
                 if weak && (most < value || sharp_enough) {
-                    return Some((None, [least, most], integrals));
+                    return Some((None, [least, most]));
                 }
                 if sharp == 0.0 && next.mu_over_size * self.load.size >= value {
-                    (at, step) = (next, correction);
+                    step = correction;
                     break;
                 }
             }
-            (at, step) = (next, correction);
+            step = correction;
         }
-        let found = self.newton(at.z + step, 1.0, 6)?;
+        let found = self.newton(z + step, 1.0, 6)?;
         let mu = found.mu_over_size * self.load.size;
-        (!strong(&found, &self.load)).then_some((Some(found), [mu; 2], integrals))
+        (!strong(&found, &self.load)).then_some((Some(found), [mu; 2]))
     }
 
     /// What a change of twist and pressure can change of the dissipation, at most: no point of the
@@ -178,8 +306,9 @@ impl Solver<'_> {
     fn change(&self, at: &State, step: &Vector7) -> f64 {
         let reach = |k: usize| self.pads.areas[k].middle().length() + self.pads.areas[k].radius();
         let radius = reach(0).max(reach(1));
-        let fastest = |z: &Vector7| z[0].hypot(z[1]) + z[2].abs() * radius;
-        let tilt = step[5].hypot(step[6]) * radius;
+        let length = |x: f64, y: f64| (x * x + y * y).sqrt();
+        let fastest = |z: &Vector7| length(z[0], z[1]) + z[2].abs() * radius;
+        let tilt = length(step[5], step[6]) * radius;
         let pressure: f64 =
             (0..2).map(|k| self.pads.moments[k][0] * (step[3 + k].abs() + tilt)).sum();
         let speed = fastest(step);

@@ -71,7 +71,7 @@ pub(super) struct Node {
 
 /// The friction and pressure integrals at a state: what the equations of any load on the contact
 /// are made of.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Integrals {
     pub(super) z: Vector7,
     /// Of the dissipation, per face.
@@ -125,13 +125,7 @@ impl<'a> Solver<'a> {
     pub(super) fn integrate(&mut self, z: &Vector7) -> Integrals {
         self.evaluations += 1;
         let q = [z[3], z[4], z[5], z[6]];
-        let mut at = Integrals {
-            z: *z,
-            gradients: [Vector3::zeros(); 2],
-            hessians: [Matrix3::zeros(); 2],
-            by_pressure: [[Vector3::zeros(); 3]; 2],
-            moments: [[0.0; 6]; 2],
-        };
+        let mut at = Integrals { z: *z, ..Integrals::default() };
         for k in 0..2 {
             let p = face_pressure(&q, k);
             let area = if separates(&self.pads.areas[k], p) {
@@ -402,8 +396,12 @@ pub(super) fn solve_newton(jacobian: &Matrix7, rhs: &Vector7) -> Option<Vector7>
         ]
     });
     for step in 0..5 {
-        let pivot =
-            (step..5).max_by(|&a, &b| rows[a][step].abs().total_cmp(&rows[b][step].abs()))?;
+        let mut pivot = step;
+        for row in step + 1..5 {
+            if rows[row][step].abs() >= rows[pivot][step].abs() {
+                pivot = row;
+            }
+        }
         rows.swap(step, pivot);
         let lead = rows[step];
         if lead[step] == 0.0 {

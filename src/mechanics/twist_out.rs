@@ -20,8 +20,9 @@ use crate::model::{Contact, Ring, Wrench};
 pub struct TwistOut {
     hull_i: Ring,
     hull_ii: Ring,
-    /// Outward unit normals of the Minkowski sum's edges.
-    normals: Vec<DVec2>,
+    /// Outward unit normals of the Minkowski sum's edges, with the supports of its two terms in that
+    /// direction.
+    normals: Vec<(DVec2, [f64; 2])>,
 }
 
 /// The weakest lever of a grip.
@@ -44,7 +45,7 @@ impl TwistOut {
             )
         };
         let (hull_i, hull_ii) = (hull(&contact.face_i), hull(&contact.face_ii));
-        let mut normals = Vec::with_capacity(hull_i.len() + hull_ii.len());
+        let mut normals: Vec<DVec2> = Vec::with_capacity(hull_i.len() + hull_ii.len());
         if hull_i.len() >= 3 && hull_ii.len() >= 3 {
             for (hull, sense) in [(&hull_i, 1.0), (&hull_ii, -1.0)] {
                 let edges = hull.iter().zip(hull.iter().cycle().skip(1));
@@ -55,6 +56,8 @@ impl TwistOut {
                 );
             }
         }
+        let supported = |e: DVec2| (e, [support(&hull_i, e), support(&hull_ii, -e)]);
+        let normals = normals.into_iter().map(supported).collect();
         Self { hull_i, hull_ii, normals }
     }
 
@@ -73,7 +76,7 @@ impl TwistOut {
     /// minimum over all directions wherever it is positive. `None` without contact on both faces.
     pub fn least_lever(&self) -> Option<Lever> {
         let levers =
-            self.normals.iter().map(|&direction| Lever { width: self.lever(direction), direction });
+            self.normals.iter().map(|&(direction, [i, ii])| Lever { width: i + ii, direction });
         levers.min_by(|a, b| a.width.total_cmp(&b.width))
     }
 
@@ -95,9 +98,9 @@ impl TwistOut {
             return f64::NEG_INFINITY;
         }
         let q = DVec2::new(-load.moment.y, load.moment.x);
-        let room = |normal: &DVec2| {
-            let limit = self.limit_moment(*normal, n_i, n_ii);
-            let left = limit - q.dot(*normal);
+        let room = |&(normal, [i, ii]): &(DVec2, [f64; 2])| {
+            let limit = n_i * i + n_ii * ii;
+            let left = limit - q.dot(normal);
             // With the areas apart, a limit can be negative: then only a moment the right way makes
             // room.
             if limit == 0.0 { left * f64::INFINITY } else { left / limit.abs() }

@@ -384,9 +384,9 @@ fn exact_answers_overlap_the_kernels_of_the_next_block() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
     gpu.start_clock().unwrap();
     pool.install(|| {
-        backend.by_blocks(3000, &batch, &set, |block| {
+        backend.by_blocks((3000, true), &batch, &set, |block| {
             order.push(block.range);
-            assert_eq!(block.seeds, expected);
+            assert_eq!(block.survivors.seeds, expected);
             std::thread::sleep(std::time::Duration::from_millis(200));
             Vec::new()
         })

@@ -1,0 +1,486 @@
+//! Which loads of a grip can be its worst, found on the processor without the rings of most of them.
+//!
+//! Let `R` be the largest ratio, for any load on a contact, of the bound from a triangle of twists
+//! to the largest value over the set. Loads whose value times `R` is below the value of another one
+//! are left out; only the others (some 5 to 20 of 500) get the bounds of [`super::search`]. Every
+//! load lies between the gradients at the corners of some triangle, `w = sum x_j g_j` with `x_j` not
+//! negative; its `mu` is at most `sum x_j`, and the values of the three twists are at least, in the
+//! mean, `sum_j x_j sum_i (g_j . v_i / D(v_i)) / 3`. So `R` is at most the largest of `3 / sum_i (g_j
+//! . v_i / D(v_i))` over corners and triangles ([`Screen::reach`]).
+
+use rayon::prelude::*;
+
+use super::job::Backend;
+use super::lanes::{LANES, Lanes, Loads, dot, larger, pick, pick_number, smaller};
+use super::layout::{
+    CONTACT_MARGIN, EdgeRecord, LEAST_DISSIPATION, LoadRecord, OUT_OF_RANGE, SeedRecord,
+};
+use super::prepare::{Contacts, RANGE, Records, not_searched};
+use super::problem::{Batch, F32_TOLERANCE, Problem, Seed, SeedStatus, check};
+use super::search::{Field, Planes, sign_of};
+use super::seeds::{NEGATED, RING, SeedSet};
+use super::table::{SLOTS, Table};
+use crate::error::Result;
+use crate::model::Wrench;
+
+/// Largest norm of the coupling in the tilt equations up to which full contact is told without the
+/// ring: `(1 - 0.4)^2` is above [`super::layout::COUPLING_MARGIN`].
+const LITTLE_COUPLING: f32 = 0.4;
+/// Largest change of a pressure, as a share of that of the squeeze, for which `R` is bounded.
+const NEAR_SQUEEZE: f32 = 0.5;
+/// In-plane load over the gripping force, and normal force over it, beyond which a load is looked at
+/// by itself.
+const ORDINARY: (f64, f64) = (1e-30, 1.999);
+/// Loads that one task looks at, at least.
+const TASK: usize = 1 << 11;
+
+/// The loads of some problems that can be the worst, with their seeds, one problem after the other.
+#[derive(Debug, Default)]
+pub(super) struct Survivors {
+    /// Which load of its problem each is; rising within a problem.
+    pub(super) loads: Vec<u32>,
+    /// Its seed.
+    pub(super) seeds: Vec<Seed>,
+    /// End of each problem's.
+    pub(super) ends: Vec<usize>,
+}
+
+impl Survivors {
+    /// Every load.
+    fn all(problems: &[Problem<'_>], seeds: Vec<Seed>) -> Self {
+        let mut all = Self { seeds, ..Self::default() };
+        for problem in problems {
+            all.loads.extend(0..problem.wrenches.len() as u32);
+            all.ends.push(all.loads.len());
+        }
+        all
+    }
+
+    /// The loads of each problem with their seeds.
+    pub(super) fn by_problem(&self) -> impl Iterator<Item = (&[u32], &[Seed])> {
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        starts
+            .zip(&self.ends)
+            .map(|(start, &end)| (&self.loads[start..end], &self.seeds[start..end]))
+    }
+}
+
+impl Backend {
+    /// The loads of each grip that can be the one with the largest `mu_s`, in their order, with
+    /// their seeds as [`Backend::seed`] gives them. On the processor the others are left out by a
+    /// bound; on a graphics processor all loads come back.
+    ///
+    /// # Errors
+    /// As [`Backend::seed`].
+    pub fn survivors(&self, batch: &Batch<'_>, seeds: &SeedSet) -> Result<Vec<Vec<(usize, Seed)>>> {
+        let contacts = Contacts::new(&batch.problems)?;
+        let found = self.survivors_on(&contacts, batch, seeds, false)?;
+        let pairs = |(loads, seeds): (&[u32], &[Seed])| {
+            loads.iter().map(|&load| load as usize).zip(seeds.iter().copied()).collect()
+        };
+        Ok(found.by_problem().map(pairs).collect())
+    }
+
+    /// [`Backend::survivors`] with the batch's contacts made ready before; with `all` of the loads.
+    pub(super) fn survivors_on(
+        &self,
+        contacts: &Contacts,
+        batch: &Batch<'_>,
+        seeds: &SeedSet,
+        all: bool,
+    ) -> Result<Survivors> {
+        if all || !matches!(self, Self::Cpu) {
+            let found = self.seed_on(contacts, batch, seeds)?;
+            return Ok(Survivors::all(&batch.problems, found));
+        }
+        let mut users: Vec<Vec<usize>> = vec![Vec::new(); contacts.ready.len()];
+        for (index, &slot) in contacts.slots.iter().enumerate() {
+            check(&batch.problems[index], index)?;
+            users[slot].push(index);
+        }
+        let of_contact = |(slot, users): (usize, Vec<usize>)| -> Result<Vec<(usize, Found)>> {
+            let Some(records) = &contacts.ready[slot].records else {
+                let none = |index: usize| {
+                    let count = batch.problems[index].wrenches.len() as u32;
+                    (index, (0..count).map(|load| (load, not_searched(SeedStatus::NoContact))))
+                };
+                let all = users.into_iter().map(none);
+                return Ok(all.map(|(index, found)| (index, found.collect())).collect());
+            };
+            let screen = Screen::new(records, seeds);
+            let loads = users.iter().map(|&index| batch.problems[index].wrenches.len()).sum();
+            let least = (users.len() * TASK).div_ceil(usize::max(loads, 1));
+            let one = |&index: &usize| Ok((index, screen.survivors(&batch.problems[index])?));
+            users.par_iter().with_min_len(least).map(one).collect()
+        };
+        let found: Vec<Vec<(usize, Found)>> =
+            users.into_par_iter().enumerate().map(of_contact).collect::<Result<_>>()?;
+        let mut by_problem: Vec<Found> = vec![Vec::new(); batch.problems.len()];
+        for (index, found) in found.into_iter().flatten() {
+            by_problem[index] = found;
+        }
+        let mut survivors = Survivors::default();
+        for found in by_problem {
+            for (load, seed) in found {
+                survivors.loads.push(load);
+                survivors.seeds.push(seed);
+            }
+            survivors.ends.push(survivors.loads.len());
+        }
+        Ok(survivors)
+    }
+}
+
+/// Loads of one problem that can be the worst, with their seeds.
+type Found = Vec<(u32, Seed)>;
+
+/// A contact on which loads are screened.
+struct Screen<'a> {
+    records: &'a Records,
+    seeds: &'a SeedSet,
+    table: Table,
+    /// `R`; for different faces under the pressure of the squeeze. [`f32::MAX`]: not known.
+    reach: f32,
+    /// Different faces: one over the pressure of the squeeze at each vertex.
+    squeezed: Vec<f32>,
+}
+
+impl<'a> Screen<'a> {
+    fn new(records: &'a Records, seeds: &'a SeedSet) -> Self {
+        let table = Table::new(&records.header, records.faces(), seeds);
+        let mut screen = Self { records, seeds, table, reach: f32::MAX, squeezed: Vec::new() };
+        let field = screen.field();
+        let planes = field.planes(&Loads::new(&[]));
+        let [at_i, at_ii] = [planes.at_i[0], planes.at_ii[0]];
+        let slope = [planes.slope[0][0], planes.slope[1][0]];
+        let (reach, squeezed) = if records.header.resolved == 0 {
+            (f32::MAX, Vec::new())
+        } else if records.header.faces == 1 {
+            (field.reach([at_i + at_ii]), Vec::new())
+        } else {
+            let on = |at: f32, sign: f32| {
+                move |edge: &EdgeRecord| {
+                    1.0 / (at + sign * (slope[0] * edge[0] + slope[1] * edge[1]))
+                }
+            };
+            let [i, ii] = field.edges;
+            let squeezed: Vec<f32> =
+                i.iter().map(on(at_i, 1.0)).chain(ii.iter().map(on(at_ii, -1.0))).collect();
+            let pressed = planes.full[0] && squeezed.iter().all(|p| p.is_finite() && *p > 0.0);
+            let pressures = [at_i, at_ii, slope[0], slope[1]];
+            (if pressed { field.reach(pressures) } else { f32::MAX }, squeezed)
+        };
+        (screen.reach, screen.squeezed) = (reach, squeezed);
+        screen
+    }
+
+    fn field(&self) -> Field<'_> {
+        Field {
+            header: &self.records.header,
+            edges: self.records.faces(),
+            table: &self.table,
+            rings: self.seeds.rings(),
+        }
+    }
+
+    /// The loads that can be the worst.
+    fn survivors(&self, problem: &Problem<'_>) -> Result<Found> {
+        let mut ceilings = vec![0.0; problem.wrenches.len().next_multiple_of(LANES)];
+        let floor = self.ceilings(problem, &mut ceilings);
+        let floor = f64::from(floor) * (1.0 - F32_TOLERANCE);
+        let reaches = |ceiling: f32| f64::from(ceiling) * (1.0 + F32_TOLERANCE) >= floor;
+        let mut found = Found::new();
+        let mut searched: Vec<(usize, f64)> = Vec::new();
+        let mut records: Vec<LoadRecord> = Vec::new();
+        for (load, wrench) in problem.wrenches.iter().enumerate() {
+            if !reaches(ceilings[load]) {
+                continue;
+            }
+            let seed = match self.records.load(problem, wrench) {
+                Ok((record, scale)) => {
+                    searched.push((found.len(), scale));
+                    records.push(record);
+                    not_searched(SeedStatus::NoContact)
+                }
+                Err(status) => not_searched(status),
+            };
+            found.push((load as u32, seed));
+        }
+        let mut answers = vec![SeedRecord::default(); records.len()];
+        super::cpu::search(&self.field(), &records, &mut answers);
+        for ((place, scale), record) in searched.into_iter().zip(&answers) {
+            found[place].1 = self.records.answer(record, scale)?;
+        }
+        found.retain(|(_, seed)| {
+            let bounded = matches!(seed.status, SeedStatus::Bounded | SeedStatus::Coupled);
+            !(bounded && seed.upper < floor)
+        });
+        Ok(found)
+    }
+
+    /// Writes what each load's `mu_s` is at most, infinite where that is not known; what the largest
+    /// is at least. With the widest vectors that the processor has.
+    fn ceilings(&self, problem: &Problem<'_>, out: &mut [f32]) -> f32 {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            #[allow(
+                unsafe_code,
+                reason = "three times the speed of the baseline's vectors; the feature was just detected"
+            )]
+            // SAFETY: the function needs AVX2, which this processor has.
+            return unsafe { ceilings_avx2(self, problem, out) };
+        }
+        ceilings_all(self, problem, out)
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn ceilings_avx2(screen: &Screen<'_>, problem: &Problem<'_>, out: &mut [f32]) -> f32 {
+    ceilings_all(screen, problem, out)
+}
+
+#[inline(always)]
+fn ceilings_all(screen: &Screen<'_>, problem: &Problem<'_>, out: &mut [f32]) -> f32 {
+    let field = screen.field();
+    let mut floor = 0.0;
+    for (wrenches, out) in problem.wrenches.chunks(LANES).zip(out.chunks_mut(LANES)) {
+        let (loads, ordinary) = side_by_side(screen.records, problem, wrenches);
+        let [low, high] = screen.range(&field, &loads);
+        for lane in 0..LANES {
+            let known = ordinary[lane] && high[lane] < f32::MAX;
+            out[lane] = if known { loads.scale[lane] * high[lane] } else { f32::INFINITY };
+            floor = larger(floor, if known { loads.scale[lane] * low[lane] } else { 0.0 });
+        }
+    }
+    floor
+}
+
+/// [`Records::load`] of loads side by side, and which of them can be told so: the others are looked
+/// at by themselves.
+#[inline(always)]
+fn side_by_side(
+    records: &Records,
+    problem: &Problem<'_>,
+    wrenches: &[Wrench],
+) -> (Loads, [bool; LANES]) {
+    let zero = [0.0_f64; LANES];
+    let (mut force, mut moment) = ([zero; 3], [zero; 3]);
+    for (lane, wrench) in wrenches.iter().enumerate().take(LANES) {
+        for m in 0..3 {
+            force[m][lane] = wrench.force[m];
+            moment[m][lane] = wrench.moment[m];
+        }
+    }
+    let (by_force, by_unit, o) = (1.0 / problem.force, 1.0 / records.unit, records.origin);
+    let by_moment = by_force * by_unit;
+    let distance = problem.distance * by_unit;
+    let mut loads = Loads::new(&[]);
+    let mut ordinary = [false; LANES];
+    for lane in 0..LANES {
+        let [fx, fy, fz] = [force[0][lane], force[1][lane], force[2][lane]];
+        let m1 = (moment[0][lane] - o.y * fz) * by_moment;
+        let m2 = (moment[1][lane] + o.x * fz) * by_moment;
+        let m3 = (moment[2][lane] - (o.x * fy - o.y * fx)) * by_moment;
+        let [f1, f2, f3] = [fx * by_force, fy * by_force, fz * by_force];
+        let length = (f1 * f1 + f2 * f2 + m3 * m3).sqrt();
+        ordinary[lane] = (length > ORDINARY.0)
+            & (length <= RANGE)
+            & (f3.abs() < ORDINARY.1)
+            & (m1.abs() <= RANGE)
+            & (m2.abs() <= RANGE)
+            & (distance.abs() <= RANGE);
+        let inverse = 1.0 / length;
+        loads.wrench[0][lane] = (f1 * inverse) as f32;
+        loads.wrench[1][lane] = (f2 * inverse) as f32;
+        loads.wrench[2][lane] = (m3 * inverse) as f32;
+        loads.scale[lane] = length as f32;
+        loads.f3[lane] = f3 as f32;
+        loads.m1[lane] = m1 as f32;
+        loads.m2[lane] = m2 as f32;
+        loads.distance[lane] = distance as f32;
+    }
+    (loads, ordinary)
+}
+
+impl Screen<'_> {
+    /// Bounds on the `mu_s` of unit wrenches without the ring; the upper one is [`f32::MAX`] where
+    /// none is known.
+    #[inline(always)]
+    fn range(&self, field: &Field<'_>, loads: &Loads) -> [Lanes; 2] {
+        if self.reach == f32::MAX {
+            return [[0.0; LANES], [f32::MAX; LANES]];
+        }
+        if field.header.faces == 1 {
+            let low = field.highest(loads);
+            let (mut high, mut mu) = (low, low);
+            for lane in 0..LANES {
+                high[lane] *= self.reach;
+                mu[lane] = loads.scale[lane] * high[lane];
+            }
+            let pressed = field.surely_pressed(loads, &mu);
+            for lane in 0..LANES {
+                high[lane] = if pressed[lane] { high[lane] } else { f32::MAX };
+            }
+            return [low, high];
+        }
+        let planes = field.planes(loads);
+        let (_, mut low) = field.strongest(loads, &planes);
+        let changes = field.changes(&planes, &self.squeezed);
+        let mut high = low;
+        for lane in 0..LANES {
+            let s = changes[lane];
+            high[lane] *= self.reach * (1.0 + s) / (1.0 - s);
+        }
+        let shares = field.coupled_share(loads, &planes, &high);
+        for lane in 0..LANES {
+            let known = (changes[lane] < NEAR_SQUEEZE) & (shares[lane] >= 0.0);
+            low[lane] /= 1.0 + shares[lane];
+            high[lane] = if known { high[lane] / (1.0 - shares[lane]) } else { f32::MAX };
+        }
+        [low, high]
+    }
+}
+
+impl Field<'_> {
+    /// `R` under a pressure: see the head of this file.
+    fn reach<const PRESSURES: usize>(&self, pressures: [f32; PRESSURES]) -> f32 {
+        let congruent = self.header.faces == 1;
+        // Twists over their dissipation.
+        let unit: Vec<[f32; 3]> = self
+            .table
+            .parts()
+            .map(|n| {
+                let d: f32 = pressures.iter().zip(&n[3..]).map(|(p, n)| p * n).sum();
+                let by = if congruent { 1.0 } else { 1.0 / larger(d, LEAST_DISSIPATION) };
+                [n[0] * by, n[1] * by, n[2] * by]
+            })
+            .collect();
+        let mut least = f32::MAX;
+        for (k, ring) in self.rings.iter().enumerate() {
+            let supports = self.table.ring(k).chunks_exact(3 * SLOTS);
+            let mut g = [0.0_f32; 3];
+            for (support, pressure) in supports.zip(pressures) {
+                for m in 0..3 {
+                    g[m] += pressure * support[m * SLOTS + SLOTS - 1];
+                }
+            }
+            let along =
+                ring.map(|entry| sign_of(entry) * dot(g, unit[(entry & !NEGATED) as usize]));
+            for slot in 0..RING {
+                // A corner of the icosahedron has one triangle less.
+                let (one, other) = (along[slot], along[(slot + 1) % RING]);
+                let sum = 1.0 + one + other;
+                least = if one > 0.0 && other > 0.0 { smaller(least, sum) } else { 0.0 };
+                if least == 0.0 {
+                    return f32::MAX;
+                }
+            }
+        }
+        3.0 / least
+    }
+
+    /// The best twist of each load and its value.
+    #[inline(always)]
+    pub(super) fn strongest(&self, loads: &Loads, planes: &Planes) -> ([u32; LANES], Lanes) {
+        let (mut best, mut value) = ([0_u32; LANES], [-1.0_f32; LANES]);
+        let w = &loads.wrench;
+        if self.header.faces == 1 {
+            for (k, n) in self.table.parts().enumerate() {
+                for lane in 0..LANES {
+                    let mu = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
+                    let better = mu > value[lane];
+                    best[lane] = pick(better, k as u32, best[lane]);
+                    value[lane] = larger(mu, value[lane]);
+                }
+            }
+            return (best, value);
+        }
+        // The largest of the quotients power / dissipation, without a division for each.
+        let mut least = [1.0_f32; LANES];
+        for (k, n) in self.table.parts().enumerate() {
+            for lane in 0..LANES {
+                let power = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
+                let d = planes.at_i[lane] * n[3]
+                    + planes.at_ii[lane] * n[4]
+                    + planes.slope[0][lane] * n[5]
+                    + planes.slope[1][lane] * n[6];
+                let d = larger(d, LEAST_DISSIPATION);
+                let better = power * least[lane] > value[lane] * d;
+                best[lane] = pick(better, k as u32, best[lane]);
+                value[lane] = pick_number(better, power, value[lane]);
+                least[lane] = pick_number(better, d, least[lane]);
+            }
+        }
+        for lane in 0..LANES {
+            value[lane] /= least[lane];
+        }
+        (best, value)
+    }
+
+    /// The largest value of each load on congruent faces.
+    #[inline(always)]
+    fn highest(&self, loads: &Loads) -> Lanes {
+        let mut value = [0.0_f32; LANES];
+        let w = &loads.wrench;
+        for n in self.table.parts() {
+            for lane in 0..LANES {
+                let mu = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
+                value[lane] = larger(mu, value[lane]);
+            }
+        }
+        value
+    }
+
+    /// Whether congruent faces stay in full contact whatever the twist, with the margins of the
+    /// search, for a friction of at most `mu`. The coupling changes the slope by at most `reach
+    /// softness` times the area's first moment for each unit of it, and by `reach softness |F3|`.
+    #[inline(always)]
+    fn surely_pressed(&self, loads: &Loads, mu: &Lanes) -> [bool; LANES] {
+        let header = self.header;
+        let k = header.compliance;
+        let zero = [0.0; LANES];
+        let (mut slope, mut more) = ([zero; 2], zero);
+        let (mut drop_i, mut drop_ii, mut held) = (zero, zero, [false; LANES]);
+        for lane in 0..LANES {
+            let (m1, m2, f3) = (loads.m1[lane], loads.m2[lane], loads.f3[lane]);
+            let distance = loads.distance[lane].abs();
+            let reach = 0.5 * distance * mu[lane] * header.softness;
+            let coupling = reach * header.spread;
+            let (s1, s2) = (-k[0] * m2 + k[1] * m1, -k[1] * m2 + k[2] * m1);
+            held[lane] = (coupling <= LITTLE_COUPLING) & (distance < OUT_OF_RANGE);
+            let change = reach * f3.abs() + coupling * (s1 * s1 + s2 * s2).sqrt();
+            more[lane] = change / (1.0 - coupling) * header.radius;
+            slope[0][lane] = s1;
+            slope[1][lane] = s2;
+            drop_i[lane] = (1.0 + 0.5 * f3 - CONTACT_MARGIN) / header.area_i;
+            drop_ii[lane] = (1.0 - 0.5 * f3 - CONTACT_MARGIN) / header.area_i;
+        }
+        for edge in self.edges[0] {
+            for lane in 0..LANES {
+                let here = slope[0][lane] * edge[0] + slope[1][lane] * edge[1];
+                held[lane] &=
+                    (here + more[lane] <= drop_ii[lane]) & (more[lane] - here <= drop_i[lane]);
+            }
+        }
+        held
+    }
+
+    /// Largest change of the pressure at a vertex from that of the squeeze, as a share of it.
+    #[inline(always)]
+    fn changes(&self, planes: &Planes, squeezed: &[f32]) -> Lanes {
+        let mut most = [0.0; LANES];
+        let faces = [(&planes.at_i, 1.0), (&planes.at_ii, -1.0)];
+        let vertices = self.edges[0].iter().map(|edge| (0, edge));
+        let vertices = vertices.chain(self.edges[1].iter().map(|edge| (1, edge)));
+        for ((face, edge), inverse) in vertices.zip(squeezed) {
+            let (at, sign) = faces[face];
+            let (x, y) = (sign * edge[0], sign * edge[1]);
+            for lane in 0..LANES {
+                let here = at[lane] + planes.slope[0][lane] * x + planes.slope[1][lane] * y;
+                most[lane] = larger(most[lane], (here * inverse - 1.0).abs());
+            }
+        }
+        most
+    }
+}
