@@ -6,6 +6,7 @@
 //! the gradient of the dissipation; pressure times these times the twist is the dissipation itself
 //! (it is homogeneous of degree one).
 
+use super::lanes::pick_number;
 use super::layout::{BASIS, ContactHeader, EdgeRecord, GAUSS, NEAR_LIMIT, ON_LINE, SERIES_LIMIT};
 
 /// `asinh(s2/|h|) - asinh(s1/|h|)` of an edge of length `l` at distance `h` from the apex, from `s1` to
@@ -21,15 +22,16 @@ pub(crate) fn edge_log(h: f32, l: f32, s1: f32, s2: f32, r1: f32, r2: f32) -> f3
     let z = l / (r1 + r2);
     let astride = (s1 < 0.0) & (s2 > 0.0);
     let ahead = s1 >= 0.0;
-    let (far, near) = if ahead { (s2 + r2, s1 + r1) } else { (r1 - s1, r2 - s2) };
-    let (a, b) = if astride { ((s2 + r2) * (r1 - s1), h * h) } else { (far, near) };
-    let (a, b) = (a.to_bits(), b.to_bits());
+    let far = pick_number(ahead, s2 + r2, r1 - s1);
+    let near = pick_number(ahead, s1 + r1, r2 - s2);
+    let a = pick_number(astride, (s2 + r2) * (r1 - s1), far).to_bits();
+    let b = pick_number(astride, h * h, near).to_bits();
     let exponent =
         f32::from_bits((a >> 23).wrapping_sub(b >> 23).wrapping_add(WHOLE.to_bits())) - WHOLE;
     let (m, n) = (f32::from_bits(a & FRACTION | ONE), f32::from_bits(b & FRACTION | ONE));
     let series = (z <= SERIES_LIMIT) & !astride;
-    let s = if series { z } else { (m - n) / (m + n) };
-    let exponent = if series { 0.0 } else { exponent };
+    let s = pick_number(series, z, (m - n) / (m + n));
+    let exponent = pick_number(series, 0.0, exponent);
     let q = s * s;
     let high = 1.0 / 9.0 + q * (1.0 / 11.0 + q * (1.0 / 13.0 + q * (1.0 / 15.0)));
     let sum = 1.0 + q * (1.0 / 3.0 + q * (1.0 / 5.0 + q * (1.0 / 7.0 + q * high)));
@@ -57,7 +59,7 @@ pub(crate) fn fan<const LANES: usize>(
             let (r1, r2) = ((h * h + s1 * s1).sqrt(), (h * h + s2 * s2).sqrt());
             let counts = h.abs() > ON_LINE;
             let log = edge_log(h, l, s1, s2, r1, r2);
-            let (h, log) = if counts { (h, log) } else { (0.0, 0.0) };
+            let (h, log) = (pick_number(counts, h, 0.0), pick_number(counts, log, 0.0));
             let dr = (s2 - s1) * (s2 + s1) / (r1 + r2);
             let sr = s2 * r2 - s1 * r1;
             let h2log = h * h * log;

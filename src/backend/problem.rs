@@ -91,7 +91,7 @@ pub(crate) fn check(problem: &Problem<'_>, index: usize) -> Result<()> {
         let (f, m) = (wrench.force, wrench.moment);
         ((f.x + f.y) + (f.z + m.x) + (m.y + m.z)) * 0.0
     };
-    if problem.wrenches.iter().map(nothing).all(|nothing| nothing == 0.0) {
+    if problem.wrenches.iter().map(nothing).sum::<f64>() == 0.0 {
         return Ok(());
     }
     for (load, wrench) in problem.wrenches.iter().enumerate() {

@@ -202,7 +202,7 @@ impl Field<'_> {
     /// equation for the share; its smaller root cannot be left on the way from no coupling to all
     /// of it.
     #[inline(always)]
-    pub(super) fn coupled_share(&self, loads: &Loads, planes: &Planes, upper: &Lanes) -> Lanes {
+    pub(crate) fn coupled_share(&self, loads: &Loads, planes: &Planes, upper: &Lanes) -> Lanes {
         let header = self.header;
         let zero = [0.0; LANES];
         // Largest relative change of pressure at a vertex per change of slope, as the squares of

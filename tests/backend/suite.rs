@@ -229,6 +229,51 @@ fn bounds_enclose_the_answer(backend: &Backend) {
     }
 }
 
+/// A load that is left out has an answer, and one below that of a load that is not.
+fn survivors_are_the_loads_that_can_be_the_worst(backend: &Backend) {
+    let mut random = Random::new(47);
+    let set = SeedSet::default();
+    let (mut left_out, mut loads) = ([0; 2], 0);
+    for index in 0..90 {
+        let size = 10_f64.powf(random.range(-2.0, 0.0));
+        let contact = if index % 3 == 0 { random.similar(size) } else { random.congruent(size) };
+        let force = 10_f64.powf(random.range(0.0, 3.0));
+        let strength = force * 10_f64.powf(random.range(-2.0, -0.3));
+        let point = random.vector() * size * random.range(0.1, 1.5);
+        let mut wrenches = ball(60, point);
+        for wrench in &mut wrenches {
+            *wrench = Wrench { force: wrench.force * strength, moment: wrench.moment * strength };
+        }
+        // No load, and one that pulls a pad off.
+        wrenches.push(Wrench::default());
+        wrenches.push(Wrench { force: DVec3::Z * 3.0 * force, ..Wrench::default() });
+        let distance = size * random.range(-2.0, 5.0);
+        let problem = Problem { contact: &contact, distance, force, wrenches: &wrenches };
+        let seeds = seed(backend, vec![problem], &set);
+        let batch = Batch { problems: vec![problem] };
+        let found = backend.survivors(&batch, &set).unwrap().remove(0);
+        assert!(found.iter().all(|&(load, ref seed)| *seed == seeds[load]), "{problem:?}");
+        assert!(found.is_sorted_by(|a, b| a.0 < b.0) && found.len() >= 3, "{problem:?}");
+        let mu = |load: usize| {
+            let wrench = &wrenches[load];
+            mechanics::solve(&contact, distance, force, wrench, &Options::default()).unwrap()
+        };
+        let largest = found.iter().filter_map(|&(load, _)| mu(load).mu_s).fold(0.0, f64::max);
+        for load in 0..wrenches.len() {
+            if found.iter().all(|&(other, _)| other != load) {
+                let score = mu(load);
+                let below = score.mu_s.is_some_and(|mu| mu < largest);
+                assert!(score.status.holds() && below, "{load}: {score:?} {largest} {problem:?}");
+                left_out[usize::from(index % 3 == 0)] += 1;
+            }
+        }
+        loads += wrenches.len();
+    }
+    println!("left out: {left_out:?} of {loads}");
+    let screens = matches!(backend, Backend::Cpu);
+    assert!(!screens || left_out[0] > loads / 4 && left_out[1] > loads / 50, "{left_out:?}");
+}
+
 fn seeds_start_the_solver_close(backend: &Backend) {
     let mut random = Random::new(5);
     let (set, dense) = (SeedSet::default(), SeedSet::with_at_least(10_000).unwrap());
@@ -742,6 +787,7 @@ macro_rules! suite {
 
 suite!(
     bounds_enclose_the_answer,
+    survivors_are_the_loads_that_can_be_the_worst,
     seeds_start_the_solver_close,
     few_loads_of_a_ball_are_solved,
     few_loads_of_a_ball_are_solved_on_different_faces,
