@@ -100,7 +100,9 @@ pub(super) fn run(request: &Request, variants: &[Variant]) -> anyhow::Result<Exi
         for path in [&mut request.output.output, &mut request.output.report].into_iter().flatten() {
             *path = tagged(path, &variant.tag);
         }
-        let plan = Plan::builder(request.clone()).command(std::env::args().collect()).build()?;
+        // The table has the best grip of each.
+        let builder = Plan::builder(request.clone()).command(std::env::args().collect());
+        let plan = builder.first_only().build()?;
         let name = format!("{}{}", plan.gripper().name, variant.label);
         watch.about(&name);
         if !request.output.yes && !agreed(&plan.ahead()?)? {

@@ -299,6 +299,13 @@ fn grippers_are_compared_and_flags_given_twice_are_refused() {
     assert_eq!(output.status.code(), Some(0), "{out}{}", text(&output.stderr));
     let rows: Vec<&str> = out.lines().filter(|line| line.contains(" holds ")).collect();
     assert!(rows.len() == 2 && rows[0].contains("2F-85") && rows[1].contains("RG2"), "{out}");
+    // Without files only the first grips are solved to the end; they are the same.
+    let table = gripfast(at, &format!("{base} {two}"));
+    let table = text(&table.stdout);
+    assert!(
+        table.lines().filter(|line| line.contains(" holds ")).eq(rows.iter().copied()),
+        "{table}"
+    );
     for name in ["robotiq-2f85", "onrobot-rg2"] {
         let set = GripSet::read(&at.join(format!("grips.{name}.json"))).unwrap();
         assert_eq!(set.provenance.request.gripper, name);
