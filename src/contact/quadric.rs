@@ -16,6 +16,7 @@ use glam::DVec2;
 use super::far::RULES;
 use crate::geometry::polygon::ring_contains;
 use crate::model::Ring;
+use edge::EdgeSums;
 
 /// Gauss points on a panel. With panels no longer than [`PANEL`] of their distance from the slip
 /// centre the error is below 1e-15 of the panel's share.
@@ -478,150 +479,6 @@ impl Region {
             }
         });
     }
-
-    /// Points between a part of an element and the line of [`Self::foot`], `range` of both
-    /// parameters, cut until the slip centre is far from each part.
-    fn area_panel<const BY: bool>(
-        &self,
-        element: &Element,
-        twist: [f64; 3],
-        centre: DVec2,
-        range: [[f64; 2]; 2],
-        depth: u32,
-        sum: &mut (Dissipation, [[f64; 3]; 3]),
-    ) {
-        let [s, t] = range;
-        let middle = |r: [f64; 2]| 0.5 * (r[0] + r[1]);
-        let line = |s: f64| {
-            let (x, dx) = self.at(element, s);
-            (self.foot(x, dx).0, x)
-        };
-        let lines = [s[0], middle(s), s[1]].map(line);
-        let point = |line: (DVec2, DVec2), t: f64| line.0.lerp(line.1, t);
-        let along = (point(lines[2], t[1]) - point(lines[0], t[1])).length();
-        let across = |line: (DVec2, DVec2)| (t[1] - t[0]) * (line.1 - line.0).length();
-        let distance = (point(lines[1], middle(t)) - centre).length();
-        let wide = across(lines[1]);
-        if along.max(wide) > PANEL * distance && depth < 40 {
-            let split = |r: [f64; 2]| [[r[0], middle(r)], [middle(r), r[1]]];
-            for part in split(if along > wide { s } else { t }) {
-                let range = if along > wide { [part, t] } else { [s, part] };
-                self.area_panel::<BY>(element, twist, centre, range, depth + 1, sum);
-            }
-            return;
-        }
-        // As seen from the nearer end.
-        let widest = lines.map(across).into_iter().fold(0.0, f64::max);
-        let bent = element.arc.map_or(0.0, |arc| arc.bent * (s[1] - s[0]));
-        let [of_along, of_wide] = [(along, widest), (widest, along)]
-            .map(|(length, other)| length / (distance - 0.5 * other).max(0.5 * length));
-        let counts = [(enough(of_along.max(bent)) + MORE).min(POINTS), enough(of_wide)];
-        let rules = counts.map(|count| RULES[count].as_slice());
-        self.area_sums::<BY>(element, twist, range, rules, sum);
-    }
-
-    /// Points of the part between an element and the line of [`Self::foot`] by Gauss rules along and
-    /// across.
-    fn area_sums<const BY: bool>(
-        &self,
-        element: &Element,
-        [u1, u2, omega]: [f64; 3],
-        [s, t]: [[f64; 2]; 2],
-        [along, across]: [&[(f64, f64)]; 2],
-        (sum, by): &mut (Dissipation, [[f64; 3]; 3]),
-    ) {
-        // Upper half of the second derivatives by rows.
-        let (mut value, mut gradient, mut bends) = (0.0, [0.0; 3], [0.0; 6]);
-        for &(ns, ws) in along {
-            let (x, dx) = self.at(element, s[0] + ns * (s[1] - s[0]));
-            let (foot, turn) = self.foot(x, dx);
-            if turn == 0.0 {
-                continue;
-            }
-            let turn = ws * (s[1] - s[0]) * turn * (t[1] - t[0]);
-            for &(nt, wt) in across {
-                let x = foot.lerp(x, t[0] + nt * (t[1] - t[0]));
-                let area = turn * wt;
-                let weight = area * self.u.value(x);
-                let v = DVec2::new(u1 - omega * x.y, u2 + omega * x.x);
-                let speed = v.length();
-                let inverse = speed.recip();
-                let e = inverse * v;
-                let (turned, along) = (x.perp_dot(e), x.dot(e));
-                value += weight * speed;
-                gradient[0] += weight * e.x;
-                gradient[1] += weight * e.y;
-                gradient[2] += weight * turned;
-                let bend = weight * inverse;
-                bends[0] += bend * e.y * e.y;
-                bends[1] -= bend * e.y * e.x;
-                bends[2] -= bend * e.y * along;
-                bends[3] += bend * e.x * e.x;
-                bends[4] += bend * e.x * along;
-                bends[5] += bend * along * along;
-                if BY {
-                    by_pressure(by, area, x, [e.x, e.y, turned]);
-                }
-            }
-        }
-        sum.value += value;
-        sum.gradient.iter_mut().zip(gradient).for_each(|(sum, more)| *sum += more);
-        let [a, b, c, d, e, f] = bends;
-        for (row, more) in sum.hessian.iter_mut().zip([[a, b, c], [b, d, e], [c, e, f]]) {
-            row.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
-        }
-    }
-
-    /// The boundary's part of the integrals about the slip centre, cut finer towards it.
-    fn edge_panel<const BY: bool>(
-        &self,
-        element: &Element,
-        centre: DVec2,
-        s: [f64; 2],
-        depth: u32,
-        sum: &mut EdgeSums,
-    ) {
-        let middle = 0.5 * (s[0] + s[1]);
-        let length = (self.at(element, s[1]).0 - self.at(element, s[0]).0).length();
-        let distance = (self.at(element, middle).0 - centre).length();
-        if length > PANEL * distance && depth < 48 {
-            self.edge_panel::<BY>(element, centre, [s[0], middle], depth + 1, sum);
-            self.edge_panel::<BY>(element, centre, [middle, s[1]], depth + 1, sum);
-            return;
-        }
-        let bent = element.arc.map_or(0.0, |arc| arc.bent * (s[1] - s[0]));
-        let points = (enough((length / distance).max(bent)) + MORE).min(POINTS);
-        let here = self.u.value(centre);
-        let slope = self.u.slope(centre);
-        for &(node, weight) in &RULES[points] {
-            let (x, dx) = self.at(element, s[0] + node * (s[1] - s[0]));
-            let y = x - centre;
-            let r = y.length();
-            if r == 0.0 {
-                continue;
-            }
-            let turn = weight * (s[1] - s[0]) * y.perp_dot(dx);
-            let e = y / r;
-            let (one, two) = (slope.dot(y), 0.5 * self.u.l.dot(y * y));
-            let moment = turn * r * (here / 3.0 + one / 4.0 + two / 5.0);
-            let force = turn * (here / 2.0 + one / 3.0 + two / 4.0);
-            let bend = turn / r * (here + one / 2.0 + two / 3.0);
-            sum.r += moment;
-            sum.e += force * e;
-            sum.h[0] += bend * e.x * e.x;
-            sum.h[1] += bend * e.x * e.y;
-            sum.h[2] += bend * e.y * e.y;
-            if BY {
-                let (of_one, of_y) = (turn / 2.0, turn / 3.0 * y);
-                sum.by_e[0] += of_one * e;
-                sum.by_e[1] += of_y.x * e;
-                sum.by_e[2] += of_y.y * e;
-                sum.by_r[0] += r * turn / 3.0;
-                sum.by_r[1] += r * turn / 4.0 * y.x;
-                sum.by_r[2] += r * turn / 4.0 * y.y;
-            }
-        }
-    }
 }
 
 /// Adds a point's share of the gradients for `1`, `x1` and `x2` in place of the pressure.
@@ -631,43 +488,6 @@ fn by_pressure(by: &mut [[f64; 3]; 3], area: f64, x: DVec2, tangent: [f64; 3]) {
         for (sum, tangent) in row.iter_mut().zip(tangent) {
             *sum += factor * tangent;
         }
-    }
-}
-
-/// `int u r`, `int u e` and `int u e e^T / r` about the slip centre, `e` the unit vector from it; the
-/// first two also for `1`, `y1`, `y2` in place of `u`, `y` the place as seen from the centre.
-#[derive(Debug, Clone, Copy, Default)]
-struct EdgeSums {
-    r: f64,
-    e: DVec2,
-    h: [f64; 3],
-    by_r: [f64; 3],
-    by_e: [DVec2; 3],
-}
-
-impl EdgeSums {
-    fn assemble(&self, c: DVec2, omega: f64) -> (Dissipation, [[f64; 3]; 3]) {
-        let sign = omega.signum();
-        let gradient = |r: f64, e: DVec2| {
-            let force = sign * e.perp();
-            [force.x, force.y, sign * r + c.perp_dot(force)]
-        };
-        let [h11, h12, h22] = self.h.map(|h| h / omega.abs());
-        let h13 = -c.y * h11 + c.x * h12;
-        let h23 = -c.y * h12 + c.x * h22;
-        let h33 = -c.y * h13 + c.x * h23;
-        // x = c + y.
-        let by = [
-            gradient(self.by_r[0], self.by_e[0]),
-            gradient(c.x * self.by_r[0] + self.by_r[1], c.x * self.by_e[0] + self.by_e[1]),
-            gradient(c.y * self.by_r[0] + self.by_r[2], c.y * self.by_e[0] + self.by_e[2]),
-        ];
-        let found = Dissipation {
-            value: omega.abs() * self.r,
-            gradient: gradient(self.r, self.e),
-            hessian: [[h11, h12, h13], [h12, h22, h23], [h13, h23, h33]],
-        };
-        (found, by)
     }
 }
 
@@ -690,5 +510,7 @@ fn roots(c: f64, b: f64, a: f64) -> [Option<f64>; 2] {
     }
 }
 
+mod area;
+mod edge;
 #[cfg(test)]
 mod tests;
