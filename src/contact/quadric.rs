@@ -14,9 +14,9 @@
 use glam::DVec2;
 
 use super::far::RULES;
+use super::lanes::{LANES, Lane, total, widest};
 use crate::geometry::polygon::ring_contains;
 use crate::model::Ring;
-use edge::EdgeSums;
 
 /// Gauss points on a panel. With panels no longer than [`PANEL`] of their distance from the slip
 /// centre the error is below 1e-15 of the panel's share.
@@ -104,6 +104,12 @@ struct Arc {
     bent: f64,
 }
 
+impl Arc {
+    /// Of no bend.
+    const STRAIGHT: Self =
+        Self { normal: DVec2::ZERO, bend: 0.0, curve: 0.0, slope: [1.0, 0.0], bent: 0.0 };
+}
+
 /// Gauss points for a panel's length over its distance from the slip centre.
 fn enough(ratio: f64) -> usize {
     FEWER.iter().find(|few| ratio <= few.0).map_or(POINTS, |few| few.1)
@@ -181,10 +187,13 @@ impl Region {
                 let step = b - a;
                 let bend = 0.5 * u.l.dot(step * step);
                 let rise = u.value(b) - u.value(a) - bend;
-                let mut cuts = vec![0.0];
-                let roots = roots(u.value(a), rise, bend);
-                cuts.extend(roots.into_iter().flatten().filter(|t| *t > 0.0 && *t < 1.0));
-                cuts.push(1.0);
+                let (mut cuts, mut count) = ([0.0; 4], 1);
+                let roots = roots(u.value(a), rise, bend).into_iter().flatten();
+                for cut in roots.filter(|t| *t > 0.0 && *t < 1.0).chain([1.0]) {
+                    cuts[count] = cut;
+                    count += 1;
+                }
+                let cuts = &cuts[..count];
                 for pair in cuts.windows(2) {
                     if u.value(a + 0.5 * (pair[0] + pair[1]) * step) > 0.0 {
                         let end = |t: f64| if t == 1.0 { b } else { a + t * step };
@@ -337,6 +346,17 @@ impl Region {
     /// Calls `visit` with points of the area and their weights, right for polynomials of `x` up to
     /// the fourth degree besides `u` on straight pieces; weights may be negative where the area is not convex.
     pub fn points(&self, mut visit: impl FnMut(DVec2, f64)) {
+        self.rows(|x, y, weights| {
+            for i in 0..LANES {
+                visit(DVec2::new(x[i], y[i]), weights[i]);
+            }
+        });
+    }
+
+    /// The same points by fours.
+    #[inline(always)]
+    fn rows(&self, mut visit: impl FnMut(&Lane, &Lane, &Lane)) {
+        let across = &RULES[LANES];
         for element in &self.elements {
             let rule = &RULES[element.arc.map_or(5, |arc| (enough(arc.bent) + 2).min(POINTS))];
             for &(s, ws) in rule {
@@ -345,9 +365,12 @@ impl Region {
                 if turn == 0.0 {
                     continue;
                 }
-                for &(t, wt) in &RULES[4] {
-                    visit(foot.lerp(x, t), turn * ws * wt);
-                }
+                let (turn, way) = (turn * ws, x - foot);
+                visit(
+                    &std::array::from_fn(|i| foot.x + across[i].0 * way.x),
+                    &std::array::from_fn(|i| foot.y + across[i].0 * way.y),
+                    &std::array::from_fn(|i| turn * across[i].1),
+                );
             }
         }
     }
@@ -391,27 +414,12 @@ impl Region {
 
     /// Area and `int u dA`.
     pub fn area_and_load(&self) -> (f64, f64) {
-        let (mut area, mut load) = (0.0, 0.0);
-        self.points(|x, weight| {
-            area += weight;
-            load += weight * self.u.value(x);
-        });
-        (area, load)
+        area_and_load(self)
     }
 
     /// `int f q dA` for `f` of `u`, `1`, `x1`, `x2` (rows) and `q` of `1`, `x1`, `x2`, `x x grad gap`.
     pub fn moments(&self, gap: &Quadratic) -> [[f64; 4]; 4] {
-        let mut sums = [[0.0; 4]; 4];
-        self.points(|x, weight| {
-            let values = [1.0, x.x, x.y, x.perp_dot(gap.slope(x))];
-            let factors = [weight * self.u.value(x), weight, weight * x.x, weight * x.y];
-            for (row, factor) in sums.iter_mut().zip(factors) {
-                for (sum, value) in row.iter_mut().zip(values) {
-                    *sum += factor * value;
-                }
-            }
-        });
-        sums
+        moments(self, gap)
     }
 
     /// `int u |v| dA` for the twist `(u1, u2, omega)` about the origin of the region's axes, any
@@ -448,15 +456,7 @@ impl Region {
             }
             return sum;
         }
-        let mut edge = EdgeSums::default();
-        for element in &self.elements {
-            // An edge on a line through the slip centre adds nothing.
-            let across = (element.a - centre).perp_dot(element.b - element.a);
-            if element.arc.is_some() || across != 0.0 {
-                self.edge_panel::<BY>(element, centre, [0.0, 1.0], 0, &mut edge);
-            }
-        }
-        edge.assemble(centre, omega)
+        self.edges(centre, BY).assemble(centre, omega)
     }
 
     /// [`Self::dissipation`] of a translation: moments of the pressure.
@@ -489,6 +489,46 @@ fn by_pressure(by: &mut [[f64; 3]; 3], area: f64, x: DVec2, tangent: [f64; 3]) {
             *sum += factor * tangent;
         }
     }
+}
+
+widest! {
+    /// See [`Region::area_and_load`].
+    fn area_and_load(region: &Region) -> (f64, f64) = area_and_load_in
+}
+
+#[inline(always)]
+fn area_and_load_in(region: &Region) -> (f64, f64) {
+    let (mut area, mut load) = ([0.0; LANES], [0.0; LANES]);
+    region.rows(|x, y, weights| {
+        for i in 0..LANES {
+            area[i] += weights[i];
+            load[i] += weights[i] * region.u.value(DVec2::new(x[i], y[i]));
+        }
+    });
+    (total(&area), total(&load))
+}
+
+widest! {
+    /// See [`Region::moments`].
+    fn moments(region: &Region, gap: &Quadratic) -> [[f64; 4]; 4] = moments_in
+}
+
+#[inline(always)]
+fn moments_in(region: &Region, gap: &Quadratic) -> [[f64; 4]; 4] {
+    let mut lanes = [[[0.0; LANES]; 4]; 4];
+    region.rows(|x, y, weights| {
+        for i in 0..LANES {
+            let (at, weight) = (DVec2::new(x[i], y[i]), weights[i]);
+            let values = [1.0, at.x, at.y, at.perp_dot(gap.slope(at))];
+            let factors = [weight * region.u.value(at), weight, weight * at.x, weight * at.y];
+            for row in 0..4 {
+                for column in 0..4 {
+                    lanes[row][column][i] += factors[row] * values[column];
+                }
+            }
+        }
+    });
+    lanes.map(|row| row.each_ref().map(total))
 }
 
 fn contains(rings: &[Ring], x: DVec2) -> bool {

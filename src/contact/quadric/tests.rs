@@ -89,13 +89,12 @@ fn both_ways_agree_and_the_derivatives_are_those_of_the_value() {
             let twist = [c.y, -c.x, 1.0].map(|x| if i % 2 == 0 { x } else { -x });
             let got = region.dissipation(twist);
             // Points of the area serve at a slip centre inside too, on many panels.
-            let (mut points, mut edge) = (Default::default(), EdgeSums::default());
+            let mut points = Default::default();
             for element in &region.elements {
                 let whole = [[0.0, 1.0]; 2];
                 region.area_panel::<true>(element, twist, c, whole, 0, &mut points);
-                region.edge_panel::<true>(element, c, [0.0, 1.0], 0, &mut edge);
             }
-            let (edges, by_edges) = edge.assemble(c, twist[2]);
+            let (edges, by_edges) = region.edges(c, true).assemble(c, twist[2]);
             let (points, by_points) = points;
             for (a, b) in by_points.iter().flatten().zip(by_edges.iter().flatten()) {
                 assert!((a - b).abs() < 1e-9, "{u:?} {twist:?} {by_points:?} {by_edges:?}");
