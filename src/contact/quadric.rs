@@ -11,6 +11,8 @@
 //! each degree of `p |v|`. Other slip centres, translations among them: points of the area itself,
 //! where nothing large cancels.
 
+use std::sync::LazyLock;
+
 use glam::DVec2;
 
 use super::far::RULES;
@@ -109,6 +111,17 @@ impl Arc {
     const STRAIGHT: Self =
         Self { normal: DVec2::ZERO, bend: 0.0, curve: 0.0, slope: [1.0, 0.0], bent: 0.0 };
 }
+
+/// Gauss rules of four, eight and twelve nodes: nodes and weights by fours.
+static BLOCKS: LazyLock<[Vec<[Lane; 2]>; POINTS / LANES + 1]> = LazyLock::new(|| {
+    std::array::from_fn(|blocks| {
+        let rule = &RULES[blocks * LANES][..];
+        let lane = |nodes: &[(f64, f64)]| {
+            [std::array::from_fn(|i| nodes[i].0), std::array::from_fn(|i| nodes[i].1)]
+        };
+        rule.chunks(LANES).map(lane).collect()
+    })
+});
 
 /// Gauss points for a panel's length over its distance from the slip centre.
 fn enough(ratio: f64) -> usize {
@@ -346,33 +359,17 @@ impl Region {
     /// Calls `visit` with points of the area and their weights, right for polynomials of `x` up to
     /// the fourth degree besides `u` on straight pieces; weights may be negative where the area is not convex.
     pub fn points(&self, mut visit: impl FnMut(DVec2, f64)) {
-        self.rows(|x, y, weights| {
+        for [x, y, weights] in self.rows() {
             for i in 0..LANES {
                 visit(DVec2::new(x[i], y[i]), weights[i]);
             }
-        });
+        }
     }
 
     /// The same points by fours.
     #[inline(always)]
-    fn rows(&self, mut visit: impl FnMut(&Lane, &Lane, &Lane)) {
-        let across = &RULES[LANES];
-        for element in &self.elements {
-            let rule = &RULES[element.arc.map_or(5, |arc| (enough(arc.bent) + 2).min(POINTS))];
-            for &(s, ws) in rule {
-                let (x, dx) = self.at(element, s);
-                let (foot, turn) = self.foot(x, dx);
-                if turn == 0.0 {
-                    continue;
-                }
-                let (turn, way) = (turn * ws, x - foot);
-                visit(
-                    &std::array::from_fn(|i| foot.x + across[i].0 * way.x),
-                    &std::array::from_fn(|i| foot.y + across[i].0 * way.y),
-                    &std::array::from_fn(|i| turn * across[i].1),
-                );
-            }
-        }
+    fn rows(&self) -> Rows<'_> {
+        Rows { region: self, elements: self.elements.iter(), at: None, across: &RULES[LANES] }
     }
 
     /// The quadratic at a point of the region's axes.
@@ -491,6 +488,45 @@ fn by_pressure(by: &mut [[f64; 3]; 3], area: f64, x: DVec2, tangent: [f64; 3]) {
     }
 }
 
+/// Points of a region by fours: places along both axes, and weights.
+struct Rows<'a> {
+    region: &'a Region,
+    elements: std::slice::Iter<'a, Element>,
+    /// The element at hand, and nodes along it that are still to come.
+    at: Option<(&'a Element, std::slice::Iter<'static, (f64, f64)>)>,
+    across: &'static [(f64, f64)],
+}
+
+impl Iterator for Rows<'_> {
+    type Item = [Lane; 3];
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<[Lane; 3]> {
+        loop {
+            let Some((element, nodes)) = &mut self.at else {
+                let element = self.elements.next()?;
+                let along = element.arc.map_or(5, |arc| (enough(arc.bent) + 2).min(POINTS));
+                self.at = Some((element, RULES[along].iter()));
+                continue;
+            };
+            let Some(&(s, weight)) = nodes.next() else {
+                self.at = None;
+                continue;
+            };
+            let (x, dx) = self.region.at(element, s);
+            let (foot, turn) = self.region.foot(x, dx);
+            if turn != 0.0 {
+                let (turn, way) = (turn * weight, x - foot);
+                return Some([
+                    std::array::from_fn(|i| foot.x + self.across[i].0 * way.x),
+                    std::array::from_fn(|i| foot.y + self.across[i].0 * way.y),
+                    std::array::from_fn(|i| turn * self.across[i].1),
+                ]);
+            }
+        }
+    }
+}
+
 widest! {
     /// See [`Region::area_and_load`].
     fn area_and_load(region: &Region) -> (f64, f64) = area_and_load_in
@@ -499,12 +535,12 @@ widest! {
 #[inline(always)]
 fn area_and_load_in(region: &Region) -> (f64, f64) {
     let (mut area, mut load) = ([0.0; LANES], [0.0; LANES]);
-    region.rows(|x, y, weights| {
+    for [x, y, weights] in region.rows() {
         for i in 0..LANES {
             area[i] += weights[i];
             load[i] += weights[i] * region.u.value(DVec2::new(x[i], y[i]));
         }
-    });
+    }
     (total(&area), total(&load))
 }
 
@@ -516,7 +552,7 @@ widest! {
 #[inline(always)]
 fn moments_in(region: &Region, gap: &Quadratic) -> [[f64; 4]; 4] {
     let mut lanes = [[[0.0; LANES]; 4]; 4];
-    region.rows(|x, y, weights| {
+    for [x, y, weights] in region.rows() {
         for i in 0..LANES {
             let (at, weight) = (DVec2::new(x[i], y[i]), weights[i]);
             let values = [1.0, at.x, at.y, at.perp_dot(gap.slope(at))];
@@ -527,7 +563,7 @@ fn moments_in(region: &Region, gap: &Quadratic) -> [[f64; 4]; 4] {
                 }
             }
         }
-    });
+    }
     lanes.map(|row| row.each_ref().map(total))
 }
 

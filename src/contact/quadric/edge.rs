@@ -4,12 +4,9 @@
 //! are `s^k r`, `s^k / r` and `s^k / r^3` with `r^2 = d^2 + s^2`: closed forms, where the slip
 //! centre is so near that a rule would need many panels.
 
-use std::sync::LazyLock;
-
 use glam::DVec2;
 
-use super::{Arc, Dissipation, Element, MORE, PANEL, POINTS, Region, enough};
-use crate::contact::far::RULES;
+use super::{Arc, BLOCKS, Dissipation, Element, MORE, PANEL, POINTS, Region, enough};
 use crate::contact::lanes::{LANES, Lane, total, widest};
 
 /// `int u r`, `int u e` and `int u e e^T / r` about the slip centre, `e` the unit vector from it; the
@@ -115,17 +112,6 @@ struct Panels {
 
 /// [`EdgeSums`] by lanes.
 type Lanes = [Lane; 15];
-
-/// Gauss rules of four, eight and twelve nodes: nodes and weights by blocks.
-static BLOCKS: LazyLock<[Vec<[Lane; 2]>; POINTS / LANES + 1]> = LazyLock::new(|| {
-    std::array::from_fn(|blocks| {
-        let rule = &RULES[blocks * LANES][..];
-        let lane = |nodes: &[(f64, f64)]| {
-            [std::array::from_fn(|i| nodes[i].0), std::array::from_fn(|i| nodes[i].1)]
-        };
-        rule.chunks(LANES).map(lane).collect()
-    })
-});
 
 /// What all nodes of a region have in common.
 #[derive(Clone, Copy)]
