@@ -300,18 +300,6 @@ impl Plan {
         for remark in proposer.tally().remarks(&self.gripper, &self.propose) {
             observer.note(&remark);
         }
-        let curved = self.part.curved.iter().filter(|face| face.outside && face.reachable).count();
-        let plane_only = proposer.tally().pairs > 0 && !proposer.tries_curved();
-        if self.propose.curved.is_none() && plane_only && curved > 0 {
-            let these = match curved {
-                1 => "a curved face that pads can close on: it is".to_owned(),
-                many => format!("{many} curved faces that pads can close on: they are"),
-            };
-            observer.note(&format!(
-                "the part has {these} tried when the option curved is set, which takes long with many \
-                 loads"
-            ));
-        }
         let (complete, checkpoint) = (found.complete, found.checkpoint.clone());
         let lost = found.collector.take_lost();
         let misses = self.misses(proposer, &lost);

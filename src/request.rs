@@ -97,8 +97,8 @@ pub struct Candidates {
     pub angle_step: Angle,
     /// Approach along and across the edges of the gripped faces as well.
     pub edge_angles: bool,
-    /// Close on curved faces from outside; absent: only where no two plane faces lie within the
-    /// stroke, because such a grip takes several times as long as one between planes.
+    /// Close on curved faces, and on opposite planes that are not parallel; absent: where no two
+    /// plane faces lie within the stroke, or where that makes no more than 20,000 candidates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub curved: Option<bool>,
     /// Smallest contact area on either face, as a share of the most that a pad can touch there: the

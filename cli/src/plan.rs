@@ -53,6 +53,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::from(2));
     }
     let interrupt = Interrupt::watched()?;
+    watch.hold(&interrupt);
     let outcome = plan.run(&mut watch, &interrupt.stop);
     watch.end();
     let outcome = outcome?;

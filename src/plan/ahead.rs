@@ -25,6 +25,9 @@ pub struct Ahead {
 /// kinds with one core.
 const CANDIDATE: f64 = 15e-6;
 const LOAD: f64 = 1.5e-6;
+/// More for a grip on curved faces, and for one of its loads \[s\].
+const CURVED: f64 = 1e-3;
+const CURVED_LOAD: f64 = 20e-6;
 /// Share of the candidates that are grips.
 const GRIPS: f64 = 0.5;
 /// Bytes of one grip in a result file, and of one load of it.
@@ -38,10 +41,12 @@ impl Plan {
     /// As [`Proposer::new`].
     pub fn ahead(&self) -> Result<Ahead> {
         let propose = || Proposer::new(&self.part, &self.gripper, &self.propose);
-        let candidates = self.threads.install(propose)?.candidates();
+        let proposer = self.threads.install(propose)?;
+        let (candidates, curved) = (proposer.candidates(), proposer.curved_candidates());
         let (loads, threads) = (self.loads.len() as u64, self.threads.current_num_threads() as u64);
         let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get() as u64);
-        let work = candidates as f64 * (CANDIDATE + GRIPS * LOAD * loads as f64);
+        let work = candidates as f64 * (CANDIDATE + GRIPS * LOAD * loads as f64)
+            + curved as f64 * GRIPS * (CURVED + CURVED_LOAD * loads as f64);
         let kept = (self.request.kept() as f64).min(candidates as f64);
         let listed = match self.request.scoring.polish {
             crate::request::Polish::All => loads as f64,

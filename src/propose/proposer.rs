@@ -61,6 +61,10 @@ pub struct Tally {
     /// \[rad\].
     #[serde(default)]
     pub nearest_approach: Option<f64>,
+    /// Curved or drafted faces are left out, because they make very many candidates beside those
+    /// between planes, and were not asked for.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub curved_left_out: bool,
 }
 
 impl Tally {
@@ -78,6 +82,13 @@ impl Tally {
                 gripper.name,
                 gripper.stroke[0] * 1e3,
                 gripper.stroke[1] * 1e3
+            ));
+        }
+        if self.curved_left_out {
+            remarks.push(format!(
+                "curved faces make more than {} candidates: they are tried when the option curved is \
+                 set, which takes longer than planes do",
+                site::MOST_CANDIDATES
             ));
         }
         if count(Rejection::OpeningTooSmall) > 0 {
@@ -254,6 +265,7 @@ impl<'a> Proposer<'a> {
         tally.pairs = pairs.len() as u64 + round.pairs;
         let outer = stroke(PairKind::External);
         round.widths.iter().for_each(|&width| tally.note_width(width, &outer));
+        tally.curved_left_out = round.left_out;
         tally.leaning = round.leans;
         tally.leaning.sort_by(f64::total_cmp);
         tally.leaning.dedup_by(|a, b| (*a - *b).abs() < SAME_LEAN);
@@ -295,18 +307,17 @@ impl<'a> Proposer<'a> {
 
     /// Number of candidates in all.
     pub fn candidates(&self) -> u64 {
-        self.sites
-            .iter()
-            .map(|site| {
-                let special: usize = site.special.iter().map(Vec::len).sum();
-                (site.grid() + special) as u64 * self.orientations().len() as u64
-            })
-            .sum()
+        self.count(&self.sites)
     }
 
-    /// Whether there are candidates on curved faces.
-    pub fn tries_curved(&self) -> bool {
-        self.sites.len() > self.plane
+    /// Number of candidates on curved and drafted faces among them.
+    pub fn curved_candidates(&self) -> u64 {
+        self.count(&self.sites[self.plane..])
+    }
+
+    fn count(&self, sites: &[Site]) -> u64 {
+        let poses: usize = sites.iter().map(Site::candidates).sum();
+        poses as u64 * self.orientations().len() as u64
     }
 
     /// Counts so far.

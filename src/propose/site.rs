@@ -18,7 +18,8 @@ use serde::{Deserialize, Serialize};
 
 use places::{angles, main_direction, positions, straight_edges};
 pub(super) use relief::Relief;
-pub(super) use round::Round;
+use round::Budget;
+pub(super) use round::{MOST_CANDIDATES, Round};
 pub(super) use rows::steepest;
 use shapes::{project, same_shape, stretches, to_site};
 use special::{Landmarks, Posture};
@@ -152,6 +153,7 @@ pub(super) fn sites(
         planes: &planes,
         chosen,
         directions: Vec::new(),
+        budget: Budget::NONE,
     };
     let mut sites = Vec::new();
     for (kind, pairs) in &groups {
@@ -161,10 +163,18 @@ pub(super) fn sites(
     let mut round = Round::default();
     let named = |faces: &Vec<u32>| faces.iter().any(|&face| face as usize >= part.faces.len());
     let asked = options.faces.as_ref().is_some_and(named) || sites.is_empty();
-    if options.curved.unwrap_or(asked) {
+    let budget = match options.curved {
+        Some(true) => Some(Budget::NONE),
+        Some(false) => None,
+        None if asked => Some(Budget::NONE),
+        None => Some(Budget::FEW),
+    };
+    if let Some(budget) = budget {
         let curved;
+        finder.budget = budget;
         (curved, round) = finder.round()?;
         sites.extend(curved);
+        finder.budget = budget;
         sites.extend(finder.leaning(&mut round)?);
     }
     Ok(Sites { sites, directions: finder.directions, plane, round })
@@ -253,6 +263,8 @@ struct Finder<'a> {
     chosen: Option<&'a [bool]>,
     /// Closing directions so far.
     directions: Vec<DVec3>,
+    /// What may still be tried on curved faces.
+    budget: Budget,
 }
 
 impl Finder<'_> {
@@ -453,6 +465,11 @@ impl Finder<'_> {
 }
 
 impl Site {
+    /// Number of candidates, at each of the ways to put the jaws.
+    pub(super) fn candidates(&self) -> usize {
+        self.grid() + self.special.iter().map(Vec::len).sum::<usize>()
+    }
+
     /// Number of candidates of the grid.
     pub(super) fn grid(&self) -> usize {
         self.positions.len() * self.angles.len()

@@ -113,8 +113,9 @@ struct CandidateArgs {
     /// Approach along and across the edges of the gripped faces as well.
     #[arg(long, value_name = "true|false", hide_possible_values = true)]
     edge_angles: Option<bool>,
-    /// Closes on curved faces from outside, too. Such a grip takes several times as long as one
-    /// between planes [default: only where no two plane faces lie within the stroke].
+    /// Closes on curved faces, and on opposite planes that are not parallel, as well. Such a grip
+    /// takes longer than one between parallel planes [default: where no two planes lie within the
+    /// stroke, or where that makes no more than 20000 candidates].
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
     curved: Option<bool>,
     /// Smallest contact area on either face, as a share of the most that the face pair allows (pad

@@ -108,6 +108,7 @@ pub(super) fn run(request: &Request, variants: &[Variant]) -> anyhow::Result<Exi
         if !request.output.yes && !agreed(&plan.ahead()?)? {
             return Ok(ExitCode::from(2));
         }
+        watch.hold(&interrupt);
         let outcome = plan.run(&mut watch, &interrupt.stop);
         watch.end();
         outcomes.push(Compared { name, plan, outcome: outcome? });

@@ -17,16 +17,24 @@ pub(super) struct Watch {
     about: String,
     /// Warnings that were given.
     given: Vec<String>,
+    /// See [`Interrupt::at_once`].
+    at_once: Option<Arc<AtomicBool>>,
 }
 
 impl Watch {
     pub(super) fn new(quiet: bool) -> Self {
-        Self { quiet, bar: None, about: String::new(), given: Vec::new() }
+        Self { quiet, bar: None, about: String::new(), given: Vec::new(), at_once: None }
     }
 
     /// From now on notes are about this plan.
     pub(super) fn about(&mut self, name: &str) {
         self.about = format!("{name}: ");
+    }
+
+    /// An interrupt ends the program at once until the search has begun.
+    pub(super) fn hold(&mut self, interrupt: &Interrupt) {
+        interrupt.at_once.store(true, Ordering::Relaxed);
+        self.at_once = Some(Arc::clone(&interrupt.at_once));
     }
 
     /// Takes the bar away.
@@ -47,6 +55,9 @@ impl Watch {
 
 impl Observer for Watch {
     fn progress(&mut self, progress: Progress) {
+        if let Some(at_once) = self.at_once.take() {
+            at_once.store(false, Ordering::Relaxed);
+        }
         let (quiet, first) = (self.quiet, self.bar.is_none());
         let bar = self.bar.get_or_insert_with(|| progress_bar(progress.total, quiet));
         bar.set_position(progress.done);
@@ -95,6 +106,9 @@ fn progress_bar(total: u64, quiet: bool) -> ProgressBar {
 pub(crate) struct Interrupt {
     /// Set by the first one.
     pub(crate) stop: Arc<AtomicBool>,
+    /// Whether the next one ends the program at once: there is nothing yet to be kept, or it is the
+    /// second.
+    at_once: Arc<AtomicBool>,
     /// The exit code that it asks for, 0 without one.
     code: Arc<AtomicUsize>,
 }
@@ -104,15 +118,17 @@ impl Interrupt {
     pub(crate) fn watched() -> std::io::Result<Self> {
         use signal_hook::consts::{SIGINT, SIGTERM};
         use signal_hook::flag;
-        let (stop, code) = (Arc::<AtomicBool>::default(), Arc::<AtomicUsize>::default());
+        let (stop, at_once) = (Arc::<AtomicBool>::default(), Arc::<AtomicBool>::default());
+        let code = Arc::<AtomicUsize>::default();
         for signal in [SIGINT, SIGTERM] {
             // As shells number them: 130 and 143.
             let ends = 128 + signal;
-            flag::register_conditional_shutdown(signal, ends, Arc::clone(&stop))?;
+            flag::register_conditional_shutdown(signal, ends, Arc::clone(&at_once))?;
             flag::register_usize(signal, Arc::clone(&code), ends as usize)?;
             flag::register(signal, Arc::clone(&stop))?;
+            flag::register(signal, Arc::clone(&at_once))?;
         }
-        Ok(Self { stop, code })
+        Ok(Self { stop, at_once, code })
     }
 
     /// The exit code of an interrupted program.

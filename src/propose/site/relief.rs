@@ -11,7 +11,7 @@ use crate::geometry::{HalfPlane, clip_ring_half_plane, even_odd, intersect_conve
 use crate::gripper::{Jaws, Layer};
 use crate::mechanics::curved::Pads;
 use crate::model::{Contact, Gap, Patch, Piece, Polygon, Ring, Surfaces};
-use crate::part::{CurvedFace, Part, Shape};
+use crate::part::{CurvedFace, Part, PlanarFace, Shape};
 use crate::propose::options::ProposeOptions;
 
 /// Surface that leans more against the pads' plane (cosine of the angle) is no place for a pad.
@@ -23,6 +23,8 @@ const FLAT: f64 = 1e-7;
 pub(super) const LEVEL: f64 = 5e-4;
 /// The part of a radius to either side of a crest within which the parabola stands for the circle.
 const PARABOLA: f64 = 0.9;
+/// Share of the reach that is added to boxes against rounding.
+const SLACK: f64 = 1e-3;
 /// Corners of the window around what a pad may touch of a sphere.
 const WINDOW: usize = 32;
 /// Step of the approach angle about a point contact, at least \[rad\].
@@ -193,34 +195,96 @@ fn moved(polygon: &Polygon, gap: &Gap, map: &DAffine2) -> Piece {
     Piece { outer, holes, gap: mapped(gap, map) }
 }
 
-/// Looks for the surface that faces a pad's plane.
-pub(super) struct Surveyor<'a> {
-    pub(super) part: &'a Part,
-    /// Triangles of no face.
-    pub(super) loose: &'a [u32],
-    /// Axes of the closing direction.
-    pub(super) axes_from_part: DMat3,
-    /// Height of the pad's plane in them.
-    pub(super) height: f64,
-    /// 1 for the pad above, facing `-z`; -1 for the one below.
-    pub(super) side: f64,
-    /// Largest gap that counts \[m\].
-    pub(super) reach: f64,
-    /// How far above the pad's plane what counts may rise \[m\]: more is on the pad's other side.
-    pub(super) above: f64,
-    /// Where pads get to.
-    pub(super) region: Bounds2,
+/// The part's surface in the axes of one closing direction, for one look after the other.
+pub(super) struct Survey<'a> {
+    part: &'a Part,
+    axes_from_part: DMat3,
+    /// Boxes around plane faces and curved ones, and the triangles of no face with theirs.
+    planes: Vec<Span>,
+    curved: Vec<Span>,
+    loose: Vec<(Span, u32)>,
 }
 
-impl Surveyor<'_> {
+/// A box around a piece of surface: across the closing direction, and along it.
+#[derive(Debug, Clone, Copy)]
+struct Span {
+    across: Bounds2,
+    along: [f64; 2],
+}
+
+impl Span {
+    fn of(points: impl Iterator<Item = DVec3>) -> Self {
+        let none = Self { across: Bounds2::EMPTY, along: [f64::INFINITY, f64::NEG_INFINITY] };
+        points.fold(none, |Self { across, along: [low, high] }, point| {
+            let at = point.truncate();
+            Self {
+                across: across.union(Bounds2 { min: at, max: at }),
+                along: [low.min(point.z), high.max(point.z)],
+            }
+        })
+    }
+}
+
+impl<'a> Survey<'a> {
+    /// `loose`: triangles of no face.
+    pub(super) fn new(part: &'a Part, loose: &[u32], axes_from_part: DMat3) -> Self {
+        let corners = |&triangle: &u32| {
+            part.mesh.corners(triangle).map(|corner| axes_from_part * corner).into_iter()
+        };
+        let plane = |face: &PlanarFace| {
+            let outlines = face.polygons.iter().flat_map(|polygon| &polygon.outer);
+            Span::of(outlines.map(|at| axes_from_part * face.part_from_face.point(at.extend(0.0))))
+        };
+        let curved = |face: &CurvedFace| Span::of(face.triangles.iter().flat_map(corners));
+        Self {
+            part,
+            axes_from_part,
+            planes: part.faces.iter().map(plane).collect(),
+            curved: part.curved.iter().map(curved).collect(),
+            loose: loose.iter().map(|id| (Span::of(corners(id)), *id)).collect(),
+        }
+    }
+
+    /// What faces each pad's plane within a region: up to a gap of `reach`, and no higher than `above`
+    /// \[m\].
+    pub(super) fn pieces(
+        &self,
+        heights: [f64; 2],
+        [reach, above]: [f64; 2],
+        region: Bounds2,
+    ) -> [Vec<Piece>; 2] {
+        [(heights[0], 1.0), (heights[1], -1.0)].map(|(height, side)| {
+            Look { survey: self, height, side, reach, above, region }.pieces()
+        })
+    }
+}
+
+/// Looks for the surface that faces one pad's plane.
+struct Look<'a> {
+    survey: &'a Survey<'a>,
+    /// Height of the pad's plane in the axes.
+    height: f64,
+    /// 1 for the pad above, facing `-z`; -1 for the one below.
+    side: f64,
+    /// Largest gap that counts \[m\].
+    reach: f64,
+    /// How far above the pad's plane what counts may rise \[m\]: more is on the pad's other side.
+    above: f64,
+    /// Where pads get to.
+    region: Bounds2,
+}
+
+impl Look<'_> {
     /// All pieces.
-    pub(super) fn pieces(&self) -> Vec<Piece> {
+    fn pieces(&self) -> Vec<Piece> {
         let mut pieces = Vec::new();
-        for index in 0..self.part.faces.len() {
+        let Survey { part, planes, curved, loose, .. } = self.survey;
+        for (index, _) in planes.iter().enumerate().filter(|(_, span)| self.meets(span)) {
             self.plane(index, &mut pieces);
         }
-        let mut facets: Vec<u32> = self.loose.to_vec();
-        for face in &self.part.curved {
+        let near = loose.iter().filter(|(span, _)| self.meets(span));
+        let mut facets: Vec<u32> = near.map(|(_, id)| *id).collect();
+        for (face, _) in part.curved.iter().zip(curved).filter(|(_, span)| self.meets(span)) {
             if !self.curved(face, &mut pieces) {
                 facets.extend(&face.triangles);
             }
@@ -230,6 +294,16 @@ impl Surveyor<'_> {
         }
         pieces.retain(|piece| largest(piece) > -self.above);
         pieces
+    }
+
+    /// Whether anything in a box can count.
+    fn meets(&self, span: &Span) -> bool {
+        let [low, high] = span.along.map(|z| self.side * (self.height - z));
+        // A curved face between the corners of its facets.
+        let slack = 0.1 * (high - low).abs() + SLACK * self.reach;
+        low.min(high) <= self.reach + slack
+            && low.max(high) > -self.above - slack
+            && span.across.grown(slack).meets(self.region)
     }
 
     /// The region as a ring, cut where a plane gap exceeds the reach.
@@ -252,15 +326,15 @@ impl Surveyor<'_> {
     }
 
     fn plane(&self, index: usize, pieces: &mut Vec<Piece>) {
-        let face = &self.part.faces[index];
+        let face = &self.survey.part.faces[index];
         let (point, normal) =
-            (self.axes_from_part * face.centroid, self.axes_from_part * face.normal);
+            (self.survey.axes_from_part * face.centroid, self.survey.axes_from_part * face.normal);
         let Some((height, slope)) = self.plane_gap(point, normal) else { return };
         if slope == DVec2::ZERO && height > self.reach {
             return;
         }
         let window = self.window(height, slope);
-        let outlines = project(std::iter::once(face), &self.axes_from_part);
+        let outlines = project(std::iter::once(face), &self.survey.axes_from_part);
         let gap = Gap::Plane { height, slope };
         for Polygon { outer, holes } in intersect_convex(&window, &outlines) {
             pieces.push(Piece { outer, holes, gap });
@@ -268,7 +342,12 @@ impl Surveyor<'_> {
     }
 
     fn facet(&self, triangle: u32, pieces: &mut Vec<Piece>) {
-        let corners = self.part.mesh.corners(triangle).map(|corner| self.axes_from_part * corner);
+        let corners = self
+            .survey
+            .part
+            .mesh
+            .corners(triangle)
+            .map(|corner| self.survey.axes_from_part * corner);
         let [a, b, c] = corners;
         let Some(normal) = (b - a).cross(c - a).try_normalize() else { return };
         let nearest = corners
@@ -288,7 +367,7 @@ impl Surveyor<'_> {
 
     /// Takes a curved face as it is; `false` where it has to be taken by its facets.
     fn curved(&self, face: &CurvedFace, pieces: &mut Vec<Piece>) -> bool {
-        let place = |point: DVec3| self.axes_from_part * point;
+        let place = |point: DVec3| self.survey.axes_from_part * point;
         let level = |direction: DVec3| {
             let direction = place(direction);
             (direction.z.abs() < LEVEL).then(|| direction.truncate().normalize())
@@ -382,8 +461,12 @@ impl Surveyor<'_> {
         }
         let mut rings: Vec<Ring> = Vec::new();
         for &triangle in &face.triangles {
-            let corners =
-                self.part.mesh.corners(triangle).map(|corner| self.axes_from_part * corner);
+            let corners = self
+                .survey
+                .part
+                .mesh
+                .corners(triangle)
+                .map(|corner| self.survey.axes_from_part * corner);
             let [a, b, c] = corners;
             if (b - a).cross(c - a).z * self.side <= 0.0 {
                 continue;

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
 
-use super::relief::{LEVEL, Relief, Surveyor};
+use super::relief::{LEVEL, Relief, Survey};
 use super::shapes::{project, stretches};
 use super::skyline::Skyline;
 use super::tapers::upright;
@@ -18,7 +18,6 @@ use crate::error::Result;
 use crate::geometry::overlay;
 use crate::geometry::polygon::{self, Bounds2};
 use crate::geometry::sphere::directions;
-use crate::model::Piece;
 use crate::part::{CurvedFace, PairKind, Shape};
 use crate::propose::options::Rejection;
 use crate::propose::stroke::Stroke;
@@ -49,6 +48,38 @@ pub(in crate::propose) struct Round {
     pub(in crate::propose) widths: Vec<f64>,
     /// Angles to the pads that these do not take \[rad\].
     pub(in crate::propose) leans: Vec<f64>,
+    /// There are so many places that none was tried.
+    pub(in crate::propose) left_out: bool,
+}
+
+/// How many places on curved faces are tried beside those between planes, unless they are asked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Budget {
+    looks: usize,
+    candidates: usize,
+}
+
+/// Closing directions and pairs of crests that are looked at, each for up to a millisecond.
+const MOST_LOOKS: usize = 1_500;
+/// Candidates on curved faces, or on drafted ones.
+pub(in crate::propose) const MOST_CANDIDATES: usize = 20_000;
+
+impl Budget {
+    pub(super) const NONE: Self = Self { looks: usize::MAX, candidates: usize::MAX };
+    pub(super) const FEW: Self = Self { looks: MOST_LOOKS, candidates: MOST_CANDIDATES };
+
+    fn look(&mut self) {
+        self.looks = self.looks.saturating_sub(1);
+    }
+
+    /// Takes what a site asks for.
+    pub(super) fn take(&mut self, site: &Site) {
+        self.candidates = self.candidates.saturating_sub(site.candidates());
+    }
+
+    pub(super) fn is_spent(&self) -> bool {
+        self.looks == 0 || self.candidates == 0
+    }
 }
 
 /// What came of pairs of faces: nothing, or the reason for which there is no site.
@@ -112,32 +143,44 @@ impl Finder<'_> {
         }
         let loose = self.loose();
         for closing in self.closings() {
+            self.budget.look();
             let skyline = self
                 .half_pad()
                 .map(|half| Skyline::new(&self.part.mesh.vertices, &axes(closing), half));
             let [above, below] =
                 [1.0, -1.0].map(|side| levels(self.crests(side * closing), SAME_PLANE * self.size));
-            for top in &above {
-                for bottom in &below {
-                    let outcome = match self.facing(closing, top, bottom) {
-                        Ok(None) => None,
-                        Ok(Some(_)) if self.is_buried(top, bottom, skyline.as_ref()) => {
-                            Some(Some(Rejection::OutOfReach))
-                        }
-                        Ok(Some(boxes)) => {
-                            self.round_sites(closing, [top, bottom], boxes, &loose, &mut sites)?
-                        }
-                        Err(reason) => Some(Some(reason)),
-                    };
-                    let key = |level: &[Crest]| level.iter().map(|crest| crest.face).min();
-                    let (Some(outcome), Some(a), Some(b)) = (outcome, key(top), key(bottom)) else {
-                        continue;
-                    };
-                    if matches!(outcome, Some(Rejection::Stroke)) {
-                        widths.push(top[0].height + bottom[0].height);
+            let mut survey = None;
+            for (top, bottom) in above.iter().flat_map(|top| below.iter().map(move |b| (top, b))) {
+                let outcome = match self.facing(closing, top, bottom) {
+                    Ok(None) => None,
+                    Ok(Some(_)) if self.is_buried(top, bottom, skyline.as_ref()) => {
+                        Some(Some(Rejection::OutOfReach))
                     }
-                    seen.add(a, b, outcome);
+                    Ok(Some(boxes)) => {
+                        self.budget.look();
+                        let direction = self.direction(closing);
+                        let survey = survey.get_or_insert_with(|| {
+                            Survey::new(self.part, &loose, axes(self.directions[direction]))
+                        });
+                        let first = sites.len();
+                        let found =
+                            self.round_sites(direction, [top, bottom], boxes, survey, &mut sites)?;
+                        sites[first..].iter().for_each(|site| self.budget.take(site));
+                        found
+                    }
+                    Err(reason) => Some(Some(reason)),
+                };
+                if self.budget.is_spent() {
+                    return Ok((Vec::new(), Round { left_out: true, ..Round::default() }));
                 }
+                let key = |level: &[Crest]| level.iter().map(|crest| crest.face).min();
+                let (Some(outcome), Some(a), Some(b)) = (outcome, key(top), key(bottom)) else {
+                    continue;
+                };
+                if matches!(outcome, Some(Rejection::Stroke)) {
+                    widths.push(top[0].height + bottom[0].height);
+                }
+                seen.add(a, b, outcome);
             }
         }
         let mut round = Round { widths, ..Round::default() };
@@ -172,23 +215,6 @@ impl Finder<'_> {
         let curved = self.part.curved.iter().map(|face| &face.triangles);
         plane.chain(curved).flatten().for_each(|&triangle| taken[triangle as usize] = true);
         (0..taken.len() as u32).filter(|&triangle| !taken[triangle as usize]).collect()
-    }
-
-    /// What faces each pad's plane in a closing direction: up to a gap of `reach`, and no higher
-    /// than `above` \[m\].
-    pub(super) fn survey(
-        &self,
-        loose: &[u32],
-        direction: usize,
-        heights: [f64; 2],
-        [reach, above]: [f64; 2],
-        region: Bounds2,
-    ) -> [Vec<Piece>; 2] {
-        let axes_from_part = axes(self.directions[direction]);
-        [(heights[0], 1.0), (heights[1], -1.0)].map(|(height, side)| {
-            let part = self.part;
-            Surveyor { part, loose, axes_from_part, height, side, reach, above, region }.pieces()
-        })
     }
 
     pub(super) fn may_touch(&self, id: u32) -> bool {
@@ -377,15 +403,14 @@ impl Finder<'_> {
     #[allow(clippy::option_option, reason = "told apart by the caller at once")]
     fn round_sites(
         &mut self,
-        closing: DVec3,
+        direction: usize,
         [top, bottom]: [&[Crest]; 2],
         boxes: [Bounds2; 2],
-        loose: &[u32],
+        survey: &Survey<'_>,
         sites: &mut Vec<Site>,
     ) -> Result<Option<Option<Rejection>>> {
         let heights = [top[0].height, -bottom[0].height];
         let (width, reach) = (heights[0] - heights[1], self.gripper.pad_reach());
-        let direction = self.direction(closing);
         let common =
             Bounds2 { min: boxes[0].min.max(boxes[1].min), max: boxes[0].max.min(boxes[1].max) };
         let region = Bounds2 {
@@ -393,7 +418,7 @@ impl Finder<'_> {
             max: common.max.max(common.min) + 2.0 * reach,
         };
         let layer = self.gripper.layer();
-        let pieces = self.survey(loose, direction, heights, [layer.reach(); 2], region);
+        let pieces = survey.pieces(heights, [layer.reach(); 2], region);
         let force = self.options.force_on(self.gripper);
         let place = common.centre();
         let Some(relief) = Relief::new(pieces, layer, force, &self.gripper.pads(width), place)

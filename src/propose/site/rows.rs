@@ -6,7 +6,7 @@
 
 use glam::DVec2;
 
-use super::relief::Relief;
+use super::relief::{Relief, Survey};
 use super::round::{Outcomes, Round};
 use super::shapes::to_site;
 use super::tapers::{STEEPEST, Surface, Taper, WIDEST};
@@ -56,7 +56,14 @@ impl Finder<'_> {
         let loose = self.loose();
         let mut seen = Outcomes::default();
         for taper in &tapers {
-            let reason = self.rows(taper, &loose, &mut sites);
+            let survey = Survey::new(self.part, &loose, axes(self.directions[taper.direction]));
+            let first = sites.len();
+            let reason = self.rows(taper, &survey, &mut sites);
+            sites[first..].iter().for_each(|site| self.budget.take(site));
+            if self.budget.is_spent() {
+                round.left_out = true;
+                return Ok(Vec::new());
+            }
             match reason {
                 Some(Rejection::Stroke) => {
                     let [one, two] = taper.heights_at(taper.bounds.centre().y);
@@ -73,7 +80,7 @@ impl Finder<'_> {
     }
 
     /// Adds the rows of places on two surfaces; the reason where there are none.
-    fn rows(&self, taper: &Taper, loose: &[u32], sites: &mut Vec<Site>) -> Option<Rejection> {
+    fn rows(&self, taper: &Taper, survey: &Survey<'_>, sites: &mut Vec<Site>) -> Option<Rejection> {
         let mut reason = None;
         let mut any = false;
         let spacing = self.options.spacing(self.gripper);
@@ -90,7 +97,7 @@ impl Finder<'_> {
                 }
             };
             for y in rows {
-                match self.row(taper, &posture, y, loose) {
+                match self.row(taper, &posture, y, survey) {
                     Ok(site) => {
                         any = true;
                         sites.extend(site);
@@ -179,7 +186,7 @@ impl Finder<'_> {
         taper: &Taper,
         posture: &Posture,
         y: f64,
-        loose: &[u32],
+        survey: &Survey<'_>,
     ) -> std::result::Result<Option<Site>, Rejection> {
         let [below, above] = posture.reach;
         let Bounds2 { min, max } = taper.bounds;
@@ -216,7 +223,7 @@ impl Finder<'_> {
         );
         let depth = layer.reach() + sag;
         let depths = [depth, depth + 4.0 * reach * taper.slope];
-        let pieces = self.survey(loose, taper.direction, heights, depths, Bounds2::of(&around));
+        let pieces = survey.pieces(heights, depths, Bounds2::of(&around));
         let relief = Relief::pressed_by(pieces, layer, self.options.force_on(self.gripper), deltas);
         let high = if taper.surface == Surface::Bore { y + above } else { top };
         let under =
