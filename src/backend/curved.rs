@@ -81,7 +81,7 @@ impl CurvedProblem<'_> {
 
     fn solve(&self, load: usize) -> Score {
         match self.pads {
-            Some(pads) => pads.solve(self.distance, self.force, &self.wrenches[load]).score,
+            Some(pads) => pads.score(self.distance, self.force, &self.wrenches[load]),
             None => refused(Status::NoContact, 0),
         }
     }

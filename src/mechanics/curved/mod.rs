@@ -148,12 +148,15 @@ impl Pads {
 
     /// As [`solve`]; numbers must be finite and `force` positive.
     pub fn solve(&self, distance: f64, force: f64, wrench: &Wrench) -> Answer {
-        self.answer(distance, force, wrench, true)
+        self.answer(distance, force, wrench, Asked::ALL)
     }
 
-    /// `search`: look for further limit states where there may be some; that decides only whether
-    /// the status is ambiguous, and what is found where the first way leads nowhere.
-    fn answer(&self, distance: f64, force: f64, wrench: &Wrench, search: bool) -> Answer {
+    /// The same without notes.
+    pub fn score(&self, distance: f64, force: f64, wrench: &Wrench) -> Score {
+        self.answer(distance, force, wrench, Asked::SCORE).score
+    }
+
+    fn answer(&self, distance: f64, force: f64, wrench: &Wrench, asked: Asked) -> Answer {
         if self.faces.iter().any(|face| face.fields.is_empty()) {
             return no_answer(Status::NoContact);
         }
@@ -165,9 +168,11 @@ impl Pads {
         let [Some(one), Some(two)] = &pressed else { return no_answer(Status::NotConverged) };
         let rotations = space::rotations([one, two], distance);
         let faces = &self.faces;
-        let case = Case { faces, pressed: [one, two], distance, normal, wrench, rotations, search };
+        let case = Case { faces, pressed: [one, two], distance, normal, wrench, rotations, asked };
         let mut answer = case.solve();
-        answer.notes.extend(case.softness(self, &answer));
+        if asked.notes {
+            answer.notes.extend(case.softness(self, &answer));
+        }
         answer
     }
 
@@ -205,8 +210,23 @@ struct Case<'a, 'c> {
     normal: [f64; 2],
     wrench: &'c Wrench,
     rotations: [Rotation; 2],
-    /// See [`Pads::answer`].
-    search: bool,
+    asked: Asked,
+}
+
+/// What is to be found besides the first limit state.
+#[derive(Debug, Clone, Copy)]
+struct Asked {
+    /// Further limit states where there may be some: that decides only whether the status is
+    /// ambiguous, and what is found where the first way leads nowhere.
+    others: bool,
+    /// What to know of the answer.
+    notes: bool,
+}
+
+impl Asked {
+    const ALL: Self = Self { others: true, notes: true };
+    const SCORE: Self = Self { others: true, notes: false };
+    const FIRST: Self = Self { others: false, notes: false };
 }
 
 /// Lever of a stiffness over the distance of the faces below which it is none.
@@ -236,7 +256,7 @@ impl<'a> Case<'a, '_> {
         });
         loop {
             let problem = self.problem(free);
-            let (status, state) = find(&problem, self.pressed, self.search);
+            let (status, state) = find(&problem, self.pressed, self.asked.others);
             // A round part that turns by more than the layers give is free to turn.
             let mut settles = None;
             for i in 0..2 {
@@ -321,22 +341,8 @@ impl<'a> Case<'a, '_> {
             return answer;
         };
         let tilt = problem.tilt(&state.angles);
-        let give = 0.5 * (self.pressed[0].compression() + self.pressed[1].compression());
-        let angle = tilt.length();
-        let slip = 0.5 * self.distance.abs() * angle;
-        if slip > give {
-            notes.push(Note::TiltsFirst { angle, slip });
-        }
-        if let Some((force, pushed)) = problem.with_tilting_planes(state, TILTING_PUSH)
-            && (pushed.mu - slipping.mu).abs() > TILTING_PUSH * slipping.mu
-        {
-            notes.push(Note::TiltPushes { force: force.to_array(), mu_s: pushed.mu });
-        }
-        for axis in &problem.space.spins {
-            let push = -axis.perp().dot(state.faces[0].slope + state.faces[1].slope);
-            if push.abs() > OVER_EDGE * (self.normal[0] + self.normal[1]) {
-                notes.push(Note::OverEdge { force: push });
-            }
+        if self.asked.notes {
+            self.note(problem, state, &slipping, &mut notes);
         }
         let motion = motion(&problem.space, &slipping);
         Answer {
@@ -356,6 +362,34 @@ impl<'a> Case<'a, '_> {
             tilt: Some([tilt.x + 0.0, tilt.y + 0.0]),
             faces: Some([0, 1].map(|k| face_answer(&state.faces[k], &slipping, k))),
             notes,
+        }
+    }
+
+    /// Notes on a limit state.
+    fn note(
+        &self,
+        problem: &Problem<'_>,
+        state: &State<'_>,
+        slipping: &Slipping,
+        notes: &mut Vec<Note>,
+    ) {
+        let tilt = problem.tilt(&state.angles);
+        let give = 0.5 * (self.pressed[0].compression() + self.pressed[1].compression());
+        let angle = tilt.length();
+        let slip = 0.5 * self.distance.abs() * angle;
+        if slip > give {
+            notes.push(Note::TiltsFirst { angle, slip });
+        }
+        if let Some((force, pushed)) = problem.with_tilting_planes(state, TILTING_PUSH)
+            && (pushed.mu - slipping.mu).abs() > TILTING_PUSH * slipping.mu
+        {
+            notes.push(Note::TiltPushes { force: force.to_array(), mu_s: pushed.mu });
+        }
+        for axis in &problem.space.spins {
+            let push = -axis.perp().dot(state.faces[0].slope + state.faces[1].slope);
+            if push.abs() > OVER_EDGE * (self.normal[0] + self.normal[1]) {
+                notes.push(Note::OverEdge { force: push });
+            }
         }
     }
 

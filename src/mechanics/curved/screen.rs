@@ -10,7 +10,7 @@ use super::equilibrium::Problem;
 use super::face::Pressed;
 use super::joint::{Found, Joint, Mode, Place, Reached};
 use super::space::{self, Kind};
-use super::{Case, NO_LEVER, Pads, slip, strong};
+use super::{Asked, Case, NO_LEVER, Pads, slip, strong};
 use crate::model::Wrench;
 
 /// What is known of a load.
@@ -95,7 +95,7 @@ impl Pads {
             normal,
             wrench,
             rotations,
-            search: true,
+            asked: Asked::SCORE,
         };
         let problem = case.problem(is_free);
         let give = pressed[0].compression().max(pressed[1].compression());
