@@ -68,6 +68,10 @@ pub(super) fn causes(
             why
         } else if options.curved == Some(false) {
             "not tried, as the option curved is off".to_owned()
+        } else if tally.curved_left_out {
+            "not tried beside planes, as curved faces make very many candidates; the option curved \
+             tries them"
+                .to_owned()
         } else if turn < HALF_TURN {
             format!("it covers {:.0} deg: no two of its sides are opposite", turn.to_degrees())
         } else {

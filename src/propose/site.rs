@@ -156,13 +156,19 @@ pub(super) fn sites(
         budget: Budget::NONE,
     };
     let mut sites = Vec::new();
+    let mut leaning = Vec::new();
     for (kind, pairs) in &groups {
-        sites.extend(finder.sites(*kind, pairs)?);
+        let rows = if options.curved == Some(false) { None } else { finder.lean(pairs) };
+        match rows {
+            Some(rows) => leaning.extend(rows),
+            None => sites.extend(finder.sites(*kind, pairs)?),
+        }
     }
     let plane = sites.len();
     let mut round = Round::default();
     let named = |faces: &Vec<u32>| faces.iter().any(|&face| face as usize >= part.faces.len());
-    let asked = options.faces.as_ref().is_some_and(named) || sites.is_empty();
+    let asked = options.faces.as_ref().is_some_and(named) || groups.is_empty();
+    sites.extend(leaning);
     let budget = match options.curved {
         Some(true) => Some(Budget::NONE),
         Some(false) => None,

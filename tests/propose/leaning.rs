@@ -98,7 +98,7 @@ fn curved(set: &GripSet) -> Vec<&RankedGrip> {
 
 #[test]
 fn drafted_faces_need_the_tangent_of_the_draft() {
-    for degrees in [[0.5, 0.5], [2.0, 2.0], [1.0, 2.0], [0.0, 3.0]] {
+    for degrees in [[0.05, 0.05], [0.2, 0.2], [0.5, 0.5], [2.0, 2.0], [1.0, 2.0], [0.0, 3.0]] {
         let drafts = degrees.map(f64::to_radians);
         let none = vec![load("none", DVec3::ZERO, DVec3::ZERO)];
         let set = planned(wedge(drafts), "robotiq-2f85", none, Side::Outside, (0.008, 45.0));

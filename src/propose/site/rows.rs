@@ -17,7 +17,7 @@ use crate::geometry::{HalfPlane, clip_ring_half_plane, intersect_convex, overlay
 use crate::gripper::{Gripper, Jaw, Layer};
 use crate::mechanics::curved::{Pads, Squeezed};
 use crate::model::{Frame, Patch, Piece, Ring, Surfaces};
-use crate::part::PairKind;
+use crate::part::{FacePair, PairKind, PlanarFace};
 use crate::propose::options::{ProposeOptions, Rejection};
 use crate::propose::stroke::Stroke;
 
@@ -37,6 +37,10 @@ struct Posture {
     /// Their outlines at the first angle.
     pads: [Ring; 2],
 }
+
+/// Sine of the angle between two planes below which their push towards the thick end is left out: it
+/// asks for half of it as friction, less than 0.0005.
+const LEANS: f64 = 1e-3;
 
 impl Finder<'_> {
     /// The sites on surfaces that lean.
@@ -77,6 +81,26 @@ impl Finder<'_> {
         }
         round.count(seen);
         Ok(sites)
+    }
+
+    /// The rows of places of pairs that count as parallel, where they lean so much that the push
+    /// towards the thick end is felt; `None` where they do not, are small, or no row comes of them.
+    pub(super) fn lean(&mut self, pairs: &[&FacePair]) -> Option<Vec<Site>> {
+        let face = |id: u32| &self.part.faces[id as usize];
+        let both = |pair: &&FacePair| [face(pair.face_i), face(pair.face_ii)];
+        let pairs: Vec<[&PlanarFace; 2]> = pairs.iter().map(both).collect();
+        let [a, b] = pairs[0];
+        if a.normal.cross(b.normal).length() < LEANS {
+            return None;
+        }
+        let (area, taper) = self.wedge(&pairs)?;
+        if area < self.smallest() {
+            return None;
+        }
+        let survey = Survey::new(self.part, &self.loose(), axes(self.directions[taper.direction]));
+        let mut sites = Vec::new();
+        self.rows(&taper, &survey, &mut sites);
+        (!sites.is_empty()).then_some(sites)
     }
 
     /// Adds the rows of places on two surfaces; the reason where there are none.

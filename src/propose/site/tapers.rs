@@ -151,7 +151,7 @@ impl Finder<'_> {
 
     /// Overlap of leaning planes below which they are none for pads [m^2]; any that is asked for by
     /// its number will do.
-    fn smallest(&self) -> f64 {
+    pub(super) fn smallest(&self) -> f64 {
         if self.options.faces.is_some() {
             return 0.0;
         }
@@ -162,7 +162,7 @@ impl Finder<'_> {
     }
 
     /// Pairs in two planes as one, and the area in which they are opposite each other [m^2].
-    fn wedge(&mut self, pairs: &[[&PlanarFace; 2]]) -> Option<(f64, Taper)> {
+    pub(super) fn wedge(&mut self, pairs: &[[&PlanarFace; 2]]) -> Option<(f64, Taper)> {
         let [a, b] = pairs[0];
         let closing = upright((a.normal - b.normal).normalize());
         let mut sides: [Vec<u32>; 2] = Default::default();
