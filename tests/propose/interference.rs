@@ -239,7 +239,9 @@ fn compare(seed: u64, wanted: u64, gripper_of: fn(&mut Random) -> Gripper) -> (u
     while candidates < wanted {
         let part = random_part(&mut random);
         let gripper = gripper_of(&mut random);
+        // Candidates on what is not plane are numbered otherwise.
         let options = ProposeOptions::default()
+            .with_curved(Some(false))
             .with_angle_step(random.range(0.3, 1.2))
             .with_spacing(Some(random.range(0.002, 0.006)))
             .with_chunk(1 + (random.unit() * 3000.0) as usize);

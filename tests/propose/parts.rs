@@ -119,7 +119,8 @@ fn grips_on_real_parts_look_right() {
         let (grips, tally) = propose(&part, &gripper, &ProposeOptions::default());
         println!("{file}, {name}: {} grips, {tally:?}", grips.len());
         assert!(grips.len() >= least, "{file} {name}: {}", grips.len());
-        for grip in grips.iter().step_by(1 + grips.len() / 60) {
+        let plane: Vec<&Grip> = grips.iter().filter(|grip| grip.surfaces.is_none()).collect();
+        for grip in plane.iter().step_by(1 + plane.len() / 60) {
             assert_sound(&part, &gripper, grip);
         }
         let mut ids: Vec<u64> = grips.iter().map(|grip| grip.id).collect();
@@ -175,7 +176,12 @@ fn assert_same_grips(coarse: &Part, fine: &Part) {
         propose(coarse, &gripper, &ProposeOptions::default()),
         propose(fine, &gripper, &ProposeOptions::default()),
     );
-    assert_eq!(tally_a, tally_b);
+    let widths = |tally: &Tally| -> Vec<i64> {
+        tally.widths_outside.iter().map(|width| (width * 1e12).round() as i64).collect()
+    };
+    assert_eq!(widths(&tally_a), widths(&tally_b));
+    let counts = |tally: Tally| Tally { widths_outside: Vec::new(), ..tally };
+    assert_eq!(counts(tally_a), counts(tally_b));
     assert_eq!(a.len(), b.len());
     for (a, b) in a.iter().zip(&b) {
         assert_eq!((a.id, a.face_i, a.face_ii), (b.id, b.face_i, b.face_ii));
