@@ -11,7 +11,6 @@ use std::process::Command;
 
 use glam::{DMat3, DVec3};
 use gripfast::export::{self, Convention, Dialect, Format, Joint, Options, Origin, Stated};
-use gripfast::model::Negative;
 use gripfast::part::Mesh;
 use gripfast::results::GripSet;
 use serde_json::Value;
@@ -535,7 +534,7 @@ fn candidates_that_are_no_grips_are_failures_of_the_label_formats() {
         let mut pose = set.grips[1].grip.clone();
         (pose.id, pose.width) = (id, 0.03);
         pose.part_from_grip.origin.x += 0.01;
-        set.negatives.push(Negative::new(&pose, format!("reason {id}")));
+        set.negatives.push(gripfast::model::Negative::new(&pose, format!("reason {id}")));
     }
     let folder = tempfile::tempdir().unwrap();
     for (format, file, reader, package) in [
