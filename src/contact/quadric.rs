@@ -357,7 +357,8 @@ impl Region {
     }
 
     /// Calls `visit` with points of the area and their weights, right for polynomials of `x` up to
-    /// the fourth degree besides `u` on straight pieces; weights may be negative where the area is not convex.
+    /// the fourth degree besides `u` on straight pieces; weights may be negative where the area is
+    /// not convex.
     pub fn points(&self, mut visit: impl FnMut(DVec2, f64)) {
         for [x, y, weights] in self.rows() {
             for i in 0..LANES {
