@@ -9,6 +9,7 @@ use super::prepare::Chunk;
 use super::search::Field;
 use super::seeds::SeedSet;
 use super::table::Table;
+use crate::contact::widest;
 
 /// Loads that one task searches at least.
 const TASK: usize = 1 << 10;
@@ -43,25 +44,9 @@ pub(crate) fn run(chunk: &Chunk, seeds: &SeedSet) -> Vec<SeedRecord> {
     records
 }
 
-/// Searches with the widest vectors that the processor has. Both ways do the same operations in the
-/// same order.
-pub(super) fn search(field: &Field<'_>, loads: &[LoadRecord], out: &mut [SeedRecord]) {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        #[allow(
-            unsafe_code,
-            reason = "three times the speed of the baseline's vectors; the feature was just detected"
-        )]
-        // SAFETY: the function needs AVX2, which this processor has.
-        return unsafe { search_avx2(field, loads, out) };
-    }
-    search_all(field, loads, out);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn search_avx2(field: &Field<'_>, loads: &[LoadRecord], out: &mut [SeedRecord]) {
-    search_all(field, loads, out);
+widest! {
+    /// Searches; both ways to compile it do the same operations in the same order.
+    pub(super) fn search(field: &Field<'_>, loads: &[LoadRecord], out: &mut [SeedRecord]) -> () = search_all
 }
 
 #[inline(always)]

@@ -20,6 +20,7 @@ use super::problem::{Batch, F32_TOLERANCE, Problem, Seed, SeedStatus, check};
 use super::search::{Field, Planes, sign_of};
 use super::seeds::{NEGATED, RING, SeedSet};
 use super::table::{SLOTS, Table};
+use crate::contact::widest;
 use crate::error::Result;
 use crate::model::Wrench;
 
@@ -185,15 +186,15 @@ impl<'a> Screen<'a> {
 
     /// The loads that can be the worst.
     fn survivors(&self, problem: &Problem<'_>) -> Result<Found> {
-        let mut ceilings = vec![0.0; problem.wrenches.len().next_multiple_of(LANES)];
-        let floor = self.ceilings(problem, &mut ceilings);
+        let mut bounds = vec![0.0; problem.wrenches.len().next_multiple_of(LANES)];
+        let floor = ceilings(self, problem, &mut bounds);
         let floor = f64::from(floor) * (1.0 - F32_TOLERANCE);
         let reaches = |ceiling: f32| f64::from(ceiling) * (1.0 + F32_TOLERANCE) >= floor;
         let mut found = Found::new();
         let mut searched: Vec<(usize, f64)> = Vec::new();
         let mut records: Vec<LoadRecord> = Vec::new();
         for (load, wrench) in problem.wrenches.iter().enumerate() {
-            if !reaches(ceilings[load]) {
+            if !reaches(bounds[load]) {
                 continue;
             }
             let seed = match self.records.load(problem, wrench) {
@@ -217,27 +218,12 @@ impl<'a> Screen<'a> {
         });
         Ok(found)
     }
-
-    /// Writes what each load's `mu_s` is at most, infinite where that is not known; what the largest
-    /// is at least. With the widest vectors that the processor has.
-    fn ceilings(&self, problem: &Problem<'_>, out: &mut [f32]) -> f32 {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            #[allow(
-                unsafe_code,
-                reason = "three times the speed of the baseline's vectors; the feature was just detected"
-            )]
-            // SAFETY: the function needs AVX2, which this processor has.
-            return unsafe { ceilings_avx2(self, problem, out) };
-        }
-        ceilings_all(self, problem, out)
-    }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn ceilings_avx2(screen: &Screen<'_>, problem: &Problem<'_>, out: &mut [f32]) -> f32 {
-    ceilings_all(screen, problem, out)
+widest! {
+    /// Writes what each load's `mu_s` is at most, infinite where that is not known; what the largest
+    /// is at least.
+    fn ceilings(screen: &Screen<'_>, problem: &Problem<'_>, out: &mut [f32]) -> f32 = ceilings_all
 }
 
 #[inline(always)]

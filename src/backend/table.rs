@@ -5,6 +5,7 @@ use super::fan::fill_basis;
 use super::layout::{ContactHeader, EdgeRecord};
 use super::search::{gradient, sign_of};
 use super::seeds::{NEGATED, RING, SeedSet};
+use crate::contact::widest;
 
 /// Places of a ring: its [`RING`] twists, the first again, and the twist in the middle.
 pub(crate) const SLOTS: usize = RING + 2;
@@ -101,31 +102,7 @@ impl Table {
     }
 }
 
-/// [`fill_basis`] with the widest vectors that the processor has; the same operations in the same
-/// order.
-pub(crate) fn contact_basis(
-    header: &ContactHeader,
-    edges: [&[EdgeRecord]; 2],
-    twists: &[[f32; 4]],
-) -> Vec<[f32; 4]> {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        #[allow(
-            unsafe_code,
-            reason = "twice the speed of the baseline's vectors; the feature was just detected"
-        )]
-        // SAFETY: the function needs AVX2, which this processor has.
-        return unsafe { basis_avx2(header, edges, twists) };
-    }
-    fill_basis(header, edges, twists)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn basis_avx2(
-    header: &ContactHeader,
-    edges: [&[EdgeRecord]; 2],
-    twists: &[[f32; 4]],
-) -> Vec<[f32; 4]> {
-    fill_basis(header, edges, twists)
+widest! {
+    /// [`fill_basis`]; both ways to compile it do the same operations in the same order.
+    pub(crate) fn contact_basis(header: &ContactHeader, edges: [&[EdgeRecord]; 2], twists: &[[f32; 4]]) -> Vec<[f32; 4]> = fill_basis
 }

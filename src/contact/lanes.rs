@@ -62,10 +62,10 @@ pub(super) fn total(lane: &Lane) -> f64 {
 /// Defines a function that runs `$kernel` (which must be `#[inline(always)]`) compiled for the
 /// widest vectors that the processor at hand has.
 macro_rules! widest {
-    ($(#[$doc:meta])* fn $name:ident($($argument:ident: $type:ty),*) -> $out:ty = $kernel:ident) => {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident($($argument:ident: $type:ty),*) -> $out:ty = $kernel:ident) => {
         $(#[$doc])*
         #[allow(unsafe_code, reason = "measured: twice as fast; sound because the processor was asked for the instructions")]
-        fn $name($($argument: $type),*) -> $out {
+        $vis fn $name($($argument: $type),*) -> $out {
             #[cfg(target_arch = "x86_64")]
             if std::arch::is_x86_feature_detected!("avx2") {
                 #[target_feature(enable = "avx2")]
@@ -79,4 +79,4 @@ macro_rules! widest {
         }
     };
 }
-pub(super) use widest;
+pub(crate) use widest;

@@ -25,6 +25,7 @@ mod thin;
 pub use far::FAR;
 pub use field::{Field, Friction, PlaneWrench, Twist};
 pub use friction::friction;
+pub(crate) use lanes::widest;
 pub use loops::{Loops, moments};
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! first, and split again into stretches too far apart for one pad.
 
 mod places;
+mod planes;
 mod relief;
 mod round;
 mod rows;
@@ -17,6 +18,7 @@ use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use places::{angles, main_direction, positions, straight_edges};
+use planes::{Planes, heights, rise};
 pub(super) use relief::Relief;
 use round::Budget;
 pub(super) use round::{MOST_CANDIDATES, Round};
@@ -33,7 +35,7 @@ use crate::geometry::polygon::{self, Bounds2};
 use crate::geometry::{contains, overlay};
 use crate::gripper::{Gripper, Jaws};
 use crate::model::{Frame, Patch, Polygon, Ring};
-use crate::part::{FacePair, PairKind, Part, PlanarFace};
+use crate::part::{FacePair, PairKind, Part};
 
 /// Planes whose directions differ by less count as one direction, which saves a tree \[rad\]: 0.1 um
 /// on 100 mm.
@@ -184,47 +186,6 @@ pub(super) fn sites(
         sites.extend(finder.leaning(&mut round)?);
     }
     Ok(Sites { sites, directions: finder.directions, plane, round })
-}
-
-/// Faces sorted into planes.
-struct Planes {
-    /// Plane number of each face.
-    of: Vec<usize>,
-    /// Faces of each plane, by its number.
-    faces: rustc_hash::FxHashMap<usize, Vec<u32>>,
-}
-
-impl Planes {
-    fn new(faces: &[PlanarFace], tolerance: f64) -> Self {
-        let reach = faces.iter().map(|face| face.centroid.length()).fold(0.0, f64::max);
-        // Sorted by offset, only a window can match: tilts of 1e-3 move the offset by that much of
-        // the reach.
-        let mut sorted: Vec<&PlanarFace> = faces.iter().collect();
-        sorted.sort_by(|a, b| a.offset.total_cmp(&b.offset).then(a.id.cmp(&b.id)));
-        let offsets: Vec<f64> = sorted.iter().map(|face| face.offset).collect();
-        let mut of = vec![usize::MAX; faces.len()];
-        for face in faces {
-            if of[face.id as usize] != usize::MAX {
-                continue;
-            }
-            of[face.id as usize] = face.id as usize;
-            let slack = tolerance + 1e-3 * reach;
-            let window = offsets.partition_point(|&offset| offset < face.offset - slack)
-                ..offsets.partition_point(|&offset| offset <= face.offset + slack);
-            for other in &sorted[window] {
-                let same = other.normal.dot(face.normal) > 1.0 - 5e-7
-                    && (face.normal.dot(other.centroid) - face.offset).abs() < tolerance;
-                if of[other.id as usize] == usize::MAX && same {
-                    of[other.id as usize] = face.id as usize;
-                }
-            }
-        }
-        let mut members: rustc_hash::FxHashMap<usize, Vec<u32>> = Default::default();
-        for face in faces.iter().filter(|face| face.reachable) {
-            members.entry(of[face.id as usize]).or_default().push(face.id);
-        }
-        Self { of, faces: members }
-    }
 }
 
 /// What a site is made of, in the axes of its direction.
@@ -601,43 +562,6 @@ impl Site {
 /// Which way round the gripper is put in a grip frame, given in the site frame.
 pub(super) fn jaws(site_from_grip: &Frame) -> Jaws {
     if site_from_grip.rotation.z_axis.z < 0.0 { Jaws::Exchanged } else { Jaws::Straight }
-}
-
-/// Heights of the planes of side I and II above `point` of the axes' `(x, y)`.
-fn heights(
-    face_i: &PlanarFace,
-    face_ii: &PlanarFace,
-    axes_from_part: &DMat3,
-    point: DVec2,
-) -> [f64; 2] {
-    [face_i, face_ii].map(|face| {
-        let normal = *axes_from_part * face.normal;
-        (face.offset - normal.truncate().dot(point)) / normal.z
-    })
-}
-
-/// How far any of the faces rises above its pad's plane within the overlap.
-fn rise(
-    sides: &[Vec<u32>; 2],
-    part: &Part,
-    axes_from_part: &DMat3,
-    axis: DVec3,
-    overlap: &[Polygon],
-    heights: [f64; 2],
-) -> f64 {
-    let mut most = 0.0_f64;
-    for side in 0..2 {
-        for &id in &sides[side] {
-            let face = &part.faces[id as usize];
-            let normal = *axes_from_part * face.normal;
-            let out = face.normal.dot(axis).signum();
-            for point in overlap.iter().flat_map(|polygon| &polygon.outer) {
-                let height = (face.offset - normal.truncate().dot(*point)) / normal.z;
-                most = most.max(out * (height - heights[side]));
-            }
-        }
-    }
-    most
 }
 
 #[cfg(test)]

@@ -111,7 +111,7 @@ struct Panels {
 }
 
 /// [`EdgeSums`] by lanes.
-type Lanes = [Lane; 15];
+type Lanes = [Lane; 14];
 
 /// What all nodes of a region have in common.
 #[derive(Clone, Copy)]

@@ -132,17 +132,30 @@ fn cranks_give_a_table_that_follows_them() {
     assert!(arm.bounds()[1].z > crank * 0.7 * (angle + 0.8).sin());
 }
 
-#[test]
-fn a_fixed_jaw_is_told() {
-    let limit = "<limit lower=\"0\" upper=\"0.05\" effort=\"0\" velocity=\"1\"/>";
-    let text = format!(
+/// A jaw that is welded to the wrist, and one that moves beside it.
+fn arm(kind: &str, axis: &str, limit: &str) -> String {
+    format!(
         "<robot name=\"arm\">{}{}{}{}{}</robot>",
         link("wrist", [0.05, 0.05, 0.04], [0.0, 0.0, 0.02]),
         link("fixed", [0.02, 0.01, 0.06], [0.0, -0.005, 0.03]),
         link("moving", [0.015, 0.008, 0.06], [0.0, 0.004, 0.03]),
         joint("weld", "fixed", "wrist", "fixed", [0.0, 0.0, 0.04], "1 0 0", ""),
-        joint("slide", "prismatic", "wrist", "moving", [0.0, 0.0, 0.04], "0 1 0", limit),
-    );
+        joint("drive", kind, "wrist", "moving", [0.0, 0.0, 0.04], axis, limit),
+    )
+}
+
+/// Why a model is refused.
+fn refusal(text: &str, jaws: [&str; 2]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("arm.urdf");
+    std::fs::write(&path, text).unwrap();
+    import(&path, jaws, None).unwrap_err().to_string()
+}
+
+#[test]
+fn a_fixed_jaw_is_told() {
+    let limit = "<limit lower=\"0\" upper=\"0.05\" effort=\"0\" velocity=\"1\"/>";
+    let text = arm("prismatic", "0 1 0", limit);
     let (gripper, found) = imported(&text, ["moving", "fixed"]);
     assert_eq!((gripper.moving, gripper.stroke), (Moving::I, [0.0, 0.05]));
     assert!(gripper.pad_ii.is_some() && gripper.fingers_ii.is_some());
@@ -151,18 +164,14 @@ fn a_fixed_jaw_is_told() {
     assert_eq!(palm, ["wrist"], "a fixed jaw is a finger only");
     // The other way round the other jaw moves.
     assert_eq!(imported(&text, ["fixed", "moving"]).0.moving, Moving::II);
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("arm.urdf");
-    std::fs::write(&path, &text).unwrap();
     for (jaws, word) in [
         (["moving", "hand"], "use one of: wrist, fixed, moving"),
         (["fixed", "wrist"], "no joint moves"),
     ] {
-        let message = import(&path, jaws, None).unwrap_err().to_string();
+        let message = refusal(&text, jaws);
         assert!(message.contains(word), "{message}");
     }
-    std::fs::write(&path, "no model").unwrap();
-    assert!(import(&path, ["a", "b"], None).unwrap_err().to_string().contains("no URDF"));
+    assert!(refusal("no model", ["a", "b"]).contains("no URDF"));
 }
 
 /// A finger whose pad is a link of its own, as in most models: what carries it belongs to the finger,
@@ -202,17 +211,7 @@ fn what_carries_the_pad_is_finger() {
 #[test]
 fn a_jaw_that_turns_on_the_spot_is_told() {
     let limit = "<limit lower=\"0\" upper=\"1\" effort=\"5\" velocity=\"1\"/>";
-    let text = format!(
-        "<robot name=\"arm\">{}{}{}{}{}</robot>",
-        link("wrist", [0.05, 0.05, 0.04], [0.0, 0.0, 0.02]),
-        link("fixed", [0.02, 0.01, 0.06], [0.0, -0.005, 0.03]),
-        link("moving", [0.015, 0.008, 0.06], [0.0, 0.004, 0.03]),
-        joint("weld", "fixed", "wrist", "fixed", [0.0, 0.0, 0.04], "1 0 0", ""),
-        joint("hinge", "revolute", "wrist", "moving", [0.0, 0.0, 0.04], "-1 0 0", limit),
-    );
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("arm.urdf");
-    std::fs::write(&path, &text).unwrap();
-    let message = import(&path, ["moving", "fixed"], None).unwrap_err().to_string();
+    let text = arm("revolute", "-1 0 0", limit);
+    let message = refusal(&text, ["moving", "fixed"]);
     assert!(message.contains("'moving' turns by 57 deg"), "{message}");
 }

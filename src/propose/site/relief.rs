@@ -228,9 +228,7 @@ impl Span {
 impl<'a> Survey<'a> {
     /// `loose`: triangles of no face.
     pub(super) fn new(part: &'a Part, loose: &[u32], axes_from_part: DMat3) -> Self {
-        let corners = |&triangle: &u32| {
-            part.mesh.corners(triangle).map(|corner| axes_from_part * corner).into_iter()
-        };
+        let corners = |&triangle: &u32| corners(part, &axes_from_part, triangle);
         let plane = |face: &PlanarFace| {
             let outlines = face.polygons.iter().flat_map(|polygon| &polygon.outer);
             Span::of(outlines.map(|at| axes_from_part * face.part_from_face.point(at.extend(0.0))))
@@ -241,7 +239,7 @@ impl<'a> Survey<'a> {
             axes_from_part,
             planes: part.faces.iter().map(plane).collect(),
             curved: part.curved.iter().map(curved).collect(),
-            loose: loose.iter().map(|id| (Span::of(corners(id)), *id)).collect(),
+            loose: loose.iter().map(|id| (Span::of(corners(id).into_iter()), *id)).collect(),
         }
     }
 
@@ -257,6 +255,11 @@ impl<'a> Survey<'a> {
             Look { survey: self, height, side, reach, above, region }.pieces()
         })
     }
+}
+
+/// Corners of a triangle in the axes.
+fn corners(part: &Part, axes_from_part: &DMat3, triangle: u32) -> [DVec3; 3] {
+    part.mesh.corners(triangle).map(|corner| *axes_from_part * corner)
 }
 
 /// Looks for the surface that faces one pad's plane.
@@ -342,12 +345,7 @@ impl Look<'_> {
     }
 
     fn facet(&self, triangle: u32, pieces: &mut Vec<Piece>) {
-        let corners = self
-            .survey
-            .part
-            .mesh
-            .corners(triangle)
-            .map(|corner| self.survey.axes_from_part * corner);
+        let corners = corners(self.survey.part, &self.survey.axes_from_part, triangle);
         let [a, b, c] = corners;
         let Some(normal) = (b - a).cross(c - a).try_normalize() else { return };
         let nearest = corners
@@ -461,12 +459,7 @@ impl Look<'_> {
         }
         let mut rings: Vec<Ring> = Vec::new();
         for &triangle in &face.triangles {
-            let corners = self
-                .survey
-                .part
-                .mesh
-                .corners(triangle)
-                .map(|corner| self.survey.axes_from_part * corner);
+            let corners = corners(self.survey.part, &self.survey.axes_from_part, triangle);
             let [a, b, c] = corners;
             if (b - a).cross(c - a).z * self.side <= 0.0 {
                 continue;
