@@ -15,6 +15,7 @@ pub(crate) mod shanno;
 pub mod slip;
 mod solve;
 pub(crate) mod states;
+mod turns;
 pub mod twist_out;
 
 pub use crate::request::{Refiner, Separation};

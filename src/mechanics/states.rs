@@ -29,9 +29,9 @@ const PIECES: usize = 8;
 /// Corners of the rim up to which each gets a ray of its own.
 const CORNERS: usize = 16;
 /// Rings at the start.
-const RINGS: u32 = 4;
+pub(super) const RINGS: u32 = 4;
 /// Halvings of a starting cell along each coordinate.
-const HALVINGS: u32 = 6;
+pub(super) const HALVINGS: u32 = 6;
 /// The outermost ring, in the coordinate whose fourth power is the distance from the rim: 1e-4 of
 /// the way to the middle. There a contact is down to about 3e-4 of its width; the map hardly
 /// changes from there to the rim, where the pressure is left on an edge or a corner, and Newton's
@@ -74,14 +74,15 @@ struct Cell {
 }
 
 /// The map on the mesh: rays to the rim by rings about the middle.
-struct Map<'s, 'a> {
+pub(super) struct Map<'s, 'a> {
     solver: &'s mut Solver<'a>,
     middle: DVec2,
     /// The rim relative to the middle, cut into pieces; each piece goes through several corners
     /// when there are many.
-    pieces: Vec<Vec<DVec2>>,
+    pub(super) pieces: Vec<Vec<DVec2>>,
     nodes: FxHashMap<(u32, u32), Option<Node>>,
-    starts: usize,
+    /// Starts of Newton's method so far.
+    pub(super) starts: usize,
 }
 
 impl Solver<'_> {
@@ -134,13 +135,12 @@ impl<'s, 'a> Map<'s, 'a> {
 
     /// Contact moment of a mesh point.
     fn place(&self, ray: u32, ring: u32) -> DVec2 {
-        let s = OUTERMOST * f64::from(ring) / f64::from(RINGS << HALVINGS);
-        self.place_at(f64::from(ray), (1.0 - s).powi(4))
+        self.place_at(f64::from(ray), depth(f64::from(ring)))
     }
 
     /// Contact moment on a ray between those of the mesh, at a distance from the rim as a share of
     /// the way to the middle.
-    fn place_at(&self, ray: f64, depth: f64) -> DVec2 {
+    pub(super) fn place_at(&self, ray: f64, depth: f64) -> DVec2 {
         let pieces = ray.rem_euclid(f64::from(1 << HALVINGS) * self.pieces.len() as f64)
             / f64::from(1 << HALVINGS);
         let piece = &self.pieces[pieces as usize % self.pieces.len()];
@@ -151,7 +151,7 @@ impl<'s, 'a> Map<'s, 'a> {
     }
 
     /// The map at a mesh point; `near`: a neighbour whose pressure and slip are close.
-    fn node(&mut self, ray: u32, ring: u32, near: Option<&Node>) -> Option<Node> {
+    pub(super) fn node(&mut self, ray: u32, ring: u32, near: Option<&Node>) -> Option<Node> {
         let round = self.pieces.len() as u32 * (1 << HALVINGS);
         let key = if ring == 0 { (0, 0) } else { (ray % round, ring) };
         if let Some(known) = self.nodes.get(&key) {
@@ -163,7 +163,7 @@ impl<'s, 'a> Map<'s, 'a> {
         node
     }
 
-    fn look(&mut self, x: DVec2, near: Option<&Node>) -> Option<Node> {
+    pub(super) fn look(&mut self, x: DVec2, near: Option<&Node>) -> Option<Node> {
         let z = match near {
             Some(near) => self.solver.state_near(x, Some(&near.z)),
             None => self.solver.state_at(x, None),
@@ -190,6 +190,10 @@ impl<'s, 'a> Map<'s, 'a> {
         if self.signs(states, ring) != turns {
             self.cells(BEND_AGAIN, 2 * MOST_NODES, states);
         }
+        if states.is_empty() && turns != 0 {
+            self.hidden(states);
+        }
+        let open = open || ring < RINGS && self.leads_out(ring);
         ring >= WITHIN && !open && self.signs(states, ring) == turns
     }
 
@@ -237,7 +241,7 @@ impl<'s, 'a> Map<'s, 'a> {
 
     /// Newton's method from a point, unless enough have been tried: on all seven equations, and if
     /// that gets stuck on the map first.
-    fn start(&mut self, node: &Node, states: &mut Vec<State>) {
+    pub(super) fn start(&mut self, node: &Node, states: &mut Vec<State>) {
         self.starts += 1;
         if self.starts > MOST_STARTS {
             return;
@@ -382,6 +386,19 @@ impl<'s, 'a> Map<'s, 'a> {
         expected && !states.iter().any(|state| self.share(state) > outermost)
     }
 
+    /// Whether Newton's step from a point on the ring, or further out, is so short that a zero may lie
+    /// beside it.
+    fn leads_out(&self, ring: u32) -> bool {
+        let longest =
+            self.pieces.iter().flatten().map(|corner| corner.length()).fold(0.0, f64::max);
+        self.nodes.iter().filter(|(key, _)| key.1 >= ring << HALVINGS).any(|(key, node)| {
+            node.is_some_and(|node| {
+                let step = (node.slope.inverse() * node.g).length();
+                step < EXPECTED_STEPS * depth(f64::from(key.1)) * longest
+            })
+        })
+    }
+
     /// Sets the cell aside, finds its zero, or cuts it.
     fn settle(
         &mut self,
@@ -465,33 +482,11 @@ impl<'s, 'a> Map<'s, 'a> {
             .flat_map(|rays| rings.iter().map(move |&rings| Cell { rays, rings }))
             .collect()
     }
+}
 
-    /// Turns of `g` along a ring; `None` where that cannot be told.
-    fn winding(&mut self, ring: u32) -> Option<i32> {
-        let whole = 1 << HALVINGS;
-        let mut turned = 0.0;
-        let mut arcs: Vec<[u32; 2]> = (0..self.pieces.len() as u32)
-            .map(|piece| [piece * whole, (piece + 1) * whole])
-            .collect();
-        while let Some([from, to]) = arcs.pop() {
-            let one = self.node(from, ring, None)?;
-            let two = self.node(to, ring, Some(&one))?;
-            let turn = one.g.angle_to(two.g);
-            let step = two.x - one.x;
-            let bent = (two.g - one.g - one.slope * step)
-                .length()
-                .max((two.g - one.g - two.slope * step).length());
-            let short = turn.abs() < 1.0 || bent < 0.5 * one.g.length().min(two.g.length());
-            if short && turn.abs() < 3.0 {
-                turned += turn;
-            } else if to - from > 1 {
-                arcs.extend([[from, (from + to) / 2], [(from + to) / 2, to]]);
-            } else {
-                return None;
-            }
-        }
-        Some((turned / std::f64::consts::TAU).round() as i32)
-    }
+/// Distance from the rim of a ring in units of the finest mesh, as a share of the way to the middle.
+pub(super) fn depth(ring: f64) -> f64 {
+    (1.0 - OUTERMOST * ring / f64::from(RINGS << HALVINGS)).powi(4)
 }
 
 /// Distance of zero from the hull of the values.

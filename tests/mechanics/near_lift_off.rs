@@ -71,6 +71,27 @@ fn a_state_on_the_last_of_a_contact_is_found() {
     }
 }
 
+/// Found by [`many_cases_near_the_end`]: a load pulls one pad nearly off, and the other presses on some
+/// millionths of its area. The frictions are those of a Newton's method in seventy digits that shares
+/// no code with this one.
+#[test]
+fn a_state_is_found_where_one_pad_is_nearly_pulled_off() {
+    let path = crate::support::root().join("tests/mechanics/cases/nearly_pulled_off.json");
+    let cases = case::read(&path).unwrap();
+    let expected = [111.21419717658016505, 281.084691226088881];
+    assert_eq!(cases.len(), expected.len());
+    for (case, expected) in cases.iter().zip(expected) {
+        let (contact, d, force, wrench) = (&case.contact, case.distance, case.force, &case.wrench);
+        let options = Options::default();
+        let answer = mechanics::solve(contact, d, force, wrench, &options).unwrap();
+        assert!(answer.status.holds() && answer.residual < 1e-9, "{answer:?}");
+        let off = answer.mu_s.unwrap() / expected - 1.0;
+        assert!(off.abs() < 1e-9, "{off:e} {answer:?}");
+        let all = mechanics::limit_states(contact, d, force, wrench, &options).unwrap();
+        assert_eq!(all.len(), 1, "{all:?}");
+    }
+}
+
 fn solve(case: &Case) -> Score {
     let options = Options::default();
     mechanics::solve(&case.contact, case.distance, case.force, &case.wrench, &options).unwrap()
