@@ -24,6 +24,9 @@ pub struct Pads {
     pub supports: Vec<(DVec2, [f64; 2])>,
     /// Whether the areas are the same to [`ROUNDING`].
     pub congruent: bool,
+    /// Width of the narrower area, that of the bar with the same least second moment, scaled: at most
+    /// 1, as of a square.
+    pub width: f64,
     /// Middle of the areas in the grip frame \[m\]: the scaled frame's origin.
     pub origin: DVec2,
     /// Square root of the mean area \[m\]: the scaled frame's unit.
@@ -54,7 +57,8 @@ impl Pads {
             .filter(|e| *e != DVec2::ZERO);
         let supports = all.map(|e| (e, [support(&hulls[0], e), support(&hulls[1], -e)])).collect();
         let congruent = congruent(&areas, ROUNDING);
-        Some(Self { areas, moments, hulls, supports, congruent, origin, length })
+        let width = moments.iter().map(width).fold(1.0, f64::min);
+        Some(Self { areas, moments, hulls, supports, congruent, width, origin, length })
     }
 
     /// The load in units of `force` \[N\] and of this contact's length, its moment about the scaled
@@ -115,6 +119,13 @@ impl Pads {
             omega: omega * self.length,
         }
     }
+}
+
+/// Width of the bar with the least second moment of the area with these [`moments`].
+fn width(&[area, x, y, xx, xy, yy]: &[f64; 6]) -> f64 {
+    let (a, b, c) = (xx - x * x / area, xy - x * y / area, yy - y * y / area);
+    let least = (a + c) / 2.0 - ((a - c) / 2.0).hypot(b);
+    (12.0 * least.max(0.0) / area).sqrt()
 }
 
 /// Greatest pressure on either face of a grip at a squeeze with `force` \[N\] and no load \[Pa\]: of

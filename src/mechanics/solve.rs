@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::branch::{self, folded, hardly_touching, strong};
+use super::branch::{self, folded, hardly_touching, narrow, strong};
 use super::equilibrium::{Solver, State, Vector7};
 use super::pads::{Load, Pads};
 use super::pressure::{self, face_pressure};
@@ -153,13 +153,12 @@ pub fn solve_pads(
     let mut solver = Solver::new(pads, load, options.refiner);
     let (state, unique) = match solver.branch(seed) {
         Some(state) if !strong(&state, &load) => {
-            let alone = if !folded(&state, pads, &load) {
-                true
-            } else if hardly_touching(&state, pads) {
+            let folded = folded(&state, pads, &load);
+            let alone = if narrow(&state, pads, &load) || folded && hardly_touching(&state, pads) {
                 let found = solver.limit_states(&[state]);
                 found.complete && found.states.len() == 1
             } else {
-                solver.partner(&state).is_none()
+                !folded || solver.partner(&state).is_none()
             };
             (state, alone)
         }

@@ -190,7 +190,7 @@ impl<'s, 'a> Map<'s, 'a> {
         if self.signs(states, ring) != turns {
             self.cells(BEND_AGAIN, 2 * MOST_NODES, states);
         }
-        if states.is_empty() && turns != 0 {
+        if self.signs(states, ring) != turns {
             self.hidden(states);
         }
         let open = open || ring < RINGS && self.leads_out(ring);

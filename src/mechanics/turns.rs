@@ -24,7 +24,7 @@ impl Map<'_, '_> {
     pub(super) fn winding(&mut self, ring: u32) -> Option<i32> {
         let ray = |piece| f64::from(piece * (1_u32 << HALVINGS));
         let spots: Vec<Spot> =
-            (0..self.pieces.len() as u32).map(|piece| [ray(piece), f64::from(ring)]).collect();
+            (0..=self.pieces.len() as u32).map(|piece| [ray(piece), f64::from(ring)]).collect();
         self.turns_along(&spots)
     }
 
@@ -68,19 +68,18 @@ impl Map<'_, '_> {
 
     /// Turns of the map along the sides of a patch between two rays and two rings.
     fn around(&mut self, [[a, b], [inner, outer]]: [[f64; 2]; 2]) -> Option<i32> {
-        self.turns_along(&[[a, inner], [a, outer], [b, outer], [b, inner]])
+        self.turns_along(&[[a, inner], [a, outer], [b, outer], [b, inner], [a, inner]])
     }
 
-    /// Turns of the map along a closed way from spot to spot; `None` where that cannot be told.
+    /// Turns of the map along a way from spot to spot that ends where it began; `None` where that cannot be told.
     fn turns_along(&mut self, spots: &[Spot]) -> Option<i32> {
-        let first = (spots[0], self.spot(spots[0], None)?);
-        let (mut last, mut turned, mut left) = (first, 0.0, MOST_ALONG);
+        let mut last = (spots[0], self.spot(spots[0], None)?);
+        let (mut turned, mut left) = (0.0, MOST_ALONG);
         for &spot in &spots[1..] {
             let next = (spot, self.spot(spot, Some(&last.1))?);
             turned += self.turned([last, next], &mut left)?;
             last = next;
         }
-        turned += self.turned([last, first], &mut left)?;
         Some((turned / std::f64::consts::TAU).round() as i32)
     }
 

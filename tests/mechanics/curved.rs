@@ -670,7 +670,7 @@ fn on_points(posed: &Posed, spins: &[DVec2], answer: &Answer, grid: usize) -> Ve
     let mut moved = vec![DVec2::ZERO; spots.len()];
     let mut bounds: [f64; 2] = [0.0, f64::INFINITY];
     let mut shares = [DVec2::ZERO; 2];
-    for _ in 0..300 {
+    for _ in 0..ROUNDS {
         let mut matrix = Matrix5::<f64>::zeros();
         for ((spot, v), speed) in spots.iter().zip(&velocities).zip(&speeds) {
             let weight = spot.p / speed;
@@ -701,11 +701,12 @@ fn on_points(posed: &Posed, spins: &[DVec2], answer: &Answer, grid: usize) -> Ve
                 shares[spot.face] += spot.p / speed * *v;
             }
         }
-        if bounds[1] < bounds[0] * (1.0 + 1e-4) {
+        if bounds[1] < bounds[0] * (1.0 + MEETING) {
             break;
         }
         for (speed, v) in speeds.iter_mut().zip(&moved) {
-            *speed = v.length().max(1e-6 * most);
+            // Over the fastest, else all of them shrink with every round until none is left.
+            *speed = (v.length() / most).max(1e-6);
         }
     }
     // About the axes that the pressure holds, with the friction's couple.
@@ -737,6 +738,11 @@ struct Seen {
     friction: f64,
     moments: f64,
 }
+
+/// Most rounds of [`on_points`], and how close its bounds must come: the forces converge with the root of
+/// what is left.
+const ROUNDS: usize = 20_000;
+const MEETING: f64 = 1e-6;
 
 /// Agreement expected of a grid, times its number of points along a side.
 const TOLERANCE: f64 = 0.1;

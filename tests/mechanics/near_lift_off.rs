@@ -57,6 +57,29 @@ fn two_states_on_the_last_of_a_contact_are_seen() {
     }
 }
 
+/// Found by [`many_other_kinds`]: on narrow contacts there are several states far from each other at
+/// couplings down to 0.03 of the width.
+#[test]
+fn further_states_of_narrow_contacts_are_seen() {
+    let path = crate::support::root().join("tests/mechanics/cases/narrow.json");
+    let cases = case::read(&path).unwrap();
+    let expected: [&[f64]; 4] = [
+        &[0.2777335062718857, 0.4461180908674975],
+        &[0.00237634398757025, 0.017897007858337394],
+        &[0.321861836236565, 0.32590544639702806, 0.3459778673312063, 0.4220673118292221],
+        &[0.0004976054863316228, 0.0005913520975915428],
+    ];
+    assert_eq!(cases.len(), expected.len());
+    for (case, expected) in cases.iter().zip(expected) {
+        let found = states_of_an_ambiguous_one(case, "narrow");
+        let same = |(a, b): (&f64, &f64)| (a / b - 1.0).abs() < 1e-8;
+        assert!(
+            found.len() == expected.len() && found.iter().zip(expected).all(same),
+            "{found:?} {expected:?}"
+        );
+    }
+}
+
 /// A limit state was found with fifty digits: the load is not refused.
 #[test]
 fn a_state_on_the_last_of_a_contact_is_found() {
@@ -97,10 +120,9 @@ fn solve(case: &Case) -> Score {
     mechanics::solve(&case.contact, case.distance, case.force, &case.wrench, &options).unwrap()
 }
 
-/// A random case with its load scaled to close by that at which answers end and refusals begin, on
-/// either side; `None` where no load of this kind is refused or answered.
-fn near_the_end(number: u64) -> Option<Case> {
-    let base = cases::case(number);
+/// A case with its load scaled to close by that at which answers end and refusals begin, on either
+/// side; `None` where no load of this kind is refused or answered.
+fn near_the_end(base: &Case, number: u64) -> Option<Case> {
     let scaled = |times: f64| Case {
         wrench: gripfast::model::Wrench {
             force: base.wrench.force * times,
@@ -135,14 +157,46 @@ fn near_the_end(number: u64) -> Option<Case> {
     Some(scaled(f64::midpoint(low, high).exp2() * side))
 }
 
+/// The kinds of random cases that are scanned.
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    /// As they come, all near the end.
+    Any,
+    /// From inside, half of them near the end, as of the next ones.
+    Inside,
+    /// The faces five to thirty-five times the pads' size apart.
+    Coupled,
+    /// Stretched to up to a hundred times as long as wide.
+    Bars,
+}
+
+fn case_of(kind: Kind, number: u64) -> Option<Case> {
+    let mut case = cases::case(number);
+    match kind {
+        Kind::Any => return near_the_end(&case, number),
+        Kind::Inside => case.distance = -case.distance.abs().clamp(0.05, 20.0),
+        Kind::Coupled => case.distance = 5.0 + 3.0 * case.distance.abs().min(10.0),
+        Kind::Bars => {
+            let long = Random::new(number ^ 0xba5).range(1.0, 10.0);
+            for polygon in case.contact.face_i.iter_mut().chain(&mut case.contact.face_ii) {
+                for x in polygon.outer.iter_mut().chain(polygon.holes.iter_mut().flatten()) {
+                    *x = glam::DVec2::new(x.x * long, x.y / long);
+                }
+            }
+            case.distance = case.distance.abs().clamp(0.05, 20.0);
+        }
+    }
+    if number % 2 == 0 { near_the_end(&case, number) } else { Some(case) }
+}
+
 /// What a scan finds out about the answer to a case, and the case where the answer is wrong.
-fn look(number: u64) -> (&'static str, Option<String>) {
-    let Some(case) = near_the_end(number) else { return ("no end within 4096 times", None) };
+fn look(kind: Kind, number: u64) -> (&'static str, Option<String>) {
+    let Some(case) = case_of(kind, number) else { return ("no end within 4096 times", None) };
     let score = solve(&case);
     let Some(problem) = Problem::new(&case) else { return ("no normal force", None) };
     let told = |mus: &[f64], coupling: Option<f64>| {
         Some(format!(
-            "case {number}: scan {mus:?}, coupling {coupling:?}\n  {score:?}\n  {}",
+            "{kind:?} case {number}: scan {mus:?}, coupling {coupling:?}\n  {score:?}\n  {}",
             case.json()
         ))
     };
@@ -169,23 +223,40 @@ fn look(number: u64) -> (&'static str, Option<String>) {
     }
 }
 
-fn count(first: u64, cases: u64) -> (BTreeMap<&'static str, u64>, Vec<String>) {
-    let looked: Vec<_> = (first..first + cases).into_par_iter().map(look).collect();
-    let mut counts = BTreeMap::new();
-    looked.iter().for_each(|(kind, _)| *counts.entry(*kind).or_default() += 1);
-    (counts, looked.into_iter().filter_map(|(_, wrong)| wrong).collect())
+/// Looks at cases of a kind: counts by what was found, none of which may be wrong.
+fn look_at(kind: Kind, first: u64, cases: u64) {
+    let looked: Vec<_> =
+        (first..first + cases).into_par_iter().map(|number| look(kind, number)).collect();
+    let mut counts = BTreeMap::<_, u64>::new();
+    looked.iter().for_each(|(found, _)| *counts.entry(*found).or_default() += 1);
+    for (found, count) in &counts {
+        crate::support::say(&format!("  {count:8} {found}"));
+    }
+    let wrong: Vec<String> = looked.into_iter().filter_map(|(_, wrong)| wrong).collect();
+    assert!(wrong.is_empty(), "{} of {cases}:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+fn number(name: &str, default: u64) -> u64 {
+    std::env::var(name).map_or(default, |text| text.parse().unwrap())
 }
 
 #[test]
 #[ignore = "a quarter of an hour: GRIPFAST_CASES=10000 cargo test --release -p gripfast --test mechanics near_the_end -- --ignored"]
 fn many_cases_near_the_end() {
-    let number = |name: &str, default: u64| {
-        std::env::var(name).map_or(default, |text| text.parse().unwrap())
-    };
-    let (first, cases) = (number("GRIPFAST_FIRST", 0), number("GRIPFAST_CASES", 10_000));
-    let (counts, wrong) = count(first, cases);
-    for (kind, count) in &counts {
-        crate::support::say(&format!("  {count:8} {kind}"));
+    look_at(Kind::Any, number("GRIPFAST_FIRST", 0), number("GRIPFAST_CASES", 10_000));
+}
+
+#[test]
+fn other_kinds_agree_with_the_scan() {
+    for kind in [Kind::Inside, Kind::Coupled, Kind::Bars] {
+        look_at(kind, 0, 24);
     }
-    assert!(wrong.is_empty(), "{} of {cases}:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+#[ignore = "minutes: GRIPFAST_CASES=1000 cargo test --release -p gripfast --test mechanics other_kinds -- --ignored"]
+fn many_other_kinds() {
+    for kind in [Kind::Inside, Kind::Coupled, Kind::Bars] {
+        look_at(kind, number("GRIPFAST_FIRST", 0), number("GRIPFAST_CASES", 1000));
+    }
 }
