@@ -101,15 +101,21 @@ impl Solver<'_> {
                 return Some(state);
             }
         }
-        let start = self.state_at(self.load.contact_moment(), seed)?;
         if self.refiner == Refiner::Newton {
-            return self.follow(start);
+            return self.followed(seed);
         }
+        let start = self.state_at(self.load.contact_moment(), seed)?;
         let direct = self.conjugate(start).filter(|state| !strong(state, &self.load));
         direct.or_else(|| {
             let followed = self.follow(start)?;
             Some(self.conjugate(followed.z).unwrap_or(followed))
         })
+    }
+
+    /// [`Solver::branch`] step by step, where several limit states are known.
+    pub(super) fn followed(&mut self, seed: Option<Twist>) -> Option<State> {
+        let start = self.state_at(self.load.contact_moment(), seed)?;
+        self.follow(start)
     }
 
     /// The solution close to `z`, that of another load, by Newton's method from there; where the

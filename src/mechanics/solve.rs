@@ -154,13 +154,16 @@ pub fn solve_pads(
     let (state, unique) = match solver.branch(seed) {
         Some(state) if !strong(&state, &load) => {
             let folded = folded(&state, pads, &load);
-            let alone = if narrow(&state, pads, &load) || folded && hardly_touching(&state, pads) {
+            if narrow(&state, pads, &load) || folded && hardly_touching(&state, pads) {
                 let found = solver.limit_states(&[state]);
-                found.complete && found.states.len() == 1
+                match found.states.len() {
+                    1 => (state, found.complete),
+                    // Newton's method need not have come to the one on the branch.
+                    _ => (solver.followed(seed).unwrap_or(state), false),
+                }
             } else {
-                !folded || solver.partner(&state).is_none()
-            };
-            (state, alone)
+                (state, !folded || solver.partner(&state).is_none())
+            }
         }
         None if load.half_distance == 0.0 => {
             return refused(out_of_reach(pads, &load), solver.evaluations);

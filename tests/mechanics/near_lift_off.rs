@@ -69,9 +69,15 @@ fn further_states_of_narrow_contacts_are_seen() {
         &[0.321861836236565, 0.32590544639702806, 0.3459778673312063, 0.4220673118292221],
         &[0.0004976054863316228, 0.0005913520975915428],
     ];
+    let answers =
+        [0.2777335062718857, 0.00237634398757025, 0.4220673118292221, 0.0004976054863316228];
     assert_eq!(cases.len(), expected.len());
-    for (case, expected) in cases.iter().zip(expected) {
+    for ((case, expected), answer) in cases.iter().zip(expected).zip(answers) {
         let found = states_of_an_ambiguous_one(case, "narrow");
+        let (contact, d, force, wrench) = (&case.contact, case.distance, case.force, &case.wrench);
+        let got = mechanics::solve(contact, d, force, wrench, &Options::default()).unwrap();
+        // That of the scan's problem followed from `d = 0`.
+        assert!((got.mu_s.unwrap() / answer - 1.0).abs() < 1e-8, "{got:?} {answer}");
         let same = |(a, b): (&f64, &f64)| (a / b - 1.0).abs() < 1e-8;
         assert!(
             found.len() == expected.len() && found.iter().zip(expected).all(same),
