@@ -192,7 +192,7 @@ fn case_of(kind: Kind, number: u64) -> Option<Case> {
             case.distance = case.distance.abs().clamp(0.05, 20.0);
         }
     }
-    if number % 2 == 0 { near_the_end(&case, number) } else { Some(case) }
+    if number.is_multiple_of(2) { near_the_end(&case, number) } else { Some(case) }
 }
 
 /// What a scan finds out about the answer to a case, and the case where the answer is wrong.
