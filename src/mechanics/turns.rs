@@ -68,7 +68,8 @@ impl Map<'_, '_> {
 
     /// Turns of the map along the sides of a patch between two rays and two rings.
     fn around(&mut self, [[a, b], [inner, outer]]: [[f64; 2]; 2]) -> Option<i32> {
-        self.turns_along(&[[a, inner], [a, outer], [b, outer], [b, inner], [a, inner]])
+        let start = [a, inner];
+        self.turns_along(&[start, [a, outer], [b, outer], [b, inner], start])
     }
 
     /// Turns of the map along a way from spot to spot that ends where it began; `None` where that cannot be told.
