@@ -72,7 +72,8 @@ impl Map<'_, '_> {
         self.turns_along(&[start, [a, outer], [b, outer], [b, inner], start])
     }
 
-    /// Turns of the map along a way from spot to spot that ends where it began; `None` where that cannot be told.
+    /// Turns of the map along a way from spot to spot that ends where it began; `None` where that
+    /// cannot be told.
     fn turns_along(&mut self, spots: &[Spot]) -> Option<i32> {
         let mut last = (spots[0], self.spot(spots[0], None)?);
         let (mut turned, mut left) = (0.0, MOST_ALONG);
