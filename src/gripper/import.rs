@@ -22,6 +22,8 @@ const NONE: f64 = 1e-6;
 const PAD_DEPTH: f64 = 0.5e-3;
 /// A jaw that turns by more while it closes does not stay parallel \[rad\].
 const PARALLEL: f64 = 1e-3;
+/// By how much it may do so, for what models round \[rad\].
+const TILT: f64 = 0.035;
 
 /// A gripper file made from a model.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,6 +77,8 @@ struct Hand {
     drive: String,
     effort: f64,
     prismatic: bool,
+    /// Whether the motion rests on something that the model does not say.
+    doubt: bool,
     notes: Vec<String>,
 }
 
@@ -106,14 +110,16 @@ impl Hand {
                 ));
             }
         }
+        let turns = turns(model, &place, links, &drives)?;
         let axes = axes(model, &place, links, &points)?;
-        let turned = links.map(|link| turned(place(link, 0.0), place(link, 1.0)));
-        if turned[0].max(turned[1]) > PARALLEL {
+        let known = notes.len();
+        if turns[0].max(turns[1]) > PARALLEL {
             notes.push(format!(
-                "the jaws turn by up to {:.1} deg while they close: gripfast takes pads as parallel; keep the stroke to where they are",
-                turned[0].max(turned[1]).to_degrees()
+                "the jaws turn by up to {:.1} deg while they close: their pads are taken as parallel",
+                turns[0].max(turns[1]).to_degrees()
             ));
         }
+        notes.extend(model.doubts(links, palm_link, &drives));
         let state = |t: f64| -> State {
             let bounds = [0, 1].map(|jaw: usize| {
                 let frame = place(links[jaw], t);
@@ -140,6 +146,7 @@ impl Hand {
                 "the jaws move by different ways: they are taken as moving by the same".to_owned(),
             );
         }
+        let doubt = notes.len() > known;
         let middle = |t: f64| {
             let along = [0, 1].map(|jaw: usize| here(jaw, t).x - here(jaw, closed).x);
             match moves {
@@ -240,6 +247,7 @@ impl Hand {
             drive: model.joint_name(drive).to_owned(),
             effort: model.effort(drive),
             prismatic: model.is_prismatic(drive),
+            doubt,
             notes,
         })
     }
@@ -249,6 +257,41 @@ impl Hand {
 fn turned(from: Frame, to: Frame) -> f64 {
     let turn = from.rotation.transpose() * to.rotation;
     ((turn.x_axis.x + turn.y_axis.y + turn.z_axis.z - 1.0) / 2.0).clamp(-1.0, 1.0).acos()
+}
+
+/// By how much each jaw turns on its way \[rad\]. A pad that turns is parallel to the other at one
+/// width only, and no gripper file says how it stands at the others: refused.
+fn turns(
+    model: &Model,
+    place: &impl Fn(usize, f64) -> Frame,
+    links: [usize; 2],
+    drives: &[usize],
+) -> Result<[f64; 2]> {
+    let turns = links.map(|link| {
+        let first = place(link, 0.0);
+        (1..=STATES)
+            .map(|step| turned(first, place(link, step as f64 / STATES as f64)))
+            .fold(0.0, f64::max)
+    });
+    let Some(jaw) =
+        (0..2).filter(|&jaw| turns[jaw] > TILT).max_by(|&a, &b| turns[a].total_cmp(&turns[b]))
+    else {
+        return Ok(turns);
+    };
+    let joints: Vec<String> =
+        drives.iter().map(|&joint| format!("'{}'", model.joint_name(joint))).collect();
+    Err(model.wrong(
+        format!(
+            "'{}' turns by {:.0} deg as joint {} opens the jaws: a jaw whose pad does not stay parallel \
+             cannot be described",
+            model.name(links[jaw]),
+            turns[jaw].to_degrees(),
+            joints.join(" and ")
+        ),
+        "describe the gripper by hand as it stands at the width that you grip, with a stroke of some \
+         millimetres about it: `gripfast gripper new`; where a linkage keeps the pad parallel, add its \
+         joint to the model as a mimic",
+    ))
 }
 
 /// Axes of the grip as columns in the palm link's frame: approach, across, closing.
@@ -262,23 +305,10 @@ fn axes(
     let way = apart(1.0) - apart(0.0);
     let Some(mut closing) = Some(way).filter(|way| way.length() > NONE).map(DVec3::normalize)
     else {
-        let turns = [0, 1].map(|jaw: usize| turned(place(links[jaw], 0.0), place(links[jaw], 1.0)));
-        return Err(match turns.iter().position(|&turn| turn > PARALLEL) {
-            Some(jaw) => model.wrong(
-                format!(
-                    "'{}' turns by {:.0} deg about a joint of its own: a jaw whose pad does not stay \
-                     parallel cannot be described",
-                    model.name(links[jaw]),
-                    turns[jaw].to_degrees()
-                ),
-                "describe the gripper by hand as it stands at the width that you grip: \
-                 `gripfast gripper new`",
-            ),
-            None => model.wrong(
-                "the two links do not move towards each other",
-                "name the links that touch the part, one of each jaw",
-            ),
-        });
+        return Err(model.wrong(
+            "the two links do not move towards each other",
+            "name the links that touch the part, one of each jaw",
+        ));
     };
     let middle = |jaw: usize| {
         let frame = place(links[jaw], 0.5);

@@ -175,8 +175,12 @@ impl Model {
             let limit = &self.robot.joints[drive].limit;
             if !(limit.lower.is_finite() && limit.upper.is_finite() && limit.lower < limit.upper) {
                 return Err(self.wrong(
-                    format!("joint '{}' has no limits", self.robot.joints[drive].name),
-                    "state its lower and upper limit in the model",
+                    format!(
+                        "joint '{}' has no limits, so how far the jaws open is not said",
+                        self.robot.joints[drive].name
+                    ),
+                    "state its lower and upper limit in the model, as \
+                     <limit lower=\"..\" upper=\"..\"/>, and its type as revolute or prismatic",
                 ));
             }
         }
@@ -187,6 +191,39 @@ impl Model {
             ));
         }
         Ok(drives)
+    }
+
+    /// What the model leaves open about how the jaws move.
+    pub(super) fn doubts(&self, links: [usize; 2], palm: usize, drives: &[usize]) -> Vec<String> {
+        let mut doubts = Vec::new();
+        if let [one, other, ..] = drives {
+            doubts.push(format!(
+                "joints '{}' and '{}' both drive the jaws, and neither follows the other: they are taken as moving together, each from its lower to its upper limit",
+                self.joint_name(*one),
+                self.joint_name(*other)
+            ));
+        }
+        let ends = [self.positions(drives, 0.0), self.positions(drives, 1.0)];
+        for link in links {
+            for step in self.ancestors(link).into_iter().take_while(|&step| step != palm) {
+                let Some(joint) = self.above[step] else { break };
+                let limit = &self.robot.joints[joint].limit;
+                let slack = 1e-3 * (limit.upper - limit.lower);
+                let within = |position: f64| {
+                    position >= limit.lower - slack && position <= limit.upper + slack
+                };
+                if self.robot.joints[joint].mimic.is_some()
+                    && slack > 0.0
+                    && !ends.iter().all(|positions| within(positions[joint]))
+                {
+                    doubts.push(format!(
+                        "joint '{}' leaves its own limits where it follows another over the whole of that one's range: the stroke may be less",
+                        self.joint_name(joint)
+                    ));
+                }
+            }
+        }
+        doubts
     }
 
     /// Position of every joint with the drives at this share of their ranges; joints that do not

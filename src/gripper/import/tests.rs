@@ -208,6 +208,107 @@ fn what_carries_the_pad_is_finger() {
     assert!((high - DVec3::new(0.01, 0.01, 0.014)).length() < 1e-9, "{high}");
 }
 
+/// A jaw on a hinge, its pad beside the hinge: whether the named link lies on the hinge or at the pad,
+/// the pad turns, and the gripper is refused rather than described as parallel.
+#[test]
+fn a_pad_that_swings_is_refused_wherever_its_link_lies() {
+    let limit = "<limit lower=\"-0.2\" upper=\"2\" effort=\"5\" velocity=\"1\"/>";
+    let text = arm("revolute", "-1 0 0", limit).replace(
+        "</robot>",
+        &format!(
+            "{}{}</robot>",
+            link("tip", [0.015, 0.008, 0.02], [0.0, 0.004, 0.0]),
+            joint("glue", "fixed", "moving", "tip", [0.0, 0.0, 0.06], "1 0 0", "")
+        ),
+    );
+    for jaws in [["tip", "fixed"], ["fixed", "tip"], ["moving", "fixed"]] {
+        let message = refusal(&text, jaws);
+        assert!(message.contains("turns by 126 deg as joint 'drive'"), "{message}");
+        assert!(message.contains("`gripfast gripper new`"), "{message}");
+    }
+    // More than a turn: first and last state look alike.
+    let around = limit.replace("-0.2", "0").replace("\"2\"", "\"6.283185307179586\"");
+    let message = refusal(&arm("revolute", "-1 0 0", &around), ["moving", "fixed"]);
+    assert!(message.contains("turns by 180 deg"), "{message}");
+}
+
+#[test]
+fn a_hinge_without_limits_is_refused() {
+    for limit in ["", "<limit effort=\"5\" velocity=\"1\"/>"] {
+        let message = refusal(&arm("continuous", "-1 0 0", limit), ["moving", "fixed"]);
+        assert!(message.contains("'drive' has no limits"), "{message}");
+        assert!(message.contains("lower and upper"), "{message}");
+    }
+}
+
+/// A crank beside a fixed jaw, the pad kept level by a joint that follows with an offset.
+#[test]
+fn an_offset_of_a_mimic_moves_the_pad_along_its_arc() {
+    let (crank, start, turn) = (0.05_f64, 0.3_f64, 0.6_f64);
+    let limit = |low: f64, high: f64| {
+        format!("<limit lower=\"{low}\" upper=\"{high}\" effort=\"5\" velocity=\"1\"/>")
+    };
+    let model = |level: &str| {
+        format!(
+            "<robot name=\"arm\">{}{}{}{}{}{}{}</robot>",
+            link("wrist", [0.05, 0.05, 0.04], [0.0, 0.0, 0.02]),
+            link("fixed", [0.02, 0.01, 0.06], [0.0, -0.005, 0.07]),
+            link("rod", [0.01, 0.004, 0.04], [0.0, 0.0, 0.02]),
+            link("tip", [0.015, 0.008, 0.03], [0.0, 0.004, 0.0]),
+            joint("weld", "fixed", "wrist", "fixed", [0.0, 0.0, 0.04], "1 0 0", ""),
+            // A positive angle leans the rod towards +y; the pad touches the fixed jaw at `start`.
+            joint(
+                "drive",
+                "revolute",
+                "wrist",
+                "rod",
+                [0.0, -crank * start.sin(), 0.04],
+                "-1 0 0",
+                &limit(start, start + turn)
+            ),
+            joint("level", "revolute", "rod", "tip", [0.0, 0.0, crank], "1 0 0", level),
+        )
+    };
+    let level = limit(0.0, 1.0) + "<mimic joint=\"drive\" multiplier=\"1\" offset=\"0\"/>";
+    let (gripper, found) = imported(&model(&level), ["tip", "fixed"]);
+    assert_eq!(gripper.moving, Moving::I);
+    let gap = |t: f64| crank * ((start + t).sin() - start.sin());
+    assert!((gripper.stroke[1] - gap(turn)).abs() < 1e-6, "{:?}", gripper.stroke);
+    for step in 0..=20 {
+        let t = turn * f64::from(step) / 20.0;
+        let exact = crank * ((start + t).cos() - start.cos());
+        let advance = gripper.travel.advance(gap(t));
+        assert!((advance - exact).abs() < 5e-5, "{t}: {advance} {exact}");
+    }
+    assert!(gripper.sources["motion"].verified, "{:?}", found.notes);
+    // The pad leans by 0.3 rad at every width: parallel to itself, and taken as it stands.
+    let leaning = level.replace("offset=\"0\"", "offset=\"0.3\"");
+    let (leant, found) = imported(&model(&leaning), ["tip", "fixed"]);
+    assert!(!leant.sources["motion"].verified, "beyond its limit of 1: {:?}", found.notes);
+    assert!(found.notes.iter().any(|note| note.contains("'level' leaves its own limits")));
+    // Half as much does not keep it level.
+    let half = level.replace("multiplier=\"1\"", "multiplier=\"0.5\"");
+    let message = refusal(&model(&half), ["tip", "fixed"]);
+    assert!(message.contains("'tip' turns by 17 deg"), "{message}");
+}
+
+#[test]
+fn two_drives_are_marked() {
+    let limit = "<limit lower=\"0\" upper=\"0.03\" effort=\"40\" velocity=\"1\"/>";
+    let text = format!(
+        "<robot name=\"pair\">{}{}{}{}{}</robot>",
+        link("palm", [0.05, 0.12, 0.04], [0.0, 0.0, 0.02]),
+        link("left", [0.018, 0.01, 0.05], [0.0, 0.005, 0.025]),
+        link("right", [0.018, 0.01, 0.05], [0.0, -0.005, 0.025]),
+        joint("a", "prismatic", "palm", "left", [0.0, 0.0, 0.05], "0 1 0", limit),
+        joint("b", "prismatic", "palm", "right", [0.0, 0.0, 0.05], "0 -1 0", limit),
+    );
+    let (gripper, found) = imported(&text, ["left", "right"]);
+    assert_eq!(gripper.stroke, [0.0, 0.06]);
+    assert!(!gripper.sources["motion"].verified && !gripper.sources["stroke"].verified);
+    assert!(found.notes.iter().any(|note| note.contains("'a' and 'b' both drive")));
+}
+
 #[test]
 fn a_jaw_that_turns_on_the_spot_is_told() {
     let limit = "<limit lower=\"0\" upper=\"1\" effort=\"5\" velocity=\"1\"/>";

@@ -120,13 +120,11 @@ pub(super) fn write(model: &Model, hand: &Hand, name: Option<&str>) -> Result<Im
         axis(mount.rotation.y_axis),
         axis(mount.rotation.z_axis)
     );
-    let _ = writeln!(
-        text,
-        "\n[source]\nmotion = {}",
-        quoted(&format!("{model_name}: joints from '{}'", hand.drive))
-    );
-    let stated = format!("{model_name}: where the pads stand at the joint's limits");
-    let _ = writeln!(text, "stroke = {}\n\n[unverified]", quoted(&stated));
+    let motion = quoted(&format!("{model_name}: joints from '{}'", hand.drive));
+    let stated = quoted(&format!("{model_name}: where the pads stand at the joint's limits"));
+    let motion = format!("motion = {motion}\nstroke = {stated}\n");
+    let [known, doubtful] = if hand.doubt { ["", motion.as_str()] } else { [motion.as_str(), ""] };
+    let _ = write!(text, "\n[source]\n{known}\n[unverified]\n{doubtful}");
     let force_text = if known_force {
         format!("largest effort of joint '{}'; the least is a tenth of it", hand.drive)
     } else {
