@@ -1,15 +1,17 @@
 //! A gripper file from a robot model (URDF): where its jaws go, and boxes round its links. What a
 //! model cannot say is marked as unverified in the file.
 
+mod axes;
 mod model;
 mod text;
 
 use std::path::Path;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 use crate::error::Result;
 use crate::model::Frame;
+use axes::axes;
 use model::Model;
 
 /// States of the drive that are looked at.
@@ -111,8 +113,9 @@ impl Hand {
             }
         }
         let turns = turns(model, &place, links, &drives)?;
-        let axes = axes(model, &place, links, &points)?;
+        let (axes, guess) = axes(model, &place, links, &points)?;
         let known = notes.len();
+        notes.extend(guess);
         if turns[0].max(turns[1]) > PARALLEL {
             notes.push(format!(
                 "the jaws turn by up to {:.1} deg while they close: their pads are taken as parallel",
@@ -292,58 +295,6 @@ fn turns(
          millimetres about it: `gripfast gripper new`; where a linkage keeps the pad parallel, add its \
          joint to the model as a mimic",
     ))
-}
-
-/// Axes of the grip as columns in the palm link's frame: approach, across, closing.
-fn axes(
-    model: &Model,
-    place: &impl Fn(usize, f64) -> Frame,
-    links: [usize; 2],
-    points: &[Vec<(String, Vec<DVec3>)>; 2],
-) -> Result<DMat3> {
-    let apart = |t: f64| place(links[0], t).origin - place(links[1], t).origin;
-    let way = apart(1.0) - apart(0.0);
-    let Some(mut closing) = Some(way).filter(|way| way.length() > NONE).map(DVec3::normalize)
-    else {
-        return Err(model.wrong(
-            "the two links do not move towards each other",
-            "name the links that touch the part, one of each jaw",
-        ));
-    };
-    let middle = |jaw: usize| {
-        let frame = place(links[jaw], 0.5);
-        let all: Vec<DVec3> = points[jaw]
-            .iter()
-            .flat_map(|(_, list)| list)
-            .map(|&point| frame.point(point))
-            .collect();
-        let [low, high] = bounds(all.into_iter());
-        (low + high) / 2.0
-    };
-    let centres = [middle(0), middle(1)];
-    // From jaw II to jaw I.
-    if closing.dot(centres[0] - centres[1]) < 0.0 {
-        closing = -closing;
-    }
-    let towards = (centres[0] + centres[1]) / 2.0;
-    let towards = towards - closing * closing.dot(towards);
-    let Some(towards) = Some(towards).filter(|way| way.length() > NONE).map(DVec3::normalize)
-    else {
-        return Err(model.wrong(
-            "the direction of the approach is not to be told: the jaws lie about the palm's origin",
-            "describe the gripper by hand: `gripfast gripper new`",
-        ));
-    };
-    // Hands are drawn along an axis of their palm.
-    let drawn = DVec3::AXES
-        .into_iter()
-        .flat_map(|axis| [axis, -axis])
-        .filter(|axis| axis.dot(closing).abs() < 1e-3)
-        .max_by(|a, b| a.dot(towards).total_cmp(&b.dot(towards)))
-        .filter(|axis| axis.dot(towards) > 0.8);
-    let approach = drawn.unwrap_or(towards);
-    let closing = (closing - approach * approach.dot(closing)).normalize();
-    Ok(DMat3::from_cols(approach, closing.cross(approach), closing))
 }
 
 /// The drive with the jaws closed, touching if they do, and open.

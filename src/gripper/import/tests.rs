@@ -286,10 +286,38 @@ fn an_offset_of_a_mimic_moves_the_pad_along_its_arc() {
     let (leant, found) = imported(&model(&leaning), ["tip", "fixed"]);
     assert!(!leant.sources["motion"].verified, "beyond its limit of 1: {:?}", found.notes);
     assert!(found.notes.iter().any(|note| note.contains("'level' leaves its own limits")));
+    // Nothing faces the fixed jaw: an axis of the palm is a guess.
+    assert!(found.notes.iter().any(|note| note.contains("no flat faces")), "{:?}", found.notes);
+    let corner = 0.015 * 0.3_f64.sin();
+    assert!((leant.stroke[1] - gap(turn) + corner).abs() < 1e-6, "{:?}", leant.stroke);
+    // The hand drawn askew in its palm: the pads show where it closes, no axis does.
+    let askew =
+        model(&level).replacen("0 0 0.04\" rpy=\"0 0 0", "0 0 0.04\" rpy=\"0.2 0 0", 1).replace(
+            &format!("{} 0.04\" rpy=\"0 0 0", -crank * start.sin()),
+            &format!(
+                "{} {}\" rpy=\"0.2 0 0",
+                -crank * start.sin() * 0.2_f64.cos(),
+                0.04 - crank * start.sin() * 0.2_f64.sin()
+            ),
+        );
+    assert_eq!(askew.matches("rpy=\"0.2 0 0").count(), 2, "{askew}");
+    let (askew, found) = imported(&askew, ["tip", "fixed"]);
+    assert!((askew.stroke[1] - gap(turn)).abs() < 1e-6, "{:?}", askew.stroke);
+    assert!(askew.sources["motion"].verified, "{:?}", found.notes);
     // Half as much does not keep it level.
     let half = level.replace("multiplier=\"1\"", "multiplier=\"0.5\"");
     let message = refusal(&model(&half), ["tip", "fixed"]);
     assert!(message.contains("'tip' turns by 17 deg"), "{message}");
+}
+
+/// A jaw on a slanted slide beside a fixed one: the pads close along their normal and shift.
+#[test]
+fn a_slanted_slide_closes_along_the_pads_normal() {
+    let limit = "<limit lower=\"0\" upper=\"0.05\" effort=\"20\" velocity=\"1\"/>";
+    let (gripper, found) = imported(&arm("prismatic", "0 0.8 0.6", limit), ["moving", "fixed"]);
+    assert!((gripper.stroke[1] - 0.04).abs() < 1e-9, "{:?}", gripper.stroke);
+    assert!((gripper.travel.advance(0.02) - 0.015).abs() < 1e-9);
+    assert!(gripper.sources["motion"].verified, "{:?}", found.notes);
 }
 
 #[test]
