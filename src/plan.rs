@@ -51,7 +51,7 @@ use crate::file::Lock;
 use crate::gripper::{Gripper, Jaws};
 use crate::lab::compare;
 use crate::model::Negative;
-use crate::part::{MassProperties, Part};
+use crate::part::{MassProperties, Part, Symmetry};
 use crate::propose::{Explanation, ProposeOptions, Proposer};
 use crate::rank;
 use crate::request::{Choice, Polish, Request};
@@ -69,6 +69,9 @@ pub use output::{GLB_TOP, WHOLE, solve_every_load};
 pub use outside::{Assessed, Assessment, Standing, explain};
 pub use prepare::{PlanBuilder, most_threads};
 
+/// Most grips kept so that enough are left when one is shown for all turns of a part.
+const MOST_TURNED: usize = 10_000;
+
 /// The main job, ready to run.
 #[derive(Debug)]
 pub struct Plan {
@@ -78,6 +81,8 @@ pub struct Plan {
     part: Part,
     gripper: Gripper,
     mass: MassProperties,
+    /// Turns that map the part to itself.
+    symmetry: Option<Symmetry>,
     loads: Vec<LoadCase>,
     propose: ProposeOptions,
     settings: Settings,
@@ -279,7 +284,7 @@ impl Plan {
     ) -> Search<'a> {
         Search {
             assessor,
-            keep: self.request.kept(),
+            keep: self.keep(),
             race: self.request.scoring.polish == Polish::Top,
             ids: self.request.selection.ids.as_deref(),
             flips: self.propose.flips,
@@ -415,12 +420,37 @@ impl Plan {
     /// Ids of the grips to show, best first.
     fn shown(&self, grips: &[RankedGrip], size: f64) -> Vec<u64> {
         let selection = &self.request.selection;
-        if selection.diverse {
-            let chosen = rank::choose_diverse(grips, selection.top, size);
-            chosen.into_iter().map(|ranked| ranked.grip.id).collect()
+        let chosen = if selection.diverse {
+            rank::choose_diverse(grips, selection.top, size)
         } else {
-            grips.iter().take(selection.top).map(|ranked| ranked.grip.id).collect()
+            let first = self.first_of_turns(grips);
+            let first = grips.iter().zip(first).filter_map(|(grip, first)| first.then_some(grip));
+            first.take(selection.top).collect()
+        };
+        chosen.into_iter().map(|ranked| ranked.grip.id).collect()
+    }
+
+    /// Which of the grips no turn of the part maps to a better one; all where every turn is shown.
+    fn first_of_turns(&self, grips: &[RankedGrip]) -> Vec<bool> {
+        match self.symmetry.filter(|_| !self.request.selection.every_turn) {
+            None => vec![true; grips.len()],
+            Some(symmetry) => {
+                let firsts = rank::first_turns(grips, symmetry, self.gripper.is_symmetric());
+                grips.iter().zip(firsts).map(|(grip, first)| grip.grip.id == first).collect()
+            }
         }
+    }
+
+    /// How many of the best grips are kept: of a round part as many more as there are turns, where
+    /// one is shown for them.
+    fn keep(&self) -> usize {
+        let kept = self.request.kept();
+        let selection = &self.request.selection;
+        if self.symmetry.is_none() || selection.every_turn || selection.keep.is_some() {
+            return kept;
+        }
+        let turns = std::f64::consts::TAU / self.propose.angle_step;
+        kept.max((selection.top as f64 * turns).ceil() as usize).min(kept.max(MOST_TURNED))
     }
 
     /// The grips for the list: all, or as many that differ as the request wants to keep.
@@ -441,7 +471,9 @@ impl Plan {
             pads: self.settings.pads,
             keep_flips: self.propose.flips,
             merge_duplicates: self.request.selection.merge_symmetric,
-            top: Some(self.request.kept()),
+            symmetry: self.symmetry,
+            jaws_alike: self.gripper.is_symmetric(),
+            top: Some(self.keep()),
             ..rank::Options::default()
         }
     }
@@ -490,7 +522,7 @@ impl Plan {
             pad_friction: self.settings.pads.value,
             safety: self.settings.pads.safety,
             seeds: self.seeds.len(),
-            keep: self.request.kept(),
+            keep: self.keep(),
         };
         let mut provenance = Provenance::new(self.asked(), resolved);
         provenance.command.clone_from(&self.command);
@@ -515,6 +547,7 @@ impl Plan {
             bbox_min,
             bbox_max,
             mass: self.mass,
+            symmetry: self.symmetry,
         }
     }
 }

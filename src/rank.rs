@@ -2,16 +2,19 @@
 //! differ.
 
 mod filter;
+mod turns;
 
 use std::collections::BTreeMap;
 
 use glam::DVec3;
 
 use crate::model::{Patch, Status};
+use crate::part::Symmetry;
 use crate::request::Scoring;
-use crate::results::{PadFriction, RankedGrip};
+use crate::results::{GripSet, PadFriction, RankedGrip};
 
 pub use filter::Filter;
+use turns::Turns;
 
 /// Scores that differ by less than this share count as equal, and other things decide (see [`rank`]):
 /// final answers agree to this across backends and refiners, and the order shall not depend on which
@@ -61,9 +64,13 @@ pub struct Options {
     /// Keeps grips that are another one with the jaws exchanged (`flip_of`).
     pub keep_flips: bool,
     /// Keeps one of the grips that score the same with the same geometry in the grip frame, as
-    /// those that a symmetry of the part maps to each other do; [`RankedGrip::merged`] names the
-    /// others.
+    /// those that a symmetry of the part maps to each other do, and of those that a turn of a round
+    /// part maps to each other, whatever they score; [`RankedGrip::merged`] names the others.
     pub merge_duplicates: bool,
+    /// Of the part, for this.
+    pub symmetry: Option<Symmetry>,
+    /// Whether both jaws are alike, for this.
+    pub jaws_alike: bool,
     /// Keeps this many.
     pub top: Option<usize>,
     /// With `top`: keeps grips that differ in place, approach and face pair rather than the first
@@ -76,6 +83,8 @@ setters!(Options {
     with_pads: pads: PadFriction,
     with_keep_flips: keep_flips: bool,
     with_merge_duplicates: merge_duplicates: bool,
+    with_symmetry: symmetry: Option<Symmetry>,
+    with_jaws_alike: jaws_alike: bool,
     with_top: top: Option<usize>,
     with_diverse: diverse: bool,
 });
@@ -134,7 +143,7 @@ pub fn rank(
     order(&mut kept, centre_of_mass);
     if options.merge_duplicates {
         let before = kept.len();
-        kept = merge(kept, centre_of_mass);
+        kept = merge(kept, centre_of_mass, options);
         if kept.len() < before {
             ranking.rejections.insert("duplicate".into(), (before - kept.len()) as u64);
         }
@@ -292,12 +301,26 @@ impl Families {
 }
 
 /// Keeps the first of each set of equal grips, from grips in order; each one kept names the others.
-fn merge(grips: Vec<(f64, RankedGrip)>, centre_of_mass: DVec3) -> Vec<(f64, RankedGrip)> {
+fn merge(
+    grips: Vec<(f64, RankedGrip)>,
+    centre_of_mass: DVec3,
+    options: &Options,
+) -> Vec<(f64, RankedGrip)> {
     let mut kept: Vec<(f64, RankedGrip)> = Vec::with_capacity(grips.len());
     let mut families = Families::default();
+    let mut turns = options.symmetry.map(|symmetry| Turns::new(symmetry, options.jaws_alike));
+    // The place in `kept` of each family of turns.
+    let mut places: Vec<usize> = Vec::new();
     for (score, mut grip) in grips {
-        let family = families.take(score, &grip, centre_of_mass);
-        if let Some((_, first)) = kept.get_mut(family) {
+        let turned = turns.as_mut().map(|turns| turns.take(&grip));
+        let place = match turned.and_then(|turned| places.get(turned)) {
+            Some(&place) => place,
+            None => families.take(score, &grip, centre_of_mass),
+        };
+        if turned == Some(places.len()) {
+            places.push(place);
+        }
+        if let Some((_, first)) = kept.get_mut(place) {
             first.merged.push(grip.grip.id);
         } else {
             grip.merged.clear();
@@ -307,20 +330,53 @@ fn merge(grips: Vec<(f64, RankedGrip)>, centre_of_mass: DVec3) -> Vec<(f64, Rank
     kept
 }
 
-/// For each of the ranked `grips`, best first, the id of the first one that it equals: a symmetry of
-/// the part maps them to each other, or exchanging the jaws does. Its own id where it is the first.
-pub fn families(grips: &[RankedGrip], centre_of_mass: DVec3) -> Vec<u64> {
+/// For each of the ranked grips of a set, best first, the id of the first one that it equals: a
+/// symmetry of the part maps them to each other, or exchanging the jaws does. Its own id where it is
+/// the first. A turn about the axis of a round part leaves a grip in its family whatever it scores.
+pub fn families(set: &GripSet) -> Vec<u64> {
+    let centre_of_mass = set.part.mass.centre_of_mass;
+    let turned = turned(set);
     let mut families = Families::default();
     let mut firsts: Vec<u64> = Vec::new();
-    let family = |grip: &RankedGrip| {
-        let score = grip.score.unwrap_or(f64::INFINITY);
-        let family = families.take(score, grip, centre_of_mass);
+    let mut of_id: BTreeMap<u64, u64> = BTreeMap::new();
+    let mut family = |grip: &RankedGrip, turned: u64| {
+        let id = grip.grip.id;
+        let first = of_id.get(&turned).copied().unwrap_or_else(|| {
+            let score = grip.score.unwrap_or(f64::INFINITY);
+            let family = families.take(score, grip, centre_of_mass);
+            if family == firsts.len() {
+                firsts.push(id);
+            }
+            firsts[family]
+        });
+        of_id.insert(id, first);
+        first
+    };
+    set.grips.iter().zip(turned).map(|(grip, turned)| family(grip, turned)).collect()
+}
+
+/// For each of the ranked grips of a set, best first, the id of the first one that a turn about the
+/// axis of the part maps it to; its own where it is the first, or the part is not round.
+pub fn turned(set: &GripSet) -> Vec<u64> {
+    let own = || set.grips.iter().map(|grip| grip.grip.id).collect();
+    let Some(symmetry) = set.part.symmetry else { return own() };
+    // Without a gripper to read nothing is said of exchanging its jaws.
+    let alike = set.read_gripper().is_ok_and(|gripper| gripper.is_symmetric());
+    first_turns(&set.grips, symmetry, alike)
+}
+
+/// As [`turned`], of grips that are not in a set yet.
+pub(crate) fn first_turns(grips: &[RankedGrip], symmetry: Symmetry, alike: bool) -> Vec<u64> {
+    let mut turns = Turns::new(symmetry, alike);
+    let mut firsts: Vec<u64> = Vec::new();
+    let first = |grip: &RankedGrip| {
+        let family = turns.take(grip);
         if family == firsts.len() {
             firsts.push(grip.grip.id);
         }
         firsts[family]
     };
-    grips.iter().map(family).collect()
+    grips.iter().map(first).collect()
 }
 
 /// At most `top` of the ranked `grips` that differ in place, approach and face pair, best first.

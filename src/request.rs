@@ -97,8 +97,9 @@ pub struct Candidates {
     pub angle_step: Angle,
     /// Approach along and across the edges of the gripped faces as well.
     pub edge_angles: bool,
-    /// Close on curved faces, and on opposite planes that are not parallel; absent: where no two
-    /// plane faces lie within the stroke, or where that makes no more than 20,000 candidates.
+    /// Close on curved faces, and on opposite planes that are not parallel; absent: where no
+    /// candidate between parallel plane faces is free of interference, or where that makes no more
+    /// than 20,000 candidates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub curved: Option<bool>,
     /// Smallest contact area on either face, as a share of the most that a pad can touch there: the
@@ -197,6 +198,8 @@ pub struct Selection {
     pub diverse: bool,
     /// List one of the grips that a symmetry of the part maps to each other, for all of them.
     pub merge_symmetric: bool,
+    /// Show also grips that a turn about the axis of a round part maps to one shown.
+    pub every_turn: bool,
     /// Only the candidates with these numbers are scored; absent: all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ids: Option<Vec<u64>>,
@@ -318,6 +321,7 @@ impl Default for Selection {
             top: 10,
             diverse: false,
             merge_symmetric: false,
+            every_turn: false,
             ids: None,
             keep: None,
             pose_noise: None,

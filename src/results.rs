@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::mechanics::curved::{FaceAnswer, Note};
 use crate::model::{Bounds, Grip, Negative, Pressure, Slip, Status, Wrench};
-use crate::part::MassProperties;
+use crate::part::{MassProperties, Symmetry};
 use crate::request::Request;
 use crate::units::{Force, Length};
 
@@ -136,6 +136,9 @@ pub struct PartSummary {
     pub bbox_max: DVec3,
     /// Mass, centre of mass, inertia.
     pub mass: MassProperties,
+    /// The turns that map the part to itself, where there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub symmetry: Option<Symmetry>,
 }
 
 /// Counts of a run.

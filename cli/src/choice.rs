@@ -23,6 +23,9 @@ pub(crate) struct ChoiceArgs {
     /// Only grips that hold with the pads' friction and the safety asked for.
     #[arg(long)]
     holding: bool,
+    /// Only the best of the grips that a turn about the axis of a round part maps to each other.
+    #[arg(long)]
+    one_turn: bool,
     /// Grips that differ in place, face pair and approach, instead of the first ones; needs --top.
     #[arg(long, requires = "top")]
     diverse: bool,
@@ -39,7 +42,8 @@ impl ChoiceArgs {
         filter.faces.clone_from(&self.faces);
         filter.approach = self.approach;
         filter.min_pad_share = self.min_pad_share;
-        (filter.holding, filter.diverse, filter.top) = (self.holding, self.diverse, self.top);
+        (filter.holding, filter.one_turn) = (self.holding, self.one_turn);
+        (filter.diverse, filter.top) = (self.diverse, self.top);
         filter
     }
 }

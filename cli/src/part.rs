@@ -8,7 +8,9 @@ use anyhow::Context;
 use clap::Args as ClapArgs;
 use comfy_table::{CellAlignment, Table, presets};
 use glam::DVec3;
-use gripfast::part::{CurvedFace, FacePair, Part, PlanarFace, ReadOptions, Shape, Unit, drawing};
+use gripfast::part::{
+    CurvedFace, FacePair, Part, PlanarFace, ReadOptions, Shape, Symmetry, Unit, drawing,
+};
 use gripfast::units::Quantity;
 use serde_json::json;
 
@@ -149,6 +151,22 @@ fn to_text(part: &Part, pairs: &[FacePair], density: Option<f64>, rows: usize) -
     if !part.curved.is_empty() {
         text += &format!("\n{} curved faces\n", part.curved.len());
         text += &curved_table(&part.curved, rows);
+    }
+    match part.symmetry() {
+        Some(Symmetry::Axis { axis }) => {
+            text += &format!(
+                "\nround about the axis {} through {} mm: a turn about it maps grips to grips\n",
+                triple(axis.direction, 4),
+                triple(axis.origin * 1e3, 2)
+            );
+        }
+        Some(Symmetry::Point { centre }) => {
+            text += &format!(
+                "\nround about {} mm: every turn about it maps grips to grips\n",
+                triple(centre * 1e3, 2)
+            );
+        }
+        _ => {}
     }
     text += &format!("\n{} antiparallel pairs\n", pairs.len());
     text += &pair_table(pairs, rows);
@@ -317,6 +335,6 @@ fn to_json(part: &Part, pairs: &[FacePair], density: Option<f64>) -> serde_json:
     json!({
         "file": part.file, "name": part.name, "unit_m": part.unit_m, "triangles": part.mesh.triangles.len(), "vertices": part.mesh.vertices.len(),
         "bbox_min": low, "bbox_max": high, "health": part.health, "volume": mass.volume, "centre_of_mass": mass.centre_of_mass,
-        "density": density, "mass": density.map(|_| mass.mass), "inertia": density.map(|_| mass.inertia), "faces": faces, "curved": curved, "pairs": pairs,
+        "density": density, "mass": density.map(|_| mass.mass), "inertia": density.map(|_| mass.inertia), "faces": faces, "curved": curved, "symmetry": part.symmetry(), "pairs": pairs,
     })
 }

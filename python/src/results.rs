@@ -175,7 +175,7 @@ impl Result {
             "face_i" => grips.iter().map(|ranked| u64::from(ranked.grip.face_i)).collect(),
             "face_ii" => grips.iter().map(|ranked| u64::from(ranked.grip.face_ii)).collect(),
             "load" => grips.iter().map(|ranked| u64::from(ranked.worst.load)).collect(),
-            "family" => rank::families(grips, self.set.part.mass.centre_of_mass),
+            "family" => rank::families(&self.set),
             _ => return Err(PyKeyError::new_err(name.to_owned())),
         };
         Ok(PyArray1::from_vec(py, values))

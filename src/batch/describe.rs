@@ -207,6 +207,8 @@ impl Batch {
         let shown = base.selection.top;
         let few = shown == Request::default().selection.top;
         base.selection.top = self.top.unwrap_or(if few { TOP } else { shown });
+        // Rows name their family instead.
+        base.selection.every_turn = true;
         // Those beyond need no more work than it takes to see that.
         if !base.selection.diverse && !base.selection.merge_symmetric {
             base.selection.keep.get_or_insert(base.selection.top);

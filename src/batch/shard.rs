@@ -80,7 +80,7 @@ impl Rows {
         let set = GripSet::parse(place, content)?;
         let [part, gripper, loads] = names;
         let names = Names { part, gripper, loads };
-        let families = rank::families(&set.grips, set.part.mass.centre_of_mass);
+        let families = rank::families(&set);
         let failed = |error: serde_json::Error| {
             Error::io(Path::new(place), "write the rows of", std::io::Error::other(error))
         };

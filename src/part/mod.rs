@@ -29,6 +29,7 @@ mod pairs;
 mod read;
 mod regions;
 mod repair;
+mod symmetry;
 mod topology;
 mod unit;
 mod weld;
@@ -40,6 +41,7 @@ pub(crate) use pairs::ANTIPARALLEL;
 pub(crate) use read::{KNOWN as KNOWN_SUFFIXES, is_part};
 #[cfg(feature = "step")]
 pub use read::{StepProcess, serve_step};
+pub use symmetry::Symmetry;
 
 /// A triangle mesh \[m\], welded, outward-oriented.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -47,7 +47,7 @@ impl Plan {
         let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get() as u64);
         let work = candidates as f64 * (CANDIDATE + GRIPS * LOAD * loads as f64)
             + curved as f64 * GRIPS * (CURVED + CURVED_LOAD * loads as f64);
-        let kept = (self.request.kept() as f64).min(candidates as f64);
+        let kept = (self.keep() as f64).min(candidates as f64);
         let listed = match self.request.scoring.polish {
             crate::request::Polish::All => loads as f64,
             _ => 0.0,

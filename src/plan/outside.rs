@@ -181,7 +181,7 @@ impl Plan {
             // Every grip counts for a rank.
             let search = Search {
                 assessor: &assessor,
-                keep: self.request.kept(),
+                keep: self.keep(),
                 race: false,
                 sample: 0,
                 partial: None,

@@ -146,12 +146,14 @@ impl PlanBuilder {
         let mut propose = ProposeOptions::read(&request.candidates)
             .map_err(|error| error.with_options(&["scene"]))?;
         propose.force = Some(settings.force);
+        let symmetry = part.symmetry();
         Ok(Plan {
             request,
             asked_polish,
             part,
             gripper,
             mass,
+            symmetry,
             loads,
             propose,
             settings,

@@ -107,7 +107,7 @@ impl Plan {
                 ("refiner", json!(scoring.refiner)),
                 ("polish", json!(scoring.polish)),
                 ("seeds", json!(self.seeds.len())),
-                ("keep", json!(self.request.kept())),
+                ("keep", json!(self.keep())),
                 ("ids", json!(self.request.selection.ids)),
                 ("negatives", json!(self.request.selection.negatives)),
             ]

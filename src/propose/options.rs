@@ -29,8 +29,8 @@ pub struct ProposeOptions {
     /// Approach along and across the edges of the gripped faces as well.
     pub edge_angles: bool,
     /// Propose grips on curved faces, and on opposite planes that are not parallel; `None`: where no
-    /// two parallel plane faces lie within the stroke, or where that makes no more than 20,000
-    /// candidates.
+    /// candidate between parallel plane faces is free of interference, or where that makes no more
+    /// than 20,000 candidates.
     pub curved: Option<bool>,
     /// Smallest contact area on either face, as a share of the most that a pad can touch there: the
     /// area in which the two faces overlap, or that of a pad over the middle of its bounds, at the

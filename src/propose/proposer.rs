@@ -62,7 +62,7 @@ pub struct Tally {
     #[serde(default)]
     pub nearest_approach: Option<f64>,
     /// Curved or drafted faces are left out, because they make very many candidates beside those
-    /// between planes, and were not asked for.
+    /// between planes, of which some are free of interference, and were not asked for.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub curved_left_out: bool,
 }
@@ -229,6 +229,30 @@ impl<'a> Proposer<'a> {
     /// When an option is out of its range or names a face that is not there, the grid is too fine,
     /// the gripper has no pad with area, or inside grips are asked of a gripper without outer pads.
     pub fn new(part: &'a Part, gripper: &'a Gripper, options: &ProposeOptions) -> Result<Self> {
+        let mut proposer = Self::within_budget(part, gripper, options)?;
+        if !proposer.tally.curved_left_out || proposer.is_any_free() {
+            return Ok(proposer);
+        }
+        // Beside planes that give nothing there is nothing to be slow for.
+        let every = ProposeOptions { curved: Some(true), ..options.clone() };
+        let proposer = Self::within_budget(part, gripper, &every)?;
+        Ok(Self { options: options.clone(), ..proposer })
+    }
+
+    /// Whether any candidate is free of interference; looks at them until one is.
+    fn is_any_free(&mut self) -> bool {
+        let (next, tally) = (self.next, self.tally.clone());
+        let found = self.any(|chunk| !chunk.grips.is_empty());
+        (self.next, self.tally) = (next, tally);
+        found
+    }
+
+    /// With the sites on curved faces only where these are few, unless the options ask for them.
+    fn within_budget(
+        part: &'a Part,
+        gripper: &'a Gripper,
+        options: &ProposeOptions,
+    ) -> Result<Self> {
         options.validate()?;
         if !gripper.pads(gripper.stroke[0]).iter().all(|pad| crate::geometry::is_convex(pad)) {
             return Err(Error::input(

@@ -23,6 +23,8 @@ pub struct Filter {
     pub holding: bool,
     /// By these they are judged; those of the set when absent.
     pub pads: Option<PadFriction>,
+    /// Only the best of the grips that a turn about the axis of a round part maps to each other.
+    pub one_turn: bool,
     /// Grips that differ in place, face pair and approach rather than the first ones.
     pub diverse: bool,
     /// The first of those that are left, or as many that differ.
@@ -61,6 +63,10 @@ impl Filter {
             self.passes(ranked, gripper.as_ref())
                 && (!self.holding || pads.verdict(ranked.friction_needed()).holds() == Some(true))
         });
+        if self.one_turn {
+            let mut firsts = super::turned(set).into_iter();
+            set.grips.retain(|ranked| firsts.next() == Some(ranked.grip.id));
+        }
         let top = self.top.unwrap_or(usize::MAX).min(set.grips.len());
         if self.diverse {
             let size = (set.part.bbox_max - set.part.bbox_min).length();

@@ -57,6 +57,7 @@ threads = 2
 top = 3
 diverse = true
 merge_symmetric = true
+every_turn = true
 ids = [3, 17]
 keep = 77
 pose_noise = "1mm,2deg"

@@ -20,7 +20,12 @@ const RADIUS: f64 = 0.010;
 const LENGTH: f64 = 0.060;
 
 /// A closed cylinder about `z` turned by `turn` about it, its facets chords.
-fn cylinder(radius: f64, length: f64, facets: u32, turn: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+pub(crate) fn cylinder(
+    radius: f64,
+    length: f64,
+    facets: u32,
+    turn: f64,
+) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let step = std::f64::consts::TAU / f64::from(facets);
     let mut vertices = Vec::new();
     for k in 0..facets {

@@ -11,6 +11,7 @@ mod negatives;
 mod options;
 mod parts;
 mod places;
+mod round;
 #[path = "../support/mod.rs"]
 mod support;
 mod unequal;

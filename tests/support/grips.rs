@@ -132,6 +132,7 @@ pub(crate) fn grip_set(count: u64) -> GripSet {
                 centre_of_mass: DVec3::new(0.001, 0.002, 0.003),
                 inertia,
             },
+            symmetry: None,
         },
         serde_json::to_value(gripper()).unwrap(),
         vec![

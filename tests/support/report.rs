@@ -88,6 +88,7 @@ pub(crate) fn plan(
             bbox_min,
             bbox_max,
             mass,
+            symmetry: part.symmetry(),
         },
         serde_json::to_value(&gripper).unwrap(),
         cases,

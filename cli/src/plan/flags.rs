@@ -114,8 +114,8 @@ struct CandidateArgs {
     #[arg(long, value_name = "true|false", hide_possible_values = true)]
     edge_angles: Option<bool>,
     /// Closes on curved faces, and on opposite planes that are not parallel, as well. Such a grip
-    /// takes longer than one between parallel planes [default: where no two planes lie within the
-    /// stroke, or where that makes no more than 20000 candidates].
+    /// takes longer than one between parallel planes [default: where no candidate between such
+    /// planes is free of interference, or where that makes no more than 20000 candidates].
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
     curved: Option<bool>,
     /// Smallest contact area on either face, as a share of the most that the face pair allows (pad
@@ -235,6 +235,9 @@ struct ChoiceArgs {
     /// Lists one of the grips that a symmetry of the part maps to each other, for all of them.
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
     merge_symmetric: Option<bool>,
+    /// Prints also grips that a turn about the axis of a round part maps to one printed.
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
+    every_turn: Option<bool>,
     /// Only the candidates with these ids, e.g. 3,17 from an earlier table of the same search.
     #[arg(long, value_delimiter = ',', value_name = "IDS", value_parser = id)]
     ids: Option<Vec<u64>>,
@@ -425,7 +428,7 @@ impl JobArgs {
             group.pad_friction = Some(friction);
         }
         let (choice, more, group) = (self.choice, self.more, &mut request.selection);
-        give!(choice => group; diverse, merge_symmetric, ids);
+        give!(choice => group; diverse, merge_symmetric, every_turn, ids);
         give!(more => group; pose_noise, noise_samples, compare, negatives);
         if more.noise_samples.is_some() && group.pose_noise.is_none() {
             return Err(Error::input("--noise-samples", "needs --pose-noise", "add that flag"));
@@ -489,7 +492,7 @@ mod tests {
         --approach-distance 80mm --backend cpu --adapter 0 --seeds 200 --k1 2 --k2 3 \
         --pad-friction 0.7 --safety 2 --max-pressure 2MPa --com 1mm,2mm,3mm \
         --inertia 3gmm2,3gmm2,3gmm2,0gmm2,0gmm2,0gmm2 --ids 3,17 --position-error 1mm --closing-friction 0.1 --separation discard \
-        --polish all --refiner shanno --threads 2 --top 3 --diverse --merge-symmetric --keep 77 \
+        --polish all --refiner shanno --threads 2 --top 3 --diverse --merge-symmetric --every-turn --keep 77 \
         -o out.json --report out.html --json -q --yes --resume --checkpoint 9s --pose-noise 1mm,2deg \
         --noise-samples 9 --compare=1,2,3,4mm --negatives 20";
 

@@ -1,5 +1,6 @@
 //! What a user of `plan` reads: a summary, the grips, and what was asked for besides.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 
 use comfy_table::Table;
@@ -96,6 +97,13 @@ fn legend(
         texts.push(
             "Rank (+n): stands for n more grips that a symmetry of the part maps to it (`merged` in \
              the result file)."
+                .to_owned(),
+        );
+    }
+    if has("turns") && turns(set).is_some() {
+        texts.push(
+            "turns: the part is round; this many of the grips kept are this one turned about its \
+             axis, and the others need as much friction or more (--every-turn lists them all)."
                 .to_owned(),
         );
     }
@@ -220,6 +228,10 @@ fn significant(value: f64) -> String {
 fn columns<'a>(set: &'a GripSet, shown: &[&RankedGrip], gripper: &'a Gripper) -> Vec<Column<'a>> {
     let mut columns =
         vec![number("rank", 0, rank), number("id", 0, |grip| grip.grip.id.to_string())];
+    if let Some(turns) = turns(set) {
+        let count = move |grip: &RankedGrip| turns.get(&grip.grip.id).map_or(1, |count| *count);
+        columns.push(number("turns", 3, move |grip| count(grip).to_string()));
+    }
     if shown.iter().any(|grip| set.verdict(grip).holds() == Some(false)) {
         columns.push(words("verdict", 0, |grip| set.verdict(grip).name().to_owned()));
     }
@@ -397,6 +409,17 @@ fn moved(grip: &RankedGrip) -> Option<f64> {
         Slip::Translation { .. } => Some(f64::INFINITY),
         Slip::Spin { .. } | Slip::None => None,
     }
+}
+
+/// How many grips of the set are one turned about the axis of a round part, by the id of the best
+/// of them; where one is shown for all.
+fn turns(set: &GripSet) -> Option<BTreeMap<u64, usize>> {
+    if set.part.symmetry.is_none() || set.provenance.request.selection.every_turn {
+        return None;
+    }
+    let mut turns = BTreeMap::new();
+    gripfast::rank::turned(set).into_iter().for_each(|id| *turns.entry(id).or_default() += 1);
+    turns.values().any(|count| *count > 1).then_some(turns)
 }
 
 fn rank(grip: &RankedGrip) -> String {
