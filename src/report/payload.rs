@@ -24,6 +24,7 @@ use crate::gripper::catalogue::{self, CATALOGUE};
 use crate::gripper::{Body, Gripper, Shape};
 use crate::model::{Frame, Miss};
 use crate::part::Mesh;
+use crate::rank;
 use crate::request::Side;
 use crate::results::{GripSet, Provenance, RankedGrip, Verdict};
 
@@ -107,7 +108,7 @@ impl Payload {
             ));
         }
         let pressed = states::worst(set, grips);
-        let statuses = poses_and_scores(&mut columns, grips, &pressed);
+        let statuses = poses_and_scores(&mut columns, set, grips, &pressed);
         let verdict = |grip| match set.verdict(grip) {
             Verdict::Unknown => 0,
             Verdict::Holds { .. } => 1,
@@ -188,12 +189,16 @@ fn packed(bytes: &[u8]) -> Result<String> {
 /// `pressed`: the state of the pads under the worst load of each grip.
 fn poses_and_scores(
     columns: &mut Columns,
+    set: &GripSet,
     grips: &[RankedGrip],
     pressed: &[Pressed],
 ) -> Vec<Value> {
     let nan = f64::NAN;
     columns.f64("id", grips.iter().map(|g| g.grip.id as f64));
     columns.f64("flip_of", grips.iter().map(|g| g.grip.flip_of.map_or(nan, |id| id as f64)));
+    if set.part.symmetry.is_some() {
+        columns.f64("turn_of", rank::turned(set).into_iter().take(grips.len()).map(|id| id as f64));
+    }
     columns.u32("rank", grips.iter().map(|g| u32::try_from(g.rank).unwrap_or(u32::MAX)));
     columns.f32("origin", grips.iter().flat_map(|g| g.grip.part_from_grip.origin.to_array()));
     columns

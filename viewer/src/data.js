@@ -56,6 +56,9 @@ export class Report {
     column.surface_ring_kind.forEach((kind, ring) => (this.pieceOf[ring] = kind & 4 ? pieces++ : pieces - 1));
     this.misses = column.miss_id.length;
     this.rowOf = new Map(Array.from(column.by_load_grip, (grip, row) => [grip, row]));
+    /** How many of the grips are one turned about the axis of a round part, by the id of the best of them. */
+    this.turns = new Map();
+    column.turn_of?.forEach((id) => this.turns.set(id, (this.turns.get(id) ?? 0) + 1));
     this.indexOfId = new Map(Array.from(column.id, (id, i) => [id, i]));
   }
 

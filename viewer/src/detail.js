@@ -77,11 +77,18 @@ export class Detail {
     const pill = this.find('.pill');
     pill.className = `pill ${kind}`;
     pill.textContent = name;
-    this.find('.grip-sub').textContent = `${c.inside[i] ? 'From inside, faces' : 'Faces'} ${c.face_i[i]} and ${c.face_ii[i]}, id ${c.id[i]}${Number.isFinite(c.flip_of[i]) ? `, jaws exchanged of ${c.flip_of[i]}` : ''}`;
+    this.find('.grip-sub').textContent = `${c.inside[i] ? 'From inside, faces' : 'Faces'} ${c.face_i[i]} and ${c.face_ii[i]}, id ${c.id[i]}${Number.isFinite(c.flip_of[i]) ? `, jaws exchanged of ${c.flip_of[i]}` : ''}${this.turns(i)}`;
     this.find('.meaning').textContent = kind === 'good' ? '' : meaning;
     this.numbers(i);
     this.loads(i);
     this.full(i);
+  }
+
+  /** That grip `i` is one of several that a turn about the part's axis maps to each other. */
+  turns(i) {
+    const first = this.report.column.turn_of?.[i];
+    const turns = this.report.turns.get(first) ?? 1;
+    return turns < 2 ? '' : `, one of ${count(turns)} turns about the axis${first === this.report.column.id[i] ? '' : ` of id ${first}`}`;
   }
 
   numbers(i) {

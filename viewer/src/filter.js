@@ -25,7 +25,7 @@ export function sortKeys(report) {
 
 export const pairName = (report, i) => `${report.column.face_i[i]}\u2009/\u2009${report.column.face_ii[i]}`;
 
-export const EMPTY = { low: -Infinity, high: Infinity, pair: '', status: '', text: '', approach: '', cover: '', pressure: '', narrow: '', wide: '', safety: '' };
+export const EMPTY = { low: -Infinity, high: Infinity, pair: '', status: '', text: '', approach: '', cover: '', pressure: '', narrow: '', wide: '', safety: '', turns: '' };
 
 /** Directions within this angle of an axis count as along it. */
 const ALONG = Math.cos(Math.PI / 4);
@@ -72,6 +72,7 @@ export function select(report, filter, key, direction) {
     if (filter.pair && !(report.column.face_i[i] === faceI && report.column.face_ii[i] === faceII)) continue;
     if (wanted >= 0 && status[i] !== wanted) continue;
     if (kind && (verdict(report, i)[1] === 'bad') !== (kind === 'bad')) continue;
+    if (filter.turns && report.column.turn_of[i] !== report.column.id[i]) continue;
     if (axis >= 0 && sign * report.column.rotation[9 * i + axis] < ALONG - 1e-6) continue;
     if (report.column.width[i] < narrow || report.column.width[i] > wide) continue;
     if (safety !== null && !(report.column.mu[i] === 0 || report.safety(i) >= safety)) continue;

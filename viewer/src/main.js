@@ -191,6 +191,7 @@ async function start() {
     sortBy(event.target.value);
   });
   $('#direction').addEventListener('click', () => sortBy(state.key));
+  $('#turns').hidden = !report.column.turn_of;
   const fields = Object.keys(EMPTY).filter((name) => name !== 'low' && name !== 'high');
   for (const id of fields) {
     $(`#${id}`).addEventListener('input', (event) => {

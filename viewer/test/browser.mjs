@@ -811,6 +811,28 @@ async function rejected() {
   await page.close();
 }
 
+/** Grips that a turn about the axis of a round part maps to each other. */
+async function turns(page) {
+  const families = await page.evaluate(() => {
+    const { report, state } = window.gripfast;
+    // What no turn about z changes: how far off the axis the grip is, how high, and how steep its approach and closing are.
+    const seen = (i) => {
+      const { origin, x1, x3 } = report.pose(i);
+      return [Math.hypot(origin[0], origin[1]), origin[2], x1[2], Math.abs(x3[2])].map((v) => Math.round(v * 2e3)).join();
+    };
+    const first = (i) => report.indexOfId.get(report.column.turn_of[i]);
+    return { alike: state.order.every((i) => seen(i) === seen(first(i))), best: new Set(report.column.turn_of).size, all: state.order.length };
+  });
+  check('turns about the axis look alike from the axis', families.alike && families.best < families.all, JSON.stringify(families));
+  check('and are told of the grip', /one of \d+ turns about the axis/.test(await page.innerText('.grip-sub')), await page.innerText('.grip-sub'));
+  await page.evaluate(() => (document.querySelector('#more-filters').open = true));
+  await page.selectOption('#turns', 'best');
+  const left = await page.evaluate(() => window.gripfast.state.order.map((i) => [window.gripfast.report.column.id[i], window.gripfast.report.column.turn_of[i]]));
+  check('the best of each are listed', left.length === families.best && left.every(([id, best]) => id === best), `${left.length} of ${families.best}`);
+  await page.click('#clear');
+  await page.evaluate(() => (document.querySelector('#more-filters').open = false));
+}
+
 /** Faces that are not plane: pressure on the unrolled face and in the view, the spin in words. */
 async function barrel() {
   const page = await open(curved);
@@ -832,6 +854,7 @@ async function barrel() {
     const mesh = view.jaws.contacts.map((group) => group.children[0]?.geometry.attributes.position.count ?? 0);
     return { carried, expected: [report.planned.force + along / 2, report.planned.force - along / 2], mesh, pieces: pad.pieces?.length, grip, largest: pad.largest(0), detail: detail.grip };
   });
+  await turns(page);
   const areas = await page.evaluate(() => {
     const { report, state } = window.gripfast;
     const pad = report.state(state.chosen);
