@@ -4,7 +4,8 @@ the same, and does the memory stay where it is while the parts become more?
 
     target/pytest/bin/python benches/batches/run.py --program target/debug/gripfast [--parts DIR] [--count 100]
 
-The parts are meshes of DIR and plates, blocks and angles that are made here, ``count`` in all. Each way
+The parts are meshes of DIR and plates, blocks and angles that are made here, ``count`` in all; what is
+left out is named. Each way
 writes a folder; all files but the ledgers, which hold times, must be the same bytes, split into shares
 or not. The largest memory of the program is measured over a quarter, a half and all of the parts.
 """
@@ -62,13 +63,26 @@ def write_stl(path, faces):
             file.write(struct.pack("<12fH", 0, 0, 0, *(value for point in face for value in point), 0))
 
 
-def gather(folder, source, count):
+def of_use(binary, path):
+    """Whether a mesh counts. Those in another unit than millimetres do not: a part of a twentieth of a
+    millimetre between pads of centimetres takes minutes, and nobody asks for it."""
+    if path.stat().st_size >= MOST_BYTES:
+        print(f"left out: {path.name}: larger than {MOST_BYTES} bytes")
+        return False
+    told = subprocess.run([binary, "part", str(path)], capture_output=True, text=True, check=False)
+    implausible = [line.strip() for line in told.stdout.splitlines() if "implausible size" in line]
+    if implausible:
+        print(f"left out: {path.name}: {implausible[0].partition(';')[0]}")
+    return not implausible
+
+
+def gather(folder, source, count, binary):
     """``count`` parts in a folder."""
     paths = []
     if source:
         meshes = sorted(Path(source).rglob("*"))
         paths = [p for p in meshes if p.suffix.lower() in (".stl", ".obj", ".ply", ".off", ".3mf")]
-        paths = [p for p in paths if p.stat().st_size < MOST_BYTES][: count * 3 // 4]
+        paths = [p for p in paths if of_use(binary, p)][: count * 3 // 4]
     for place, path in enumerate(paths):
         os.symlink(path.resolve(), folder / f"{place:03}_{path.name}")
     for number in range(count - len(paths)):
@@ -99,12 +113,16 @@ def program(binary, parts, folder, *more):
 
 
 def outcomes(folder):
-    counts = {}
+    """How many jobs ended how, and the seconds of all jobs and of the slowest parts."""
+    counts, seconds = {}, {}
     with open(Path(folder) / "manifest.jsonl", encoding="utf-8") as lines:
         for line in lines:
-            outcome = json.loads(line)["outcome"]
-            counts[outcome] = counts.get(outcome, 0) + 1
-    return counts
+            job = json.loads(line)
+            counts[job["outcome"]] = counts.get(job["outcome"], 0) + 1
+            seconds[job["part"]] = seconds.get(job["part"], 0) + job["seconds"]
+    slowest = sorted(seconds, key=seconds.get, reverse=True)[:3]
+    slow = ", ".join(f"{part} {seconds[part]:.1f}" for part in slowest)
+    return f"{counts}, {sum(seconds.values()):.0f} job seconds (most: {slow})"
 
 
 def main():
@@ -116,7 +134,7 @@ def main():
     arguments = parser.parse_args()
     work = Path(tempfile.mkdtemp(prefix="gripfast-batches-"))
     (work / "parts").mkdir()
-    parts = gather(work / "parts", arguments.parts, arguments.count)
+    parts = gather(work / "parts", arguments.parts, arguments.count, arguments.program)
     print(f"{len(parts)} parts x {len(GRIPPERS)} grippers in {work}", flush=True)
     for count in (len(parts) // 4, len(parts) // 2, len(parts)):
         # Evenly over the list: large and small ones in the same shares.

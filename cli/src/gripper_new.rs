@@ -67,26 +67,30 @@ const FINGER: Question = (
 const THROAT: Question = ("--throat", "free length from the pads' rear edge to the palm", "37mm");
 const PALM: Question =
     ("--palm", "size of the palm: backwards, across, along the closing axis", "70mm,90mm,90mm");
+const FRICTION: Question =
+    ("--friction", "friction of the pads on the part (nothing: not known)", "0.5");
 
 /// Asks on a terminal.
 struct Asker {
-    input: Option<std::io::StdinLock<'static>>,
+    input: Option<Box<dyn BufRead>>,
 }
 
 impl Asker {
     fn new() -> Self {
         let input = std::io::stdin();
-        Self { input: input.is_terminal().then(|| input.lock()) }
+        Self { input: input.is_terminal().then(|| Box::new(input.lock()) as Box<dyn BufRead>) }
     }
 
-    /// The answer to a question, where the flag does not give it.
-    fn text(
+    /// What `read` makes of the flag's value or, where there is none, of an answer: one that is wrong
+    /// is told and asked for again.
+    fn ask<T>(
         &mut self,
         given: Option<String>,
         (flag, question, example): Question,
-    ) -> anyhow::Result<String> {
+        read: impl Fn(&str) -> gripfast::error::Result<T>,
+    ) -> anyhow::Result<T> {
         if let Some(text) = given {
-            return Ok(text);
+            return Ok(read(&text)?);
         }
         let Some(input) = &mut self.input else {
             anyhow::bail!(Error::input(
@@ -95,25 +99,42 @@ impl Asker {
                 format!("give it, e.g. {flag} {}", quoted(example))
             ));
         };
-        terminal::say(&format!("{question}, e.g. {example}:"));
-        let mut line = String::new();
-        input.read_line(&mut line).context("the answer")?;
-        Ok(line.trim().to_owned())
+        loop {
+            terminal::say(&format!("{question}, e.g. {example}:"));
+            let mut line = String::new();
+            if input.read_line(&mut line).context("the answer")? == 0 {
+                anyhow::bail!(Error::input(
+                    flag,
+                    format!("{question}: the input ended before an answer"),
+                    format!("answer, or give it, e.g. {flag} {}", quoted(example))
+                ));
+            }
+            match read(line.trim()) {
+                Ok(answer) => return Ok(answer),
+                Err(error) => terminal::say(&format!("{error:#}")),
+            }
+        }
+    }
+
+    fn name(&mut self, given: Option<String>) -> anyhow::Result<String> {
+        self.ask(given, NAME, |text| match text {
+            "" => Err(Error::input(NAME.0, "is empty", "give a name")),
+            text => Ok(text.to_owned()),
+        })
     }
 
     /// The friction of the pads, which may stay open.
-    fn friction(&mut self) -> anyhow::Result<Option<f64>> {
-        let Some(input) = &mut self.input else { return Ok(None) };
-        terminal::say("friction of the pads on the part, e.g. 0.5 (nothing: not known):");
-        let mut line = String::new();
-        input.read_line(&mut line).context("the answer")?;
-        match line.trim() {
+    fn friction(&mut self, given: Option<f64>) -> anyhow::Result<Option<f64>> {
+        if given.is_some() || self.input.is_none() {
+            return Ok(given);
+        }
+        self.ask(None, FRICTION, |text| match text {
             "" => Ok(None),
             text => text.parse().map(Some).map_err(|_| {
                 let remedy = "give a number without a unit, e.g. 0.5";
-                Error::input("--friction", format!("'{text}' is no number"), remedy).into()
+                Error::input(FRICTION.0, format!("'{text}' is no number"), remedy)
             }),
-        }
+        })
     }
 
     /// So many values of a quantity.
@@ -123,29 +144,45 @@ impl Asker {
         question: Question,
         quantity: Quantity,
     ) -> anyhow::Result<[f64; N]> {
-        let text = self.text(given, question)?;
-        let (flag, _, example) = question;
-        let pieces: Vec<&str> = text.split(',').map(str::trim).collect();
-        let values: Vec<f64> = pieces
-            .iter()
-            .map(|piece| quantity.parse(flag, piece))
-            .collect::<gripfast::error::Result<_>>()?;
-        let values: [f64; N] = values.try_into().map_err(|_| {
-            Error::input(
-                flag,
-                format!("'{text}' is not {N} values"),
-                format!("give e.g. {example}"),
-            )
-        })?;
-        if values.iter().any(|value| *value < 0.0) {
-            anyhow::bail!(Error::input(
-                flag,
-                format!("'{text}' is negative"),
-                format!("give e.g. {example}")
-            ));
-        }
-        Ok(values)
+        self.ask(given, question, |text| values(text, question, quantity))
     }
+
+    /// The ends of a range.
+    fn range(
+        &mut self,
+        given: Option<String>,
+        question: Question,
+        quantity: Quantity,
+    ) -> anyhow::Result<[f64; 2]> {
+        self.ask(given, question, |text| {
+            let [least, most] = values(text, question, quantity)?;
+            if least < most {
+                return Ok([least, most]);
+            }
+            Err(Error::input(
+                question.0,
+                format!("'{text}' does not rise"),
+                format!("give the smallest value first, e.g. {}", question.2),
+            ))
+        })
+    }
+}
+
+/// So many values of a quantity, none of them negative.
+fn values<const N: usize>(
+    text: &str,
+    (flag, _, example): Question,
+    quantity: Quantity,
+) -> gripfast::error::Result<[f64; N]> {
+    let wrong = |what: String| Error::input(flag, what, format!("give e.g. {example}"));
+    let pieces = text.split(',').map(|piece| quantity.parse(flag, piece.trim()));
+    let values: Vec<f64> = pieces.collect::<gripfast::error::Result<_>>()?;
+    let values: [f64; N] =
+        values.try_into().map_err(|_| wrong(format!("'{text}' is not {N} values")))?;
+    if values.iter().any(|value| *value < 0.0) {
+        return Err(wrong(format!("'{text}' is negative")));
+    }
+    Ok(values)
 }
 
 /// A value as a shell takes it for one word.
@@ -163,14 +200,14 @@ pub(crate) fn run(args: NewArgs) -> anyhow::Result<()> {
         ));
     }
     let mut asker = Asker::new();
-    let name = asker.text(args.name, NAME)?;
-    let stroke = asker.values::<2>(args.stroke, STROKE, Quantity::Length)?;
-    let force = asker.values::<2>(args.force, FORCE, Quantity::Force)?;
+    let name = asker.name(args.name)?;
+    let stroke = asker.range(args.stroke, STROKE, Quantity::Length)?;
+    let force = asker.range(args.force, FORCE, Quantity::Force)?;
     let pad = asker.values::<2>(args.pad, PAD, Quantity::Length)?;
     let finger = asker.values::<3>(args.finger, FINGER, Quantity::Length)?;
     let [throat] = asker.values::<1>(args.throat, THROAT, Quantity::Length)?;
     let palm = asker.values::<3>(args.palm, PALM, Quantity::Length)?;
-    let friction = args.friction.map_or_else(|| asker.friction(), |friction| Ok(Some(friction)))?;
+    let friction = asker.friction(args.friction)?;
     let mm = |value: f64| format!("{}mm", gripfast::units::decimal(value * 1e3, 4));
     // The finger's tip is flush with the pad's front edge.
     let finger_at = pad[0] / 2.0 - finger[0] / 2.0;
@@ -243,4 +280,24 @@ pub(crate) fn run(args: NewArgs) -> anyhow::Result<()> {
     writeln!(out, "wrote {}", args.file.display())?;
     writeln!(out, "drawing: {}", drawing.display())?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_answer_is_asked_for_again() {
+        let lines = "\nBench\n0,60\n60mm,2mm\n2mm\n-2mm,60mm\n2mm, 60mm\nhigh\n\n";
+        let mut asker = Asker { input: Some(Box::new(lines.as_bytes())) };
+        assert_eq!(asker.name(None).unwrap(), "Bench");
+        let stroke = asker.range(None, STROKE, Quantity::Length).unwrap();
+        assert!((stroke[0] - 0.002).abs() < 1e-12 && (stroke[1] - 0.06).abs() < 1e-12);
+        assert_eq!(asker.friction(None).unwrap(), None);
+        let ended = asker.values::<3>(None, PALM, Quantity::Length).unwrap_err().to_string();
+        assert!(ended.contains("ended before an answer"), "{ended}");
+        // What is given as a flag is refused at once.
+        let wrong = asker.range(Some("60mm,2mm".to_owned()), STROKE, Quantity::Length).unwrap_err();
+        assert!(wrong.to_string().contains("does not rise"), "{wrong}");
+    }
 }

@@ -224,6 +224,8 @@ impl Case<'_> {
         match ended {
             Ok(()) => work.worst(),
             Err(Ended::Outranked) => work.outranked(),
+            // Which load refuses it shall not hang on the order of the race.
+            Err(Ended::Refused) if beaten.is_some() => self.score(None),
             Err(Ended::Refused) => work.refused(),
         }
     }

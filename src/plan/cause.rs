@@ -97,8 +97,9 @@ pub(super) fn overpowered(
     force: f64,
     rejections: &BTreeMap<String, u64>,
 ) -> Option<String> {
-    let most = rejections.values().max()?;
-    let count = rejections.get(&rank::status_name(Status::NoNormalForce))?;
+    let lost = |status: Status| rejections.get(&rank::status_name(status));
+    let count = lost(Status::NoNormalForce)?;
+    let most = lost(Status::TwistedOut).max(Some(count))?;
     let size = |load: &&LoadCase| load.wrench.force.length();
     let worst = loads.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
     (count == most && size(&worst) > 2.0 * force).then(|| {
@@ -198,7 +199,11 @@ mod tests {
         };
         let loads = [load("small", 3.0), load("large", 1962.0)];
         let counts = |lost: u64| {
-            BTreeMap::from([("contact too small".into(), 10), ("no_normal_force".into(), lost)])
+            BTreeMap::from([
+                ("part interference:finger".into(), 9000),
+                ("twisted_out".into(), 10),
+                ("no_normal_force".into(), lost),
+            ])
         };
         assert_eq!(
             overpowered(&loads, 150.0, &counts(4000)).unwrap(),

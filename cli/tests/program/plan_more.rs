@@ -55,6 +55,30 @@ fn bracket(more: &[&str]) -> (GripSet, String) {
     (GripSet::read(&file).unwrap(), text(&output.stdout))
 }
 
+/// What refuses a grip hung on the order in which its loads were solved, which another depth of the
+/// search changes.
+#[test]
+fn a_grip_is_refused_for_the_same_reason_in_a_table_and_in_a_file() {
+    let rejected = |polish: &str| {
+        let heavy = ["--mass", "12kg", "--force", "80N", "--accel", "1g", "--spacing", "12mm"];
+        let line = ["plan", "data/parts/l_bracket.stl", "--gripper", "robotiq-2f85"];
+        let output = gripfast(
+            &[
+                &line[..],
+                &heavy,
+                &["--backend", "cpu", "--angle-step", "90deg", "--polish", polish],
+            ]
+            .concat(),
+        );
+        assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+        let out = text(&output.stdout);
+        out.lines().find(|line| line.starts_with("rejected")).unwrap().to_owned()
+    };
+    let table = rejected("top");
+    assert!(table.contains("no normal force"), "{table}");
+    assert_eq!(table, rejected("worst"));
+}
+
 #[test]
 fn the_load_multiple_is_where_the_pads_friction_or_the_contact_ends() {
     let (set, out) = bracket(&["--accel", "2g", "--force", "20N", "--pad-friction", "2"]);
