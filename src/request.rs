@@ -51,6 +51,8 @@ pub struct Request {
     pub max_memory: Option<Memory>,
     /// Whether a glTF file may name buffers outside of its own folder.
     pub outside_buffers: bool,
+    /// Whether every facet of the part is meant as a plane: none is taken for a curved face.
+    pub faceted: bool,
     /// Gripper of the catalogue, or a gripper file.
     pub gripper: String,
     /// Mass of the part.
@@ -252,6 +254,7 @@ impl Default for Request {
             unit: None,
             max_memory: None,
             outside_buffers: false,
+            faceted: false,
             gripper: String::new(),
             mass: None,
             density: None,

@@ -48,6 +48,9 @@ pub(crate) struct Args {
     /// Most memory that reading may take, e.g. 2GB. Default: half of the machine's.
     #[arg(long, value_name = "SIZE")]
     max_memory: Option<String>,
+    /// Every facet is meant as a plane: none is taken for a curved face.
+    #[arg(long)]
+    faceted: bool,
     /// Drawing (SVG): three views with the faces numbered.
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
@@ -76,7 +79,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         _ => [0.0, f64::INFINITY],
     };
     let max_memory = args.max_memory.as_deref().map(flags::memory).transpose()?;
-    let options = ReadOptions::default().with_unit(args.unit).with_max_memory(max_memory);
+    let options = ReadOptions::default()
+        .with_unit(args.unit)
+        .with_max_memory(max_memory)
+        .with_faceted(args.faceted);
     let part = Part::read(&args.part, &options)?;
     let volume = part.mass_properties(1.0).volume;
     let density = match mass {
@@ -151,6 +157,9 @@ fn to_text(part: &Part, pairs: &[FacePair], density: Option<f64>, rows: usize) -
     if !part.curved.is_empty() {
         text += &format!("\n{} curved faces\n", part.curved.len());
         text += &curved_table(&part.curved, rows);
+        if part.curved.iter().take(rows).any(CurvedFace::is_doubtful) {
+            text += "faceted or round?: so few facets may be meant as planes; --faceted takes all for such\n";
+        }
     }
     match part.symmetry() {
         Some(Symmetry::Axis { axis }) => {

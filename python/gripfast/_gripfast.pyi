@@ -45,6 +45,7 @@ class Part:
         unit: str | None = None,
         max_memory: str | None = None,
         outside_buffers: bool = False,
+        faceted: bool = False,
         known_as: _Path | None = None,
     ) -> Part: ...
     @staticmethod

@@ -39,10 +39,11 @@ class Part:
         name: str | None = None,
         max_memory: str | None = None,
         outside_buffers: bool = False,
+        faceted: bool = False,
     ) -> None:
         if faces is None and isinstance(source, (str, os.PathLike)):
             self._native = _gripfast.Part.read(
-                os.fspath(source), unit, max_memory, outside_buffers
+                os.fspath(source), unit, max_memory, outside_buffers, faceted
             )
             return
         if faces is None:

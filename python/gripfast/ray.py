@@ -162,7 +162,12 @@ def _task(
             file.write(content)
         try:
             native = _gripfast.Part.read(
-                path, request.get("unit"), request.get("max_memory"), False, request["part"]
+                path,
+                request.get("unit"),
+                request.get("max_memory"),
+                False,
+                request.get("faceted", False),
+                request["part"],
             )
         except Exception:  # noqa: BLE001
             # A bad part is an outcome of the job, which reads it again to say so.

@@ -26,13 +26,14 @@ pub(crate) struct Part {
 impl Part {
     /// Reads a file; `known_as` is the name of it that results carry, where that is another.
     #[staticmethod]
-    #[pyo3(signature = (path, unit=None, max_memory=None, outside_buffers=false, known_as=None))]
+    #[pyo3(signature = (path, unit=None, max_memory=None, outside_buffers=false, faceted=false, known_as=None))]
     fn read(
         py: Python<'_>,
         path: PathBuf,
         unit: Option<&str>,
         max_memory: Option<&str>,
         outside_buffers: bool,
+        faceted: bool,
         known_as: Option<PathBuf>,
     ) -> PyResult<Self> {
         let unit = unit.map(|text| text.parse::<Unit>()).transpose().or_raise()?;
@@ -43,7 +44,7 @@ impl Part {
             .map(|bytes| bytes as u64);
         let mut options = ReadOptions::default();
         (options.unit, options.max_memory) = (unit, max_memory);
-        options.outside_buffers = outside_buffers;
+        (options.outside_buffers, options.faceted) = (outside_buffers, faceted);
         let mut part = py.detach(|| part::Part::read(&path, &options)).or_raise()?;
         if let Some(name) = known_as {
             part.file = name;

@@ -25,8 +25,9 @@ const NARROWEST: f64 = 5e-4;
 
 /// All planar faces of the part by falling area, and the curved ones; facets of curved surfaces ([`Facets`]) and regions
 /// narrower than 5e-4 of the part's diagonal are left out. Says so in the part's warnings when
-/// faces had to be found with wider tolerances, and when noise has broken planes up.
-pub(super) fn faces(part: &mut Repaired) -> (Vec<PlanarFace>, Vec<CurvedFace>) {
+/// faces had to be found with wider tolerances, and when noise has broken planes up. `faceted`: no
+/// facet is that of a curved surface.
+pub(super) fn faces(part: &mut Repaired, faceted: bool) -> (Vec<PlanarFace>, Vec<CurvedFace>) {
     let [fine, rough] = [0, 1].map(|level| {
         let factor = [1.0, 2.0][level];
         Flatness {
@@ -57,6 +58,10 @@ pub(super) fn faces(part: &mut Repaired) -> (Vec<PlanarFace>, Vec<CurvedFace>) {
             distance / taken,
             taken * 1e6
         ));
+    }
+    if faceted {
+        facets.is_facet.fill(false);
+        return (outline(part, &regions, &facets), Vec::new());
     }
     let floor =
         if is_rough { rough.distance } else { (FLOOR * part.diagonal).max(4.0 * part.noise) };

@@ -145,12 +145,15 @@ pub struct ReadOptions {
     pub max_memory: Option<u64>,
     /// Whether a glTF file may name buffers outside of its own folder.
     pub outside_buffers: bool,
+    /// Whether every facet is meant as a plane, so that none is taken for a curved face.
+    pub faceted: bool,
 }
 
 setters!(ReadOptions {
     with_unit: unit: Option<Unit>,
     with_max_memory: max_memory: Option<u64>,
     with_outside_buffers: outside_buffers: bool,
+    with_faceted: faceted: bool,
 });
 
 impl From<&Request> for ReadOptions {
@@ -159,6 +162,7 @@ impl From<&Request> for ReadOptions {
             unit: request.unit,
             max_memory: request.max_memory.map(|memory| memory.0 as u64),
             outside_buffers: request.outside_buffers,
+            faceted: request.faceted,
         }
     }
 }
@@ -222,7 +226,7 @@ impl Part {
         let unit = options.unit.or(soup.unit);
         let stated = unit.is_some();
         let unit = unit.unwrap_or(Unit::Millimetre);
-        let mut part = Self::build(soup, unit, &path.display().to_string())?;
+        let mut part = Self::build(soup, unit, options.faceted, &path.display().to_string())?;
         part.name = read::stem(path);
         part.file = path.to_path_buf();
         part.unit_m = unit.metres();
@@ -262,15 +266,15 @@ impl Part {
             }
             welder.triangle(corners);
         }
-        let mut part = Self::build(welder.finish(None, Vec::new()), Unit::Metre, name)?;
+        let mut part = Self::build(welder.finish(None, Vec::new()), Unit::Metre, false, name)?;
         part.name = name.to_string();
         Ok(part)
     }
 
-    fn build(soup: weld::Soup, unit: Unit, place: &str) -> Result<Self> {
+    fn build(soup: weld::Soup, unit: Unit, faceted: bool, place: &str) -> Result<Self> {
         check_extent(&soup, unit, place)?;
         let mut repaired = repair::repair(soup, unit.metres(), place)?;
-        let (faces, curved) = faces::faces(&mut repaired);
+        let (faces, curved) = faces::faces(&mut repaired, faceted);
         let unit_mass = repaired.mass();
         Ok(Self {
             name: String::new(),

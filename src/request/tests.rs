@@ -10,6 +10,7 @@ part = "a/b c.stl"
 unit = "in"
 max_memory = "2GB"
 outside_buffers = true
+faceted = true
 gripper = "my.toml"
 density = "2.7 g/cm3"
 com = "1in,-2mm,0mm"

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod curved;
+mod faceted;
 mod formats;
 mod hostile;
 mod solids;

@@ -88,6 +88,9 @@ pub(crate) struct JobArgs {
     /// A glTF file may name buffers outside of its own folder.
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
     outside_buffers: Option<bool>,
+    /// Every facet of the part is meant as a plane: none is taken for a curved face.
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
+    faceted: Option<bool>,
     /// Acceleration in any direction on top of gravity, e.g. 2g.
     #[arg(long)]
     accel: Option<Acceleration>,
@@ -405,7 +408,7 @@ impl JobArgs {
             (request.mass, request.density) = (None, None);
         }
         give!(self => request;
-            mass, density, com, inertia, unit, max_memory, outside_buffers, accel);
+            mass, density, com, inertia, unit, max_memory, outside_buffers, faceted, accel);
         if let [force] = self.force[..] {
             request.force = Some(force);
         }
