@@ -4,6 +4,7 @@
 
 mod brute;
 mod curved;
+mod curved_points;
 mod earlier_method;
 mod exact;
 mod invariances;
