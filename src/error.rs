@@ -112,14 +112,17 @@ impl Error {
     /// A failed file operation, `action` being `read`, `write`, ..: [`ErrorKind::NotFound`] when
     /// the file is not there, else [`ErrorKind::File`].
     pub fn io(path: &Path, action: &str, source: std::io::Error) -> Self {
-        let kind = match source.kind() {
-            std::io::ErrorKind::NotFound => ErrorKind::NotFound,
-            _ => ErrorKind::File,
+        use std::io::ErrorKind as Io;
+        let (kind, remedy) = match source.kind() {
+            Io::NotFound => (ErrorKind::NotFound, "check the name and the folder"),
+            Io::PermissionDenied => (ErrorKind::File, "check who may use the file and its folder"),
+            Io::StorageFull => (ErrorKind::File, "free some space, or write elsewhere"),
+            _ => (ErrorKind::File, ""),
         };
         let problem = format!("cannot {action}: {source}");
         Self {
             source: Some(Box::new(source)),
-            ..Self::new(kind, path.display().to_string(), problem, "")
+            ..Self::new(kind, path.display().to_string(), problem, remedy)
         }
     }
 
@@ -206,6 +209,7 @@ mod tests {
         let error = Error::io(path, "read", std::fs::read(path).unwrap_err());
         assert_eq!(error.kind(), ErrorKind::NotFound);
         assert!(error.to_string().starts_with("no/such/file: cannot read: "));
+        assert_eq!(error.remedy(), "check the name and the folder");
         let source = std::error::Error::source(&error).unwrap();
         assert!(source.downcast_ref::<std::io::Error>().is_some());
         let denied = std::io::ErrorKind::PermissionDenied.into();

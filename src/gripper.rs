@@ -419,13 +419,10 @@ impl Gripper {
     /// names: the jaws are alike and both move, the pad is mirror-symmetric in `x2`, and the half
     /// turn maps the set of palm bodies to itself.
     pub fn is_symmetric(&self) -> bool {
-        if !self.moving.is_both() || self.pad_ii.is_some() || self.fingers_ii.is_some() {
+        if !self.moving.is_both() || !self.has_like_pads() || self.fingers_ii.is_some() {
             return false;
         }
         let close = 1e-9;
-        let mirrored = |point: &DVec2| {
-            self.pad.iter().any(|other| other.distance(DVec2::new(point.x, -point.y)) < close)
-        };
         let turn = Frame { rotation: half_turn(), origin: DVec3::ZERO };
         let has_twin = |body: &Body| {
             let [min, max] = body.moved(&turn).bounds();
@@ -437,7 +434,16 @@ impl Gripper {
                     && !matches!(other.shape, Shape::Hull { .. })
             })
         };
-        self.pad.iter().all(mirrored) && self.palm.iter().all(has_twin)
+        self.palm.iter().all(has_twin)
+    }
+
+    /// Whether exchanging the jaws leaves what the pads touch as it is: they are alike and
+    /// mirror-symmetric in `x2`.
+    pub fn has_like_pads(&self) -> bool {
+        let mirrored = |point: &DVec2| {
+            self.pad.iter().any(|other| other.distance(DVec2::new(point.x, -point.y)) < 1e-9)
+        };
+        self.pad_ii.is_none() && self.pad.iter().all(mirrored)
     }
 }
 

@@ -156,9 +156,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         sets.push(set);
     }
     write(&args, &sets, format, &options)?;
+    let most = options.top.unwrap_or(usize::MAX);
+    let count: usize = sets.iter().map(|set| set.grips.len().min(most)).sum();
+    if count == 0 {
+        crate::terminal::say(
+            "warning: no grip is written: the results hold none, or none that the choice (--ids, \
+             --faces, --approach, --min-pad-share, --holding, --top) lets through",
+        );
+    }
     if !to_stdout {
-        let most = options.top.unwrap_or(usize::MAX);
-        let count: usize = sets.iter().map(|set| set.grips.len().min(most)).sum();
         let frame = match sets.first() {
             Some(set) => export::tool_frame(set, format, &options)?,
             None => None,
@@ -166,7 +172,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         let frame = frame.map_or("grip frames".to_owned(), |frame| format!("tool frame {frame}"));
         crate::terminal::say(&format!("{}: {count} grips, {frame}", args.output.display()));
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(ExitCode::from(u8::from(count == 0)))
 }
 
 /// Writes one result, or a table of several.

@@ -9,7 +9,7 @@ use clap::Args as ClapArgs;
 use comfy_table::{CellAlignment, Table, presets};
 use glam::DVec3;
 use gripfast::part::{
-    CurvedFace, FacePair, Part, PlanarFace, ReadOptions, Shape, Symmetry, Unit, drawing,
+    CurvedFace, FacePair, Part, PlanarFace, ReadOptions, Shape, Symmetry, Unit, UnitSource, drawing,
 };
 use gripfast::units::Quantity;
 use serde_json::json;
@@ -116,12 +116,14 @@ fn to_text(part: &Part, pairs: &[FacePair], density: Option<f64>, rows: usize) -
     let (low, high) = part.mesh.bounding_box();
     let size = (high - low) * 1e3;
     let unit = Unit::of_metres(part.unit_m).map_or(String::new(), |unit| unit.to_string());
+    let unit = match part.unit_source {
+        UnitSource::Assumed => format!("the file states no unit: {unit} assumed"),
+        UnitSource::Given => format!("read in {unit}, as asked"),
+        _ => format!("unit of the file: {unit}"),
+    };
     let mut text = format!("{}\n", part.file.display());
     let mut line = |name: &str, value: String| text += &format!("  {name:<15} {value}\n");
-    line(
-        "size",
-        format!("{:.3} x {:.3} x {:.3} mm (unit of the file: {unit})", size.x, size.y, size.z),
-    );
+    line("size", format!("{:.3} x {:.3} x {:.3} mm ({unit})", size.x, size.y, size.z));
     line(
         "triangles",
         format!("{}, {} vertices", part.mesh.triangles.len(), part.mesh.vertices.len()),
@@ -342,7 +344,7 @@ fn to_json(part: &Part, pairs: &[FacePair], density: Option<f64>) -> serde_json:
         .map(|pair| json!({ "faces": [pair.face_i, pair.face_ii], "width": pair.width, "overlap_area": pair.overlap_area, "kind": pair.kind }))
         .collect();
     json!({
-        "file": part.file, "name": part.name, "unit_m": part.unit_m, "triangles": part.mesh.triangles.len(), "vertices": part.mesh.vertices.len(),
+        "file": part.file, "name": part.name, "unit_m": part.unit_m, "unit_source": part.unit_source, "triangles": part.mesh.triangles.len(), "vertices": part.mesh.vertices.len(),
         "bbox_min": low, "bbox_max": high, "health": part.health, "volume": mass.volume, "centre_of_mass": mass.centre_of_mass,
         "density": density, "mass": density.map(|_| mass.mass), "inertia": density.map(|_| mass.inertia), "faces": faces, "curved": curved, "symmetry": part.symmetry(), "pairs": pairs,
     })

@@ -42,6 +42,7 @@ pub(crate) use read::{KNOWN as KNOWN_SUFFIXES, is_part};
 #[cfg(feature = "step")]
 pub use read::{StepProcess, serve_step};
 pub use symmetry::Symmetry;
+pub(crate) use unit::is_plausible;
 
 /// A triangle mesh \[m\], welded, outward-oriented.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -167,6 +168,19 @@ impl From<&Request> for ReadOptions {
     }
 }
 
+/// Where the unit of a part's numbers comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum UnitSource {
+    /// The file states it.
+    File,
+    /// The reader was told.
+    Given,
+    /// Neither: millimetres are assumed.
+    Assumed,
+}
+
 /// A part, read and checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
@@ -176,6 +190,8 @@ pub struct Part {
     pub file: PathBuf,
     /// Unit of the file's numbers \[m\].
     pub unit_m: f64,
+    /// Where that unit comes from.
+    pub unit_source: UnitSource,
     /// The surface: welded, repaired, outward-oriented.
     pub mesh: Mesh,
     /// What was found and repaired.
@@ -223,15 +239,23 @@ impl Part {
     /// see [`Part::health`].
     pub fn read(path: &Path, options: &ReadOptions) -> Result<Self> {
         let soup = read::read(path, options)?;
-        let unit = options.unit.or(soup.unit);
-        let stated = unit.is_some();
-        let unit = unit.unwrap_or(Unit::Millimetre);
+        let of_file = soup.unit;
+        let (unit, source) = match (options.unit, of_file) {
+            (Some(given), _) => (given, UnitSource::Given),
+            (None, Some(stated)) => (stated, UnitSource::File),
+            (None, None) => (Unit::Millimetre, UnitSource::Assumed),
+        };
         let mut part = Self::build(soup, unit, options.faceted, &path.display().to_string())?;
         part.name = read::stem(path);
         part.file = path.to_path_buf();
-        part.unit_m = unit.metres();
+        (part.unit_m, part.unit_source) = (unit.metres(), source);
+        if let Some(stated) = of_file.filter(|&stated| stated != unit) {
+            part.health.warnings.push(format!(
+                "the file states the unit {stated}; its numbers were read in {unit}, as asked"
+            ));
+        }
         let (low, high) = part.mesh.bounding_box();
-        if let Some(warning) = unit::implausible_size(high - low, unit, stated) {
+        if let Some(warning) = unit::implausible_size(high - low, unit, source) {
             part.health.warnings.push(warning);
         }
         Ok(part)
@@ -280,6 +304,7 @@ impl Part {
             name: String::new(),
             file: PathBuf::new(),
             unit_m: unit.metres(),
+            unit_source: UnitSource::Given,
             mesh: repaired.mesh,
             health: repaired.health,
             faces,

@@ -9,7 +9,7 @@ use crate::backend::SeedSet;
 use crate::error::{Error, ErrorKind, Result};
 use crate::gripper::{self, Gripper};
 use crate::load::LoadSet;
-use crate::part::{MassProperties, Part, ReadOptions};
+use crate::part::{MassProperties, Part, ReadOptions, is_plausible};
 use crate::propose::ProposeOptions;
 use crate::request::{Polish, Request};
 use crate::results::LoadCase;
@@ -252,7 +252,10 @@ fn doubts(request: &Request, part: &Part, mass: &MassProperties) -> Vec<String> 
     let mut doubts = Vec::new();
     let density = mass.mass / mass.volume;
     let stated = request.mass.is_some() || request.density.is_some();
-    let unit = request.mass.and_then(|_| likely_unit(density, part));
+    let (low, high) = part.mesh.bounding_box();
+    // A part of an implausible size has got its hint, and two that differ help nobody.
+    let hint = request.mass.filter(|_| is_plausible(high - low));
+    let unit = hint.and_then(|_| likely_unit(density, part));
     let remedy = unit.map_or(String::new(), |(unit, density)| {
         format!("; the unit {unit} would give {:.1} g/cm3", density / 1e3)
     });
@@ -269,7 +272,6 @@ fn doubts(request: &Request, part: &Part, mass: &MassProperties) -> Vec<String> 
              unit of its file{remedy}"
         ));
     }
-    let (low, high) = part.mesh.bounding_box();
     let centre = mass.centre_of_mass;
     if request.com.is_some() && (centre.cmplt(low) | centre.cmpgt(high)).any() {
         doubts.push(format!(

@@ -413,7 +413,8 @@ fn chosen_faces(part: &Part, options: &ProposeOptions) -> Result<Option<Vec<bool
         };
         *chosen = true;
     }
-    for [low, high] in &options.faces_in {
+    for corners in &options.faces_in {
+        let [low, high] = corners;
         // A face may touch the box from inside: coordinates come rounded to single precision.
         let (low, high) = (*low - 1e-6, *high + 1e-6);
         let within = |face: &crate::part::PlanarFace| {
@@ -436,10 +437,11 @@ fn chosen_faces(part: &Part, options: &ProposeOptions) -> Result<Option<Vec<bool
             any = true;
         }
         if !any {
-            let [a, b] = [low, high].map(|corner| (corner * 1e3).to_array());
+            // Without a sign before zero.
+            let [a, b] = corners.map(|corner| (corner * 1e6).round() / 1e3 + 0.0);
             let problem = format!(
-                "no face lies wholly between ({:.2}, {:.2}, {:.2}) and ({:.2}, {:.2}, {:.2}) mm",
-                a[0], a[1], a[2], b[0], b[1], b[2]
+                "no face lies wholly between ({}, {}, {}) and ({}, {}, {}) mm",
+                a.x, a.y, a.z, b.x, b.y, b.z
             );
             return Err(Error::input(
                 "box of faces",

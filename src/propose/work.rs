@@ -148,7 +148,9 @@ impl Proposer<'_> {
                 };
                 if jaws == Jaws::Exchanged {
                     turn(&mut grip);
-                    grip.flip_of = taken.contains_key(&(grip.id)).then_some(grip.id);
+                    // Other pads touch another area: such a grip holds differently.
+                    let same = self.gripper.has_like_pads() && taken.contains_key(&(grip.id));
+                    grip.flip_of = same.then_some(grip.id);
                     grip.id += 1;
                 } else if self.options.flips && self.symmetric {
                     let mut flip = grip.clone();

@@ -4,7 +4,7 @@
 use std::io::Write;
 
 use glam::DVec3;
-use gripfast::part::{Part, ReadOptions, Unit};
+use gripfast::part::{Part, ReadOptions, Unit, UnitSource};
 
 /// An L-shaped bar, 30 x 20 x 10: its ends are concave hexagons.
 const OUTLINE: [(f64, f64); 6] =
@@ -318,7 +318,17 @@ fn three_mf_with_components_transforms_and_unit() {
             && high.distance(DVec3::new(100.0, 30.0, 10.0) * 0.0254) < 1e-9,
         "{low} {high}"
     );
-    check(&scratch.read("bar.3mf", &bytes, Some(Unit::Millimetre)), Unit::Millimetre, 2);
+    assert_eq!(part.unit_source, UnitSource::File);
+    let told = scratch.read("bar.3mf", &bytes, Some(Unit::Millimetre));
+    check(&told, Unit::Millimetre, 2);
+    assert_eq!(told.unit_source, UnitSource::Given);
+    let contradicted = "the file states the unit in; its numbers were read in mm, as asked";
+    assert!(told.health.warnings.iter().any(|text| text == contradicted), "{:?}", told.health);
+    let agreed = scratch.read("bar.3mf", &bytes, Some(Unit::Inch));
+    assert_eq!((agreed.unit_source, agreed.health.warnings.len()), (UnitSource::Given, 0));
+    let stl =
+        Part::read(&crate::support::root().join("data/parts/hex_nut.stl"), &ReadOptions::default());
+    assert_eq!(stl.unwrap().unit_source, UnitSource::Assumed);
     let path = scratch.0.path().join("bad.3mf");
     for bytes in [&bytes[..bytes.len() / 2], b"PK\x03\x04 and nothing else", b"no zip"] {
         std::fs::write(&path, bytes).unwrap();

@@ -95,7 +95,16 @@ fn each_face_is_touched_by_its_own_pad() {
         let normal = part.faces[grip.face_i as usize].normal;
         assert!(normal.dot(grip.part_from_grip.rotation.z_axis) > 0.999);
     }
-    // Both ways round are grips of their own, one marked as the flip of the other.
+    // Both ways round are grips of their own: with other pads they hold differently. Where the pads
+    // are alike, one stands for the other.
+    assert!(grips.iter().all(|grip| grip.flip_of.is_none()));
+    let alike =
+        gripper::parse(&VICE.replace("\"30mm\", \"24mm\"]", "\"20mm\", \"16mm\"]"), "alike");
+    let alike = alike.unwrap();
+    let alike: Vec<Grip> =
+        Proposer::new(&part, &alike, &options).unwrap().flat_map(|chunk| chunk.grips).collect();
+    let flips = alike.iter().filter(|grip| grip.flip_of == Some(grip.id - 1)).count();
+    assert!(2 * flips == alike.len() && flips > 20, "{flips} of {}", alike.len());
     assert!(whole.iter().any(|grip| grip.part_from_grip.rotation.z_axis.z > 0.0));
     assert!(whole.iter().any(|grip| grip.part_from_grip.rotation.z_axis.z < 0.0));
     // At an edge both are cut at the same line of the part.

@@ -161,10 +161,13 @@ fn print(outcomes: &[Compared]) -> anyhow::Result<()> {
     if !left_out.is_empty() {
         writeln!(out, "Left out to fit {width} columns: {}.", left_out.join(", "))?;
     }
-    let text = "force N: gripping force per jaw with which it just holds; + more than the gripper \
-                has, - less than its least. pad: share of the pad that touches; left: share of that \
-                contact left under the worst load.";
-    writeln!(out, "\n{}", wrapped(text, width))?;
+    let usable = table::usable(outcomes[0].outcome.set.pads().safety);
+    let text = format!(
+        "force N: gripping force per jaw with which it {usable}; + more than the gripper has, - less \
+         than its least. pad: share of the pad that touches; left: share of that contact left under \
+         the worst load."
+    );
+    writeln!(out, "\n{}", wrapped(&text, width))?;
     Ok(())
 }
 

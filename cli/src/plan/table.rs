@@ -12,6 +12,7 @@ use gripfast::mechanics::squeeze_pressure;
 use gripfast::model::{Contact, Slip, Status};
 use gripfast::plan::OUTRANKED;
 use gripfast::results::{Comparison, EarlierScore, ForceRange, GripSet, RankedGrip};
+use gripfast::units::decimal;
 
 use super::layout::{Column, grid, number, words, wrapped};
 
@@ -27,12 +28,7 @@ pub(super) fn print(
     if set.grips.is_empty() {
         writeln!(out, "\nno grip holds this part: see the reasons above")?;
         if set.summary.pairs == 0 {
-            writeln!(
-                out,
-                "no two opposite faces lie within the stroke of {:.1} to {:.1} mm",
-                gripper.stroke[0] * 1e3,
-                gripper.stroke[1] * 1e3
-            )?;
+            writeln!(out, "{}", no_pairs(&set.summary.rejections, gripper))?;
         }
         return Ok(());
     }
@@ -45,6 +41,24 @@ pub(super) fn print(
         compared(out, set, comparison, width)?;
     }
     Ok(())
+}
+
+/// Why no two faces come into question.
+fn no_pairs(rejections: &BTreeMap<String, u64>, gripper: &Gripper) -> String {
+    let any = |reason: &str| rejections.contains_key(reason);
+    let [least, most] = gripper.stroke.map(|end| end * 1e3);
+    if any("face_pair_opening_too_small") {
+        return format!(
+            "opposite faces lie so near the end of the stroke of {least:.1} to {most:.1} mm that a jaw \
+             opens by less than the least opening (--min-opening)"
+        );
+    }
+    if any("face_pair_not_chosen") && !any("face_pair_outside_stroke") {
+        return "no two of the faces chosen (--faces, --faces-in) are a pair: `gripfast part` lists \
+                the pairs"
+            .to_owned();
+    }
+    format!("no two opposite faces lie within the stroke of {least:.1} to {most:.1} mm")
 }
 
 /// What the columns mean, a paragraph each.
@@ -65,10 +79,7 @@ fn legend(
     )];
     match pads.value {
         Some(friction) => {
-            let usable = match pads.safety {
-                1.0 => "just holds".to_owned(),
-                safety => format!("holds with a safety of {safety}"),
-            };
+            let usable = usable(pads.safety);
             let multiple = match has("multiple") {
                 true => " multiple: factor by which all of the worst load can grow.",
                 false => "",
@@ -123,10 +134,18 @@ fn legend(
     texts
 }
 
+/// What a grip does with the force needed.
+pub(super) fn usable(safety: f64) -> String {
+    match safety {
+        1.0 => "just holds".to_owned(),
+        safety => format!("holds with a safety of {safety}"),
+    }
+}
+
 /// What the marks behind forces mean, where there are any.
 fn range_note(set: &GripSet, shown: &[&RankedGrip], gripper: &Gripper) -> String {
     let is = |range| shown.iter().any(|grip| set.force_range(grip) == Some(range));
-    let [least, most] = gripper.force;
+    let [least, most] = gripper.force.map(|force| decimal(force, 3));
     let above = format!("+ more than the gripper's {most} N");
     let below = format!("- less than its least, {least} N");
     match (is(ForceRange::Above), is(ForceRange::Below)) {
@@ -143,7 +162,7 @@ fn summary(out: &mut impl Write, set: &GripSet, gripper: &Gripper) -> std::io::R
         out,
         "{} at {} N per jaw, {} loads, {} face pairs, {} candidates",
         gripper.name,
-        set.provenance.resolved.force.0,
+        decimal(set.provenance.resolved.force.0, 3),
         set.loads.len(),
         set.summary.pairs,
         set.summary.candidates,
@@ -167,13 +186,13 @@ pub(super) fn part(set: &GripSet) -> String {
     let mass = &set.part.mass;
     let size = (set.part.bbox_max - set.part.bbox_min) * 1e3;
     format!(
-        "{}: {} x {} x {} mm, {} triangles, {:.4} kg, centre of mass {} mm",
+        "{}: {} x {} x {} mm, {} triangles, {} kg, centre of mass {} mm",
         set.part.file,
         length(size.x),
         length(size.y),
         length(size.z),
         set.part.triangles,
-        mass.mass,
+        kilograms(mass.mass),
         tuple(&(mass.centre_of_mass * 1e3).to_array(), 2)
     )
 }
@@ -188,15 +207,24 @@ pub(super) fn reasons(set: &GripSet) -> Option<String> {
     (!reasons.is_empty()).then(|| texts.collect::<Vec<_>>().join(", "))
 }
 
-/// A length in millimetres to 0.1 mm, or to two digits where it is less than a millimetre.
+/// A length in millimetres to 0.1 mm; to 0.01 mm where that tells more, and to two digits where it
+/// is less than a millimetre.
 fn length(mm: f64) -> String {
     let digits = if mm > 0.0 { (1.0 - mm.log10().floor()).clamp(1.0, 9.0) } else { 1.0 };
+    let digits =
+        if (mm * 10.0 - (mm * 10.0).round()).abs() < 0.05 { digits } else { digits.max(2.0) };
     format!("{mm:.*}", digits as usize)
+}
+
+/// A mass in kilograms to 0.1 g, or to three digits where it is less than 0.1 kg.
+fn kilograms(mass: f64) -> String {
+    let digits = if mass > 0.0 { (2.0 - mass.log10().floor()).clamp(4.0, 12.0) } else { 4.0 };
+    format!("{mass:.*}", digits as usize)
 }
 
 /// How many of the grips hold, with what, and what the best needs where none does.
 pub(super) fn verdict(set: &GripSet) -> String {
-    let (ranked, force) = (set.summary.ranked, set.provenance.resolved.force.0);
+    let (ranked, force) = (set.summary.ranked, decimal(set.provenance.resolved.force.0, 3));
     let pads = set.pads();
     let (Some(holding), Some(friction)) = (set.holding(), pads.value) else {
         return format!(
@@ -209,8 +237,11 @@ pub(super) fn verdict(set: &GripSet) -> String {
         safety => format!(" and a safety of {safety}"),
     };
     let best = set.grips.iter().filter_map(|grip| grip.force_needed).fold(f64::INFINITY, f64::min);
+    // Of those that were not solved one may need a little less than the best in the order.
+    let all = !set.summary.rejections.contains_key(OUTRANKED);
+    let which = if all { "the best needs" } else { "the best of those solved needs" };
     let needs = match holding == 0 && best.is_finite() {
-        true => format!(" (the best needs {} N)", significant(best)),
+        true => format!(" ({which} {} N)", significant(best)),
         false => String::new(),
     };
     format!(

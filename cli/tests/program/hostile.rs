@@ -254,4 +254,10 @@ fn a_crash_of_the_cad_kernel_is_an_error_that_names_file_and_stage() {
     assert!(matches!(answer.code, Some(0 | 1)), "{}", answer.errors);
     assert!(answer.output.contains("planar faces"), "{}", answer.output);
     refused(&["part", &good, "--max-memory", "1MB"], &["remedy"]);
+    // Started under a limit of its own (a batch system, a container), lower than the one allowed.
+    let program = assert_cmd::cargo::cargo_bin("gripfast").display().to_string();
+    let line = format!("ulimit -v 8000000; exec '{program}' part '{good}' --max-memory 12GB");
+    let output = std::process::Command::new("sh").args(["-c", &line]).output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(matches!(output.status.code(), Some(0 | 1)), "{errors}");
 }

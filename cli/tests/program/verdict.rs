@@ -567,3 +567,79 @@ fn a_turn_about_a_centre_beyond_all_measure_is_told_as_a_slide() {
         assert!(output.status.code() == Some(0) && out.contains(words), "{moment}: {out}");
     }
 }
+
+#[test]
+fn answers_without_a_grip_name_what_was_in_the_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    // Boxes of so many millimetres.
+    let solid = |name: &str, size: [f64; 3]| {
+        let mut text = String::from("OFF\n8 12 0\n");
+        for corner in 0..8 {
+            let along = |axis: usize| size[axis] * f64::from(corner >> axis & 1);
+            text += &format!("{} {} {}\n", along(0), along(1), along(2));
+        }
+        for [a, b, c, d] in
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+        {
+            text += &format!("3 {a} {b} {c}\n3 {a} {c} {d}\n");
+        }
+        std::fs::write(at.join(name), text).unwrap();
+    };
+    solid("near.off", [84.97, 90.0, 100.0]);
+    solid("mid.off", [20.0, 30.0, 40.0]);
+    let run = |line: &str, code: i32| {
+        let output = gripfast(at, line);
+        let told = text(&output.stdout) + &text(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{line}: {told}");
+        told
+    };
+    // A pair within the stroke, that no jaw can open beyond.
+    let told = run("plan near.off -g robotiq-2f85 --mass 200g -q", 1);
+    assert!(told.contains("(--min-opening)") && told.contains("84.97 x 90.0 x 100.0 mm"), "{told}");
+    assert!(!told.contains("no two opposite faces lie within"), "{told}");
+    // Faces that are no pair.
+    let told = run("plan mid.off -g robotiq-2f85 --mass 200g -q --faces 0", 1);
+    assert!(told.contains("no two of the faces chosen"), "{told}");
+    assert!(!told.contains("within the stroke"), "{told}");
+    let corner = "0mm,0mm,0mm:1mm,1mm,1mm";
+    let told = run(&format!("plan mid.off -g generic --mass 20g --faces-in {corner}"), 2);
+    assert!(told.contains("between (0, 0, 0) and (1, 1, 1) mm"), "{told}");
+    // A light part has a mass, and no unit is said to be stated where none is.
+    let told = run("plan mid.off -g generic --mass 0.01g -q --top 1 --spacing 20mm", 0);
+    assert!(told.contains(" 0.0000100 kg,"), "{told}");
+    let told = run("part mid.off", 0);
+    assert!(told.contains("40.000 mm (the file states no unit: mm assumed)"), "{told}");
+    let told = run("part mid.off --unit cm", 0);
+    assert!(told.contains("400.000 mm (read in cm, as asked)"), "{told}");
+    // Forces in pounds are not told to the last digit; the safety asked for is told everywhere.
+    std::fs::write(
+        at.join("pounds.toml"),
+        "name = \"Pounds\"\nstroke = [\"0in\", \"4in\"]\nforce = [\"5lbf\", \"20lbf\"]\n\
+         [pad]\nrectangle = [\"1in\", \"0.5in\"]\nfriction = 0.3\n",
+    )
+    .unwrap();
+    let few = "--spacing 20mm --angle-step 90deg -q --safety 3";
+    let told = run(&format!("plan mid.off -g pounds.toml -g generic --mass 2kg {few}"), 0);
+    assert!(told.contains("with which it holds with a safety of 3;"), "{told}");
+    let told = run(&format!("plan mid.off -g pounds.toml --mass 20kg {few}"), 1);
+    assert!(told.contains("Pounds at 88.964 N per jaw"), "{told}");
+    assert!(told.contains("(the best of those solved needs"), "{told}");
+    // A choice that leaves nothing is no success.
+    let told = run(&format!("plan mid.off -g pounds.toml --mass 20kg {few} -o grips.json"), 1);
+    assert!(told.contains("(the best needs"), "{told}");
+    let told = run("export grips.json --holding -o grips.csv", 1);
+    assert!(told.contains("warning: no grip is written"), "{told}");
+}
+
+#[test]
+fn hints_about_the_unit_do_not_contradict_each_other() {
+    let Some(battery) = crate::support::reference("trials/verdict/battery_in_metres.stl") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let line = format!("plan {} -g generic --mass 30g -q", battery.display());
+    let err = text(&gripfast(folder.path(), &line).stderr);
+    assert!(err.contains("(--unit m)") && !err.contains("--unit ft"), "{err}");
+    assert!(err.contains("more than any metal"), "{err}");
+}

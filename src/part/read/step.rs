@@ -60,9 +60,14 @@ pub fn serve_step(
     #[cfg(unix)]
     {
         use rlimit::Resource;
-        Resource::AS.set(memory, memory)?;
-        Resource::CPU.set(seconds, seconds + 1)?;
-        Resource::CORE.set(0, 0)?;
+        // A process may not raise a limit that it was started with.
+        let lower = |resource: Resource, soft: u64, hard: u64| {
+            let most = resource.get_hard()?;
+            resource.set(soft.min(most), hard.min(most))
+        };
+        lower(Resource::AS, memory, memory)?;
+        lower(Resource::CPU, seconds, seconds + 1)?;
+        lower(Resource::CORE, 0, 0)?;
     }
     #[cfg(not(unix))]
     let _ = (memory, seconds);
