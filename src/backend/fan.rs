@@ -214,7 +214,9 @@ pub(crate) fn fill_basis(
             let g = basis::<LANES>(edges, header.radius, &v);
             for (lane, v) in some.iter().enumerate() {
                 for weight in 0..BASIS {
-                    let [g1, g2, torque] = [0, 1, 2].map(|m| g[3 * weight + m][lane]);
+                    let g1 = g[3 * weight][lane];
+                    let g2 = g[3 * weight + 1][lane];
+                    let torque = g[3 * weight + 2][lane];
                     out.push([g1, g2, torque, v[0] * g1 + v[1] * g2 + v[2] * torque]);
                 }
             }

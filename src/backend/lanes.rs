@@ -38,6 +38,24 @@ impl Loads {
         }
         all
     }
+
+    /// Some of the loads in `blocks`, by their places there.
+    #[inline(always)]
+    pub(crate) fn gathered(blocks: &[Self], places: &[u32]) -> Self {
+        let mut all = Self::new(&[]);
+        for (lane, &place) in places.iter().enumerate().take(LANES) {
+            let (block, from) = (&blocks[place as usize / LANES], place as usize % LANES);
+            for m in 0..3 {
+                all.wrench[m][lane] = block.wrench[m][from];
+            }
+            all.scale[lane] = block.scale[from];
+            all.f3[lane] = block.f3[from];
+            all.m1[lane] = block.m1[from];
+            all.m2[lane] = block.m2[from];
+            all.distance[lane] = block.distance[from];
+        }
+        all
+    }
 }
 
 #[inline(always)]

@@ -71,6 +71,12 @@ pub struct Seed {
 
 /// Refuses numbers that are not finite.
 pub(crate) fn check(problem: &Problem<'_>, index: usize) -> Result<()> {
+    check_grip(problem, index)?;
+    problem.wrenches.iter().enumerate().try_for_each(|load| check_load(load, index))
+}
+
+/// [`check`] of all but the loads.
+pub(super) fn check_grip(problem: &Problem<'_>, index: usize) -> Result<()> {
     let place = || format!("grip {index}");
     if !(problem.force.is_finite() && problem.force > 0.0) {
         return Err(Error::input(
@@ -86,22 +92,17 @@ pub(crate) fn check(problem: &Problem<'_>, index: usize) -> Result<()> {
             "give a distance of at most 1e60 m",
         ));
     }
-    // Zero unless a number is not finite, or the sum of huge ones is not: then they are told apart.
-    let nothing = |wrench: &Wrench| {
-        let (f, m) = (wrench.force, wrench.moment);
-        ((f.x + f.y) + (f.z + m.x) + (m.y + m.z)) * 0.0
-    };
-    if problem.wrenches.iter().map(nothing).sum::<f64>() == 0.0 {
+    Ok(())
+}
+
+/// [`check`] of one load of the grip with this index.
+pub(super) fn check_load((load, wrench): (usize, &Wrench), grip: usize) -> Result<()> {
+    if wrench.force.is_finite() && wrench.moment.is_finite() {
         return Ok(());
     }
-    for (load, wrench) in problem.wrenches.iter().enumerate() {
-        if !(wrench.force.is_finite() && wrench.moment.is_finite()) {
-            return Err(Error::input(
-                place(),
-                format!("load {load} is not finite: {wrench:?}"),
-                "give finite forces and moments",
-            ));
-        }
-    }
-    Ok(())
+    Err(Error::input(
+        format!("grip {grip}"),
+        format!("load {load} is not finite: {wrench:?}"),
+        "give finite forces and moments",
+    ))
 }

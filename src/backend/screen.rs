@@ -6,7 +6,9 @@
 //! load lies between the gradients at the corners of some triangle, `w = sum x_j g_j` with `x_j` not
 //! negative; its `mu` is at most `sum x_j`, and the values of the three twists are at least, in the
 //! mean, `sum_j x_j sum_i (g_j . v_i / D(v_i)) / 3`. So `R` is at most the largest of `3 / sum_i (g_j
-//! . v_i / D(v_i))` over corners and triangles ([`Screen::reach`]).
+//! . v_i / D(v_i))` over corners and triangles ([`Screen::reaches`]). This holds for any set of twists
+//! that goes round the sphere in triangles: a quarter of them leaves out most loads already, and the
+//! others are compared by all.
 
 use rayon::prelude::*;
 
@@ -16,10 +18,12 @@ use super::layout::{
     CONTACT_MARGIN, EdgeRecord, LEAST_DISSIPATION, LoadRecord, OUT_OF_RANGE, SeedRecord,
 };
 use super::prepare::{Contacts, RANGE, Records, not_searched};
-use super::problem::{Batch, F32_TOLERANCE, Problem, Seed, SeedStatus, check};
+use super::problem::{
+    Batch, F32_TOLERANCE, Problem, Seed, SeedStatus, check, check_grip, check_load,
+};
 use super::search::{Field, Planes, sign_of};
 use super::seeds::{NEGATED, RING, SeedSet};
-use super::table::{SLOTS, Table};
+use super::table::{PARTS, Table};
 use crate::contact::widest;
 use crate::error::Result;
 use crate::model::Wrench;
@@ -96,11 +100,12 @@ impl Backend {
         }
         let mut users: Vec<Vec<usize>> = vec![Vec::new(); contacts.ready.len()];
         for (index, &slot) in contacts.slots.iter().enumerate() {
-            check(&batch.problems[index], index)?;
+            check_grip(&batch.problems[index], index)?;
             users[slot].push(index);
         }
         let of_contact = |(slot, users): (usize, Vec<usize>)| -> Result<Vec<(usize, Found)>> {
             let Some(records) = &contacts.ready[slot].records else {
+                users.iter().try_for_each(|&index| check(&batch.problems[index], index))?;
                 let none = |index: usize| {
                     let count = batch.problems[index].wrenches.len() as u32;
                     (index, (0..count).map(|load| (load, not_searched(SeedStatus::NoContact))))
@@ -111,11 +116,18 @@ impl Backend {
             let screen = Screen::new(records, seeds);
             let loads = users.iter().map(|&index| batch.problems[index].wrenches.len()).sum();
             let least = (users.len() * TASK).div_ceil(usize::max(loads, 1));
-            let one = |&index: &usize| Ok((index, screen.survivors(&batch.problems[index])?));
+            let one =
+                |&index: &usize| Ok((index, screen.survivors(&batch.problems[index], index)?));
             users.par_iter().with_min_len(least).map(one).collect()
         };
-        let found: Vec<Vec<(usize, Found)>> =
-            users.into_par_iter().enumerate().map(of_contact).collect::<Result<_>>()?;
+        let found: Result<Vec<Vec<(usize, Found)>>> =
+            users.into_par_iter().enumerate().map(of_contact).collect();
+        let found = found.or_else(|error| {
+            // Of several loads that are not finite the first one is told.
+            let mut problems = batch.problems.iter().enumerate();
+            problems.try_for_each(|(index, problem)| check(problem, index))?;
+            Err(error)
+        })?;
         let mut by_problem: Vec<Found> = vec![Vec::new(); batch.problems.len()];
         for (index, found) in found.into_iter().flatten() {
             by_problem[index] = found;
@@ -139,25 +151,39 @@ type Found = Vec<(u32, Seed)>;
 struct Screen<'a> {
     records: &'a Records,
     seeds: &'a SeedSet,
-    table: Table,
-    /// `R`; for different faces under the pressure of the squeeze. [`f32::MAX`]: not known.
-    reach: f32,
+    table: Table<'a>,
+    /// A quarter of the twists ([`SeedSet::half`]), by which most loads are left out already.
+    few: Twists,
+    /// All of them.
+    all: Twists,
     /// Different faces: one over the pressure of the squeeze at each vertex.
     squeezed: Vec<f32>,
+}
+
+/// Twists by which loads are compared.
+struct Twists {
+    /// Their [`Table::parts`].
+    parts: Vec<[f32; PARTS]>,
+    /// `R`; for different faces under the pressure of the squeeze. [`f32::MAX`]: not known.
+    reach: f32,
 }
 
 impl<'a> Screen<'a> {
     fn new(records: &'a Records, seeds: &'a SeedSet) -> Self {
         let table = Table::new(&records.header, records.faces(), seeds);
-        let mut screen = Self { records, seeds, table, reach: f32::MAX, squeezed: Vec::new() };
+        let none = || Twists { parts: Vec::new(), reach: f32::MAX };
+        let mut screen =
+            Self { records, seeds, table, few: none(), all: none(), squeezed: Vec::new() };
+        screen.all.parts = screen.table.parts().to_vec();
+        if records.header.resolved == 0 {
+            return screen;
+        }
         let field = screen.field();
         let planes = field.planes(&Loads::new(&[]));
         let [at_i, at_ii] = [planes.at_i[0], planes.at_ii[0]];
         let slope = [planes.slope[0][0], planes.slope[1][0]];
-        let (reach, squeezed) = if records.header.resolved == 0 {
-            (f32::MAX, Vec::new())
-        } else if records.header.faces == 1 {
-            (field.reach([at_i + at_ii]), Vec::new())
+        let (reaches, squeezed) = if records.header.faces == 1 {
+            (screen.reaches([at_i + at_ii]), Vec::new())
         } else {
             let on = |at: f32, sign: f32| {
                 move |edge: &EdgeRecord| {
@@ -169,10 +195,37 @@ impl<'a> Screen<'a> {
                 i.iter().map(on(at_i, 1.0)).chain(ii.iter().map(on(at_ii, -1.0))).collect();
             let pressed = planes.full[0] && squeezed.iter().all(|p| p.is_finite() && *p > 0.0);
             let pressures = [at_i, at_ii, slope[0], slope[1]];
-            (if pressed { field.reach(pressures) } else { f32::MAX }, squeezed)
+            (if pressed { screen.reaches(pressures) } else { [f32::MAX; 2] }, squeezed)
         };
-        (screen.reach, screen.squeezed) = (reach, squeezed);
+        [screen.few.reach, screen.all.reach] = reaches;
+        if screen.few.reach < f32::MAX {
+            let parts = screen.table.parts();
+            screen.few.parts = seeds.half().iter().map(|&(k, _)| parts[k as usize]).collect();
+        }
+        screen.squeezed = squeezed;
         screen
+    }
+
+    /// `R` of a quarter of the twists and of all under a pressure.
+    fn reaches<const PRESSURES: usize>(&self, pressures: [f32; PRESSURES]) -> [f32; 2] {
+        let table = &self.table;
+        let support = |k: usize| table.support(k, pressures);
+        let supports: Vec<[f32; 3]> = (0..self.seeds.len()).map(support).collect();
+        // Twists over their dissipation.
+        let congruent = self.records.header.faces == 1;
+        let over = |n: &[f32; PARTS]| {
+            let d: f32 = pressures.iter().zip(&n[3..]).map(|(p, n)| p * n).sum();
+            let by = if congruent { 1.0 } else { 1.0 / larger(d, LEAST_DISSIPATION) };
+            [n[0] * by, n[1] * by, n[2] * by]
+        };
+        let unit: Vec<[f32; 3]> = table.parts().iter().map(over).collect();
+        let of = |(k, ring): (usize, &[u32; RING])| least_sum(supports[k], &unit, ring);
+        let least = |sums: &mut dyn Iterator<Item = f32>| sums.fold(f32::MAX, smaller);
+        let few = self.seeds.half().iter().map(|(k, ring)| (*k as usize, ring));
+        let all = self.seeds.rings().iter().enumerate();
+        // Nothing is known of no twists.
+        [least(&mut few.map(of)), least(&mut all.map(of))]
+            .map(|least| if least > 0.0 && least < f32::MAX { 3.0 / least } else { f32::MAX })
     }
 
     fn field(&self) -> Field<'_> {
@@ -185,18 +238,18 @@ impl<'a> Screen<'a> {
     }
 
     /// The loads that can be the worst.
-    fn survivors(&self, problem: &Problem<'_>) -> Result<Found> {
+    fn survivors(&self, problem: &Problem<'_>, index: usize) -> Result<Found> {
         let mut bounds = vec![0.0; problem.wrenches.len().next_multiple_of(LANES)];
         let floor = ceilings(self, problem, &mut bounds);
-        let floor = f64::from(floor) * (1.0 - F32_TOLERANCE);
-        let reaches = |ceiling: f32| f64::from(ceiling) * (1.0 + F32_TOLERANCE) >= floor;
         let mut found = Found::new();
         let mut searched: Vec<(usize, f64)> = Vec::new();
         let mut records: Vec<LoadRecord> = Vec::new();
         for (load, wrench) in problem.wrenches.iter().enumerate() {
-            if !reaches(bounds[load]) {
+            if !reaches(bounds[load], floor) {
                 continue;
             }
+            // A number that is not finite leaves a load without a bound.
+            check_load((load, wrench), index)?;
             let seed = match self.records.load(problem, wrench) {
                 Ok((record, scale)) => {
                     searched.push((found.len(), scale));
@@ -214,7 +267,7 @@ impl<'a> Screen<'a> {
         }
         found.retain(|(_, seed)| {
             let bounded = matches!(seed.status, SeedStatus::Bounded | SeedStatus::Coupled);
-            !(bounded && seed.upper < floor)
+            !(bounded && seed.upper < f64::from(floor) * (1.0 - F32_TOLERANCE))
         });
         Ok(found)
     }
@@ -226,17 +279,44 @@ widest! {
     fn ceilings(screen: &Screen<'_>, problem: &Problem<'_>, out: &mut [f32]) -> f32 = ceilings_all
 }
 
+/// Whether a load whose `mu_s` is at most `ceiling` may have that of another one, at least `floor`.
+#[inline(always)]
+fn reaches(ceiling: f32, floor: f32) -> bool {
+    f64::from(ceiling) * (1.0 + F32_TOLERANCE) >= f64::from(floor) * (1.0 - F32_TOLERANCE)
+}
+
 #[inline(always)]
 fn ceilings_all(screen: &Screen<'_>, problem: &Problem<'_>, out: &mut [f32]) -> f32 {
     let field = screen.field();
+    let count = problem.wrenches.len();
+    let mut blocks = Vec::with_capacity(count.div_ceil(LANES));
     let mut floor = 0.0;
+    let mut left: Vec<u32> = Vec::with_capacity(count);
     for (wrenches, out) in problem.wrenches.chunks(LANES).zip(out.chunks_mut(LANES)) {
         let (loads, ordinary) = side_by_side(screen.records, problem, wrenches);
-        let [low, high] = screen.range(&field, &loads);
+        let [low, high] = screen.range(&field, &loads, &screen.few);
         for lane in 0..LANES {
             let known = ordinary[lane] && high[lane] < f32::MAX;
             out[lane] = if known { loads.scale[lane] * high[lane] } else { f32::INFINITY };
             floor = larger(floor, if known { loads.scale[lane] * low[lane] } else { 0.0 });
+        }
+        for lane in 0..wrenches.len() {
+            if ordinary[lane] {
+                left.push((blocks.len() * LANES + lane) as u32);
+            }
+        }
+        blocks.push(loads);
+    }
+    left.retain(|&load| reaches(out[load as usize], floor));
+    for some in left.chunks(LANES) {
+        let loads = Loads::gathered(&blocks, some);
+        let [low, high] = screen.range(&field, &loads, &screen.all);
+        for (lane, &load) in some.iter().enumerate() {
+            if high[lane] < f32::MAX {
+                let most = &mut out[load as usize];
+                *most = smaller(loads.scale[lane] * high[lane], *most);
+                floor = larger(floor, loads.scale[lane] * low[lane]);
+            }
         }
     }
     floor
@@ -293,15 +373,15 @@ impl Screen<'_> {
     /// Bounds on the `mu_s` of unit wrenches without the ring; the upper one is [`f32::MAX`] where
     /// none is known.
     #[inline(always)]
-    fn range(&self, field: &Field<'_>, loads: &Loads) -> [Lanes; 2] {
-        if self.reach == f32::MAX {
+    fn range(&self, field: &Field<'_>, loads: &Loads, twists: &Twists) -> [Lanes; 2] {
+        if twists.reach == f32::MAX {
             return [[0.0; LANES], [f32::MAX; LANES]];
         }
         if field.header.faces == 1 {
-            let low = field.highest(loads);
+            let low = highest(loads, &twists.parts);
             let (mut high, mut mu) = (low, low);
             for lane in 0..LANES {
-                high[lane] *= self.reach;
+                high[lane] *= twists.reach;
                 mu[lane] = loads.scale[lane] * high[lane];
             }
             let pressed = field.surely_pressed(loads, &mu);
@@ -311,12 +391,12 @@ impl Screen<'_> {
             return [low, high];
         }
         let planes = field.planes(loads);
-        let (_, mut low) = field.strongest(loads, &planes);
+        let mut low = strongest_of(loads, &planes, &twists.parts);
         let changes = field.changes(&planes, &self.squeezed);
         let mut high = low;
         for lane in 0..LANES {
             let s = changes[lane];
-            high[lane] *= self.reach * (1.0 + s) / (1.0 - s);
+            high[lane] *= twists.reach * (1.0 + s) / (1.0 - s);
         }
         let shares = field.coupled_share(loads, &planes, &high);
         for lane in 0..LANES {
@@ -328,51 +408,70 @@ impl Screen<'_> {
     }
 }
 
-impl Field<'_> {
-    /// `R` under a pressure: see the head of this file.
-    fn reach<const PRESSURES: usize>(&self, pressures: [f32; PRESSURES]) -> f32 {
-        let congruent = self.header.faces == 1;
-        // Twists over their dissipation.
-        let unit: Vec<[f32; 3]> = self
-            .table
-            .parts()
-            .map(|n| {
-                let d: f32 = pressures.iter().zip(&n[3..]).map(|(p, n)| p * n).sum();
-                let by = if congruent { 1.0 } else { 1.0 / larger(d, LEAST_DISSIPATION) };
-                [n[0] * by, n[1] * by, n[2] * by]
-            })
-            .collect();
-        let mut least = f32::MAX;
-        for (k, ring) in self.rings.iter().enumerate() {
-            let supports = self.table.ring(k).chunks_exact(3 * SLOTS);
-            let mut g = [0.0_f32; 3];
-            for (support, pressure) in supports.zip(pressures) {
-                for m in 0..3 {
-                    g[m] += pressure * support[m * SLOTS + SLOTS - 1];
-                }
-            }
-            let along =
-                ring.map(|entry| sign_of(entry) * dot(g, unit[(entry & !NEGATED) as usize]));
-            for slot in 0..RING {
-                // A corner of the icosahedron has one triangle less.
-                let (one, other) = (along[slot], along[(slot + 1) % RING]);
-                let sum = 1.0 + one + other;
-                least = if one > 0.0 && other > 0.0 { smaller(least, sum) } else { 0.0 };
-                if least == 0.0 {
-                    return f32::MAX;
-                }
-            }
+/// The largest value of each load on congruent faces.
+#[inline(always)]
+fn highest(loads: &Loads, parts: &[[f32; PARTS]]) -> Lanes {
+    let mut value = [0.0_f32; LANES];
+    let w = &loads.wrench;
+    for n in parts {
+        for lane in 0..LANES {
+            let mu = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
+            value[lane] = larger(mu, value[lane]);
         }
-        3.0 / least
     }
+    value
+}
 
+/// The largest value of each load on different faces.
+#[inline(always)]
+fn strongest_of(loads: &Loads, planes: &Planes, parts: &[[f32; PARTS]]) -> Lanes {
+    // The largest of the quotients power / dissipation, without a division for each.
+    let (mut value, mut least) = ([-1.0_f32; LANES], [1.0_f32; LANES]);
+    let w = &loads.wrench;
+    for n in parts {
+        for lane in 0..LANES {
+            let power = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
+            let d = planes.at_i[lane] * n[3]
+                + planes.at_ii[lane] * n[4]
+                + planes.slope[0][lane] * n[5]
+                + planes.slope[1][lane] * n[6];
+            let d = larger(d, LEAST_DISSIPATION);
+            let better = power * least[lane] > value[lane] * d;
+            value[lane] = pick_number(better, power, value[lane]);
+            least[lane] = pick_number(better, d, least[lane]);
+        }
+    }
+    for lane in 0..LANES {
+        value[lane] /= least[lane];
+    }
+    value
+}
+
+/// The least `sum_i (g . v_i / D(v_i))` over the triangles of a ring, `g` the support in its middle
+/// and `unit` the twists over their dissipation; zero where a term is not positive.
+fn least_sum(g: [f32; 3], unit: &[[f32; 3]], ring: &[u32; RING]) -> f32 {
+    let along = ring.map(|entry| sign_of(entry) * dot(g, unit[(entry & !NEGATED) as usize]));
+    let mut least = f32::MAX;
+    for slot in 0..RING {
+        // A corner of the icosahedron has one triangle less.
+        let (one, other) = (along[slot], along[(slot + 1) % RING]);
+        let sum = 1.0 + one + other;
+        least = if one > 0.0 && other > 0.0 { smaller(least, sum) } else { 0.0 };
+        if least == 0.0 {
+            break;
+        }
+    }
+    least
+}
+
+impl Field<'_> {
     /// The best twist of each load and its value.
     #[inline(always)]
     pub(super) fn strongest(&self, loads: &Loads, planes: &Planes) -> ([u32; LANES], Lanes) {
         let (mut best, mut value) = ([0_u32; LANES], [-1.0_f32; LANES]);
         let w = &loads.wrench;
         if self.header.faces == 1 {
-            for (k, n) in self.table.parts().enumerate() {
+            for (k, n) in self.table.parts().iter().enumerate() {
                 for lane in 0..LANES {
                     let mu = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
                     let better = mu > value[lane];
@@ -384,7 +483,7 @@ impl Field<'_> {
         }
         // The largest of the quotients power / dissipation, without a division for each.
         let mut least = [1.0_f32; LANES];
-        for (k, n) in self.table.parts().enumerate() {
+        for (k, n) in self.table.parts().iter().enumerate() {
             for lane in 0..LANES {
                 let power = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
                 let d = planes.at_i[lane] * n[3]
@@ -402,20 +501,6 @@ impl Field<'_> {
             value[lane] /= least[lane];
         }
         (best, value)
-    }
-
-    /// The largest value of each load on congruent faces.
-    #[inline(always)]
-    fn highest(&self, loads: &Loads) -> Lanes {
-        let mut value = [0.0_f32; LANES];
-        let w = &loads.wrench;
-        for n in self.table.parts() {
-            for lane in 0..LANES {
-                let mu = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
-                value[lane] = larger(mu, value[lane]);
-            }
-        }
-        value
     }
 
     /// Whether congruent faces stay in full contact whatever the twist, with the margins of the

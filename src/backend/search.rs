@@ -18,7 +18,7 @@ pub(crate) struct Field<'a> {
     pub(crate) header: &'a ContactHeader,
     /// This contact's edges: face I's, then face II's.
     pub(crate) edges: [&'a [EdgeRecord]; 2],
-    pub(crate) table: &'a Table,
+    pub(crate) table: &'a Table<'a>,
     pub(crate) rings: &'a [[u32; RING]],
 }
 

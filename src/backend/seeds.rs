@@ -24,6 +24,9 @@ pub struct SeedSet {
     frequency: u32,
     twists: Vec<[f32; 4]>,
     rings: Vec<[u32; RING]>,
+    /// The set of half the frequency within this one, where there is one: each of its twists with
+    /// its ring, by the indices of this set.
+    half: Vec<(u32, [u32; RING])>,
 }
 
 impl SeedSet {
@@ -93,6 +96,12 @@ impl SeedSet {
         &self.rings
     }
 
+    /// The set of half the frequency, a quarter as many twists: index and ring of each in this set.
+    /// Empty for an odd frequency.
+    pub(super) fn half(&self) -> &[(u32, [u32; RING])] {
+        &self.half
+    }
+
     fn build(frequency: u32) -> Self {
         let (points, triangles) = geodesic_sphere(frequency);
         let index_of: HashMap<[i64; 3], usize> =
@@ -108,23 +117,22 @@ impl SeedSet {
                 entry[opposite] = position as u32 | NEGATED;
             }
         }
-        // For vertex a of triangle (a, b, c): b is followed by c in the ring of a.
-        let mut followers: Vec<Vec<(usize, usize)>> = vec![Vec::new(); points.len()];
-        for &[a, b, c] in &triangles {
-            followers[a].push((b, c));
-            followers[b].push((c, a));
-            followers[c].push((a, b));
-        }
-        let rings = kept
+        let followers = followers(points.len(), &triangles);
+        let rings: Vec<_> = kept
             .iter()
             .map(|&vertex| ring(&followers[vertex]).map(|neighbour| entry[neighbour]))
             .collect();
+        let half = if frequency.is_multiple_of(2) {
+            within(frequency / 2, |point| index_of.get(&key(point)).map(|&i| entry[i]))
+        } else {
+            Vec::new()
+        };
         let twists = kept
             .iter()
             .map(|&vertex| points[vertex].map(|x| x as f32))
             .map(|[x, y, z]| [x, y, z, 0.0])
             .collect();
-        Self { frequency, twists, rings }
+        Self { frequency, twists, rings, half }
     }
 }
 
@@ -138,6 +146,34 @@ impl Default for SeedSet {
 /// `u1`.
 fn is_representative([x, y, z]: [f64; 3]) -> bool {
     z > 0.0 || z == 0.0 && (y > 0.0 || y == 0.0 && x > 0.0)
+}
+
+/// The twists and rings of the set with this frequency by the entries that its points have in
+/// another one; nothing if one of them is not found there.
+fn within(frequency: u32, entry: impl Fn([f64; 3]) -> Option<u32>) -> Vec<(u32, [u32; RING])> {
+    let (points, triangles) = geodesic_sphere(frequency);
+    let Some(entries) = points.iter().map(|&point| entry(point)).collect::<Option<Vec<u32>>>()
+    else {
+        return Vec::new();
+    };
+    let followers = followers(points.len(), &triangles);
+    let ours = (0..points.len()).filter(|&vertex| entries[vertex] & NEGATED == 0);
+    ours.map(|vertex| {
+        (entries[vertex], ring(&followers[vertex]).map(|neighbour| entries[neighbour]))
+    })
+    .collect()
+}
+
+/// The pairs (neighbour, next neighbour) of each of so many vertices, counter-clockwise.
+fn followers(vertices: usize, triangles: &[[usize; 3]]) -> Vec<Vec<(usize, usize)>> {
+    // For vertex a of triangle (a, b, c): b is followed by c in the ring of a.
+    let mut followers: Vec<Vec<(usize, usize)>> = vec![Vec::new(); vertices];
+    for &[a, b, c] in triangles {
+        followers[a].push((b, c));
+        followers[b].push((c, a));
+        followers[c].push((a, b));
+    }
+    followers
 }
 
 /// Neighbours in cyclic order from the pairs (neighbour, next neighbour).
@@ -206,6 +242,31 @@ mod tests {
             assert_eq!(set.twists()[0], [0.0, 0.0, 1.0, 0.0]);
             assert!(set.twists().iter().filter(|v| v[2] == 0.0).count() >= 2 * frequency as usize);
         }
+    }
+
+    #[test]
+    fn a_set_of_even_frequency_holds_that_of_half_of_it() {
+        for frequency in [2, 4, 8, 12, 64] {
+            let set = SeedSet::new(frequency).unwrap();
+            let half = SeedSet::new(frequency / 2).unwrap();
+            let twist = |entry: u32| {
+                let sign = if entry & NEGATED != 0 { -1.0 } else { 1.0 };
+                glam::Vec4::from(set.twists()[(entry & !NEGATED) as usize]) * sign
+            };
+            assert_eq!(set.half().len(), half.len(), "frequency {frequency}");
+            for (k, ring) in set.half() {
+                let is = |twist: glam::Vec4| {
+                    move |other: &[f32; 4]| glam::Vec4::from(*other).distance(twist) < 1e-6
+                };
+                let place = half.twists().iter().position(is(twist(*k))).unwrap();
+                for neighbour in half.rings()[place] {
+                    let other = glam::Vec4::from(half.twists()[(neighbour & !NEGATED) as usize]);
+                    let other = if neighbour & NEGATED != 0 { -other } else { other };
+                    assert!(ring.iter().any(|&entry| twist(entry).distance(other) < 1e-6));
+                }
+            }
+        }
+        assert!(SeedSet::new(3).unwrap().half().is_empty());
     }
 
     #[test]

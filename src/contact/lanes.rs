@@ -67,6 +67,18 @@ macro_rules! widest {
         #[allow(unsafe_code, reason = "measured: twice as fast; sound because the processor was asked for the instructions")]
         $vis fn $name($($argument: $type),*) -> $out {
             #[cfg(target_arch = "x86_64")]
+            if std::arch::is_x86_feature_detected!("avx512f")
+                && std::arch::is_x86_feature_detected!("avx512dq")
+                && std::arch::is_x86_feature_detected!("avx512vl")
+            {
+                #[target_feature(enable = "avx512f,avx512dq,avx512vl")]
+                fn widest($($argument: $type),*) -> $out {
+                    $kernel($($argument),*)
+                }
+                // SAFETY: the processor has these parts of AVX-512.
+                return unsafe { widest($($argument),*) };
+            }
+            #[cfg(target_arch = "x86_64")]
             if std::arch::is_x86_feature_detected!("avx2") {
                 #[target_feature(enable = "avx2")]
                 fn wide($($argument: $type),*) -> $out {
