@@ -1,11 +1,13 @@
 //! The worst load of one grip, found with as few loads solved as bounds allow: loads without bounds
 //! get some from Newton's first steps, and only those that can be the worst are solved.
 
+use std::collections::HashMap;
+
 use super::problem::{F32_TOLERANCE, SeedStatus};
 use super::score::{Case, Scored, TIE, usable};
-use crate::contact::{Field, PlaneWrench};
+use crate::contact::{Field, PlaneWrench, Twist};
 use crate::mechanics::{
-    Comparer, Comparison, Load, Neighbour, Pads, Question, Search, slip, solve_next,
+    Comparer, Comparison, Load, Neighbour, Pads, Question, Search, abreast, slip, solve_next,
 };
 use crate::model::Score;
 use crate::request::Refiner;
@@ -41,6 +43,9 @@ impl Open {
 /// Bounds on a load's `mu_s` need not be closer together than this share: those of the loads that
 /// follow the worst lie farther apart.
 const SHARP: f64 = 2e-4;
+
+/// Loads with bounds from which on closer ones are made of several at a time.
+const MANY: usize = 3;
 
 /// What one more load came to.
 enum Compared {
@@ -207,8 +212,14 @@ impl Work<'_> {
         let case = self.case;
         let floor = self.open.floor.max(self.open.largest);
         bounded.retain(|&load| case.seeds[load].upper >= floor);
-        bounded
-            .sort_by(|&a, &b| case.seeds[b].upper.total_cmp(&case.seeds[a].upper).then(a.cmp(&b)));
+        let close = self.close_bounds(&bounded);
+        let upper = |load: usize| {
+            close.get(&load).copied().unwrap_or(f64::INFINITY).min(case.seeds[load].upper)
+        };
+        let (all, value) = (bounded.len(), self.open.value());
+        bounded.retain(|&load| upper(load) >= value);
+        self.compared += all - bounded.len();
+        bounded.sort_by(|&a, &b| upper(b).total_cmp(&upper(a)).then(a.cmp(&b)));
         let mut slips: Vec<(usize, f64)> = Vec::new();
         // Ties with the largest are solved too, so that the first of them is found.
         // Congruent to rounding, not only to the single precision of the part's file.
@@ -216,13 +227,16 @@ impl Work<'_> {
         let margin = if exact { 2.0 * TIE } else { F32_TOLERANCE };
         let mut largest = self.open.largest;
         for load in bounded {
-            if case.seeds[load].upper < largest * (1.0 - margin) {
+            if upper(load) < largest * (1.0 - margin) {
                 break;
             }
             if let (SeedStatus::Bounded, Some(pads)) = (case.seeds[load].status, case.pads) {
                 let mu = slip_only(pads, case, load);
                 largest = largest.max(mu);
                 slips.push((load, mu));
+            } else if let Some(&most) = close.get(&load) {
+                self.compared += 1;
+                self.open.loads.push((load, most));
             } else if self.look(load).is_err() {
                 // No other load is farther from being held.
                 largest = f64::INFINITY;
@@ -251,6 +265,34 @@ impl Work<'_> {
             }
         }
         Ok(())
+    }
+
+    /// What the `mu_s` of loads on different faces is at most, by Newton's steps on several of them
+    /// side by side, where that succeeds; the largest is then known to be at least some value. On
+    /// congruent faces the slip alone costs no more.
+    fn close_bounds(&mut self, bounded: &[usize]) -> HashMap<usize, f64> {
+        let case = self.case;
+        let (Some(pads), Refiner::Newton) = (case.pads, case.options.refiner) else {
+            return HashMap::new();
+        };
+        let coupled = |load: &&usize| case.seeds[**load].status == SeedStatus::Coupled;
+        let coupled: Vec<usize> = bounded.iter().filter(coupled).copied().collect();
+        if coupled.len() < MANY {
+            return HashMap::new();
+        }
+        let ready = |&load: &usize| {
+            let scaled = pads.load(case.problem.distance, case.problem.force, case.wrench(load));
+            (scaled, pads.scaled_twist(case.seeds[load].twist))
+        };
+        let loads: Vec<(Load, Twist)> = coupled.iter().map(ready).collect();
+        let found = coupled.into_iter().zip(abreast::bounds(pads, &loads));
+        let known = found.filter_map(|(load, bounds)| Some((load, bounds?)));
+        known
+            .map(|(load, [least, most])| {
+                self.open.floor = self.open.floor.max(least);
+                (load, most)
+            })
+            .collect()
     }
 
     /// What is asked about a load's `mu_s`, or what it is.

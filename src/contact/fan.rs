@@ -50,68 +50,154 @@ widest! {
 }
 
 #[inline(always)]
-fn sums_of(edges: &[Block], Centre { c, p: [pc, p1, p2] }: Centre) -> Sums {
+fn sums_of(edges: &[Block], Centre { c, p }: Centre) -> Sums {
     let mut lanes = [[0.0; LANES]; 11];
     for edge in edges {
         for i in 0..LANES {
-            let (t1, t2, l) = (edge.t1[i], edge.t2[i], edge.length[i]);
-            let (ax, ay) = (edge.ax[i] - c.x, edge.ay[i] - c.y);
-            let (bx, by) = (edge.bx[i] - c.x, edge.by[i] - c.y);
-            let (r1, r2) = ((ax * ax + ay * ay).sqrt(), (bx * bx + by * by).sqrt());
-            let h = ax * t2 - ay * t1;
-            let (s1, s2) = (t1 * ax + t2 * ay, t1 * bx + t2 * by);
-            // With a vertex at the slip centre `h` is zero but for rounding.
-            let product = r1 * r2;
-            let counts = !((h.abs() < H_MIN) | (product == 0.0));
-            let h = if counts { h } else { 0.0 };
-            let product = if counts { product } else { 1.0 };
-            let hh = h * h;
-            let dr = l * (s1 + s2) / if counts { r1 + r2 } else { 1.0 };
-            // Both forms of the logarithm are free of cancellation on their side.
-            let astride = (s1 < 0.0) & (s2 > 0.0);
-            let (q1, q2) = (s1.abs() + r1, s2.abs() + r2);
-            let nearer = if q1 < q2 { q1 } else { q2 };
-            let numerator = if astride { q1 * q2 } else { nearer + (l + dr.abs()) };
-            let denominator = if astride { hh } else { nearer };
-            let log = ln_ratio(
-                if counts { numerator } else { 1.0 },
-                if counts { denominator } else { 1.0 },
-            );
-            let inverse = 1.0 / product;
-            let inv = -dr * inverse;
-            let ds = (s2 * r1 - s1 * r2) * inverse;
-            let sr = s2 * r2 - s1 * r1;
-            let (x, y, z) = (hh * log, h * dr, h * inv);
-            let (j2, r0) = (0.5 * (sr - x), 0.5 * (sr + x));
-            let big_r1 = dr * (r1 * r1 + product + r2 * r2) * (1.0 / 3.0);
-            let (k2, k3) = (log - ds, dr + hh * inv);
-            let (tt11, tt12, tt22) = (t1 * t1, t1 * t2, t2 * t2);
-            let (half, third, quarter) = (0.5 * h, h * (1.0 / 3.0), 0.25 * h);
-
-            let hl = h * log;
-            lanes[0][i] += half * (hl * t2 + dr * t1);
-            lanes[1][i] += half * (dr * t2 - hl * t1);
-            let both = 2.0 * tt12 * y;
-            lanes[2][i] += third * (x * tt22 + both + j2 * tt11);
-            lanes[3][i] += third * (tt12 * (j2 - x) + y * (tt22 - tt11));
-            lanes[4][i] += third * (x * tt11 - both + j2 * tt22);
-            lanes[5][i] += third * r0;
-            let hr = h * r0;
-            lanes[6][i] += quarter * (hr * t2 + big_r1 * t1);
-            lanes[7][i] += quarter * (big_r1 * t2 - hr * t1);
-            // The pressure's weight at once, along `n` and `t`: `nn`, `nt + tn`, `tt`.
-            let (pn, pt) = (p1 * t2 - p2 * t1, p1 * t1 + p2 * t2);
-            let nn = h * (pc * ds + half * (pn * ds - pt * z));
-            let nt = h * (half * (pt * k2 - pn * z) - pc * z);
-            let tt = h * pc * k2 + half * (h * pn * k2 + pt * k3);
-            let both = 2.0 * tt12 * nt;
-            lanes[8][i] += nn * tt22 + both + tt * tt11;
-            lanes[9][i] += tt12 * (tt - nn) + nt * (tt22 - tt11);
-            lanes[10][i] += nn * tt11 - both + tt * tt22;
+            let a = [edge.ax[i] - c.x, edge.ay[i] - c.y];
+            let b = [edge.bx[i] - c.x, edge.by[i] - c.y];
+            let terms = of_edge([edge.t1[i], edge.t2[i], edge.length[i]], a, b, p);
+            for (sum, term) in lanes.iter_mut().zip(terms) {
+                sum[i] += term;
+            }
         }
     }
     let [e1, e2, ye11, ye12, ye22, r, yr1, yr2, q11, q12, q22] = lanes.each_ref().map(total);
     Sums { e: [e1, e2], ye: [ye11, ye12, ye22], r, yr: [yr1, yr2], q: [q11, q12, q22] }
+}
+
+/// What an edge with unit tangent `t` and length `l` from `a` to `b`, seen from the slip centre, adds
+/// to [`Sums`], in their order; the pressure is that of [`Centre`].
+#[inline(always)]
+fn of_edge(
+    [t1, t2, l]: [f64; 3],
+    [ax, ay]: [f64; 2],
+    [bx, by]: [f64; 2],
+    [pc, p1, p2]: [f64; 3],
+) -> [f64; 11] {
+    let (r1, r2) = ((ax * ax + ay * ay).sqrt(), (bx * bx + by * by).sqrt());
+    let h = ax * t2 - ay * t1;
+    let (s1, s2) = (t1 * ax + t2 * ay, t1 * bx + t2 * by);
+    // With a vertex at the slip centre `h` is zero but for rounding.
+    let product = r1 * r2;
+    let counts = !((h.abs() < H_MIN) | (product == 0.0));
+    let h = if counts { h } else { 0.0 };
+    let product = if counts { product } else { 1.0 };
+    let hh = h * h;
+    let dr = l * (s1 + s2) / if counts { r1 + r2 } else { 1.0 };
+    // Both forms of the logarithm are free of cancellation on their side.
+    let astride = (s1 < 0.0) & (s2 > 0.0);
+    let (q1, q2) = (s1.abs() + r1, s2.abs() + r2);
+    let nearer = if q1 < q2 { q1 } else { q2 };
+    let numerator = if astride { q1 * q2 } else { nearer + (l + dr.abs()) };
+    let denominator = if astride { hh } else { nearer };
+    let log =
+        ln_ratio(if counts { numerator } else { 1.0 }, if counts { denominator } else { 1.0 });
+    let inverse = 1.0 / product;
+    let inv = -dr * inverse;
+    let ds = (s2 * r1 - s1 * r2) * inverse;
+    let sr = s2 * r2 - s1 * r1;
+    let (x, y, z) = (hh * log, h * dr, h * inv);
+    let (j2, r0) = (0.5 * (sr - x), 0.5 * (sr + x));
+    let big_r1 = dr * (r1 * r1 + product + r2 * r2) * (1.0 / 3.0);
+    let (k2, k3) = (log - ds, dr + hh * inv);
+    let (tt11, tt12, tt22) = (t1 * t1, t1 * t2, t2 * t2);
+    let (half, third, quarter) = (0.5 * h, h * (1.0 / 3.0), 0.25 * h);
+
+    let hl = h * log;
+    let both = 2.0 * tt12 * y;
+    let ye = [
+        third * (x * tt22 + both + j2 * tt11),
+        third * (tt12 * (j2 - x) + y * (tt22 - tt11)),
+        third * (x * tt11 - both + j2 * tt22),
+    ];
+    let hr = h * r0;
+    // The pressure's weight at once, along `n` and `t`: `nn`, `nt + tn`, `tt`.
+    let (pn, pt) = (p1 * t2 - p2 * t1, p1 * t1 + p2 * t2);
+    let nn = h * (pc * ds + half * (pn * ds - pt * z));
+    let nt = h * (half * (pt * k2 - pn * z) - pc * z);
+    let tt = h * pc * k2 + half * (h * pn * k2 + pt * k3);
+    let both = 2.0 * tt12 * nt;
+    [
+        half * (hl * t2 + dr * t1),
+        half * (dr * t2 - hl * t1),
+        ye[0],
+        ye[1],
+        ye[2],
+        third * r0,
+        quarter * (hr * t2 + big_r1 * t1),
+        quarter * (big_r1 * t2 - hr * t1),
+        nn * tt22 + both + tt * tt11,
+        tt12 * (tt - nn) + nt * (tt22 - tt11),
+        nn * tt11 - both + tt * tt22,
+    ]
+}
+
+/// Twists side by side.
+pub(crate) const ABREAST: usize = 8;
+
+/// A number of each.
+pub(crate) type Abreast = [f64; ABREAST];
+
+/// [`Friction`] of one area under several twists: `g` by weight and component, the Hessian's 11, 12,
+/// 13, 22, 23, 33.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Frictions {
+    pub(crate) g: [[Abreast; 3]; 3],
+    pub(crate) hessian: [Abreast; 6],
+}
+
+/// The integrals of an area under some twists `v`, each with its own pressure `p`, by the closed
+/// forms: none may be a translation, and what cancels between the edges grows with the square of the
+/// slip centre's distance.
+#[inline(always)]
+pub(crate) fn frictions(area: &Loops, v: &[Abreast; 3], p: &[Abreast; 3]) -> Frictions {
+    let zero = [0.0; ABREAST];
+    let (mut c, mut at) = ([zero; 2], zero);
+    for i in 0..ABREAST {
+        (c[0][i], c[1][i]) = (-v[1][i] / v[2][i], v[0][i] / v[2][i]);
+        at[i] = p[0][i] + p[1][i] * c[0][i] + p[2][i] * c[1][i];
+    }
+    let mut sums = [zero; 11];
+    for block in area.blocks() {
+        for e in 0..LANES {
+            if block.length[e] == 0.0 {
+                continue;
+            }
+            let along = [block.t1[e], block.t2[e], block.length[e]];
+            for i in 0..ABREAST {
+                let a = [block.ax[e] - c[0][i], block.ay[e] - c[1][i]];
+                let b = [block.bx[e] - c[0][i], block.by[e] - c[1][i]];
+                let terms = of_edge(along, a, b, [at[i], p[1][i], p[2][i]]);
+                for (sum, term) in sums.iter_mut().zip(terms) {
+                    sum[i] += term;
+                }
+            }
+        }
+    }
+    let mut out = Frictions { g: [[zero; 3]; 3], hessian: [zero; 6] };
+    for i in 0..ABREAST {
+        let (c1, c2, omega) = (c[0][i], c[1][i], v[2][i]);
+        let sign = 1.0_f64.copysign(omega);
+        let s = |m: usize| sums[m][i];
+        let row =
+            |e1: f64, e2: f64, r: f64| [-sign * e2, sign * e1, sign * (c1 * e1 + c2 * e2 + r)];
+        let g0 = row(s(0), s(1), s(5));
+        let (g1, g2) = (row(s(2), s(3), s(6)), row(s(3), s(4), s(7)));
+        for m in 0..3 {
+            out.g[0][m][i] = g0[m];
+            out.g[1][m][i] = c1 * g0[m] + g1[m];
+            out.g[2][m][i] = c2 * g0[m] + g2[m];
+        }
+        let scale = 1.0 / omega.abs();
+        let (h11, h12, h22) = (scale * s(8), scale * s(9), scale * s(10));
+        let (h13, h23) = (-c2 * h11 + c1 * h12, -c2 * h12 + c1 * h22);
+        let h33 = -c2 * h13 + c1 * h23;
+        for (m, h) in [h11, h12, h13, h22, h23, h33].into_iter().enumerate() {
+            out.hessian[m][i] = h;
+        }
+    }
+    out
 }
 
 /// Coefficients of `(atanh(s)/s - 1)/s^2` in powers of `s^2` up to `s = 1/3`: interpolated at the

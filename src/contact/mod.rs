@@ -22,6 +22,7 @@ pub mod quadric;
 pub mod surface;
 mod thin;
 
+pub(crate) use fan::{ABREAST, Abreast, Frictions, frictions};
 pub use far::FAR;
 pub use field::{Field, Friction, PlaneWrench, Twist};
 pub use friction::friction;

@@ -162,9 +162,9 @@ pub(crate) enum Comparison {
 }
 
 /// Ratio of two corrections up to which Newton's method converges for certain.
-const CONTRACTION: f64 = 0.25;
+pub(super) const CONTRACTION: f64 = 0.25;
 /// Growth of the last correction that bounds the way to the solution.
-const WITHIN: f64 = 2.0;
+pub(super) const WITHIN: f64 = 2.0;
 /// Corrections after the first.
 const CORRECTIONS: u32 = 6;
 

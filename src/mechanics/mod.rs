@@ -2,6 +2,7 @@
 //!
 //! [`solve`] answers one case; [`Pads`] keeps what a contact determines for many loads.
 
+pub(crate) mod abreast;
 mod branch;
 mod compare;
 pub mod curved;
