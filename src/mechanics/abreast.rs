@@ -197,19 +197,7 @@ impl Equations {
             let (g, d) = ([self.g[0][i], self.g[1][i], self.g[2][i]], self.d[i]);
             // The slip's rows: `a dv = right`, for each unit of what is on the right.
             let a = |m: usize, n: usize| g[m] * g[n] + d * self.sum[AT[m][n]][i];
-            let (a11, a21, a31) = (a(0, 0), a(1, 0), a(2, 0));
-            let (l21, l31) = (a21 / a11, a31 / a11);
-            let d2 = a(1, 1) - l21 * a21;
-            let e32 = a(2, 1) - l31 * a21;
-            let l32 = e32 / d2;
-            let d3 = a(2, 2) - l31 * a31 - l32 * e32;
-            let turn = |b: [f64; 3]| {
-                let y2 = b[1] - l21 * b[0];
-                let y3 = b[2] - l31 * b[0] - l32 * y2;
-                let x3 = y3 / d3;
-                let x2 = y2 / d2 - l32 * x3;
-                [b[0] / a11 - l21 * x2 - l31 * x3, x2, x3]
-            };
+            let slip = Definite::new([a(0, 0), a(1, 0), a(2, 0), a(1, 1), a(2, 1), a(2, 2)]);
             let lever = loads.half_distance[i] * loads.size[i];
             // Columns of the pressure in the slip's rows and in those of the moments, these by the
             // twist too.
@@ -243,9 +231,8 @@ impl Equations {
                         c[2 + s][m] + c[0][m] * by_slope[0][s] + c[1][m] * by_slope[1][s];
                 }
             }
-            let known = turn(right[0]);
-            let turned = [turn(right[1]), turn(right[2])];
-            let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+            let known = slip.solve(right[0]);
+            let turned = [slip.solve(right[1]), slip.solve(right[2])];
             let entry = |row: usize, s: usize| {
                 dot(row_v[row], turned[s])
                     + row_q[row][2 + s]
@@ -318,6 +305,40 @@ impl Equations {
         }
         pressed
     }
+}
+
+/// A definite matrix, taken apart: `L D L^T`.
+struct Definite {
+    d: [f64; 3],
+    l21: f64,
+    l31: f64,
+    l32: f64,
+}
+
+impl Definite {
+    /// From its entries 11, 21, 31, 22, 32, 33.
+    #[inline(always)]
+    fn new([a11, a21, a31, a22, a32, a33]: [f64; 6]) -> Self {
+        let (l21, l31) = (a21 / a11, a31 / a11);
+        let d2 = a22 - l21 * a21;
+        let e32 = a32 - l31 * a21;
+        let l32 = e32 / d2;
+        Self { d: [a11, d2, a33 - l31 * a31 - l32 * e32], l21, l31, l32 }
+    }
+
+    #[inline(always)]
+    fn solve(&self, b: [f64; 3]) -> [f64; 3] {
+        let y2 = b[1] - self.l21 * b[0];
+        let y3 = b[2] - self.l31 * b[0] - self.l32 * y2;
+        let x3 = y3 / self.d[2];
+        let x2 = y2 / self.d[1] - self.l32 * x3;
+        [b[0] / self.d[0] - self.l21 * x2 - self.l31 * x3, x2, x3]
+    }
+}
+
+#[inline(always)]
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// [`super::pressure::stiffness`] of the whole areas, by rows.
