@@ -199,8 +199,7 @@ impl Equations {
             let a = |m: usize, n: usize| g[m] * g[n] + d * self.sum[AT[m][n]][i];
             let slip = Definite::new([a(0, 0), a(1, 0), a(2, 0), a(1, 1), a(2, 1), a(2, 2)]);
             let lever = loads.half_distance[i] * loads.size[i];
-            // Columns of the pressure in the slip's rows and in those of the moments, these by the
-            // twist too.
+            // The slip's rows by the pressure; those of the moments by twist and pressure.
             let (x, y) = (self.difference[0][i], self.difference[1][i]);
             let (mut c, mut row_v, mut row_q) = ([[0.0; 3]; 4], [[0.0; 3]; 2], [[0.0; 4]; 2]);
             for m in 0..3 {
@@ -246,8 +245,7 @@ impl Equations {
                     - row_q[row][1] * base[1]
             };
             let (m11, m12, m21, m22) = (entry(0, 0), entry(0, 1), entry(1, 0), entry(1, 1));
-            let (b1, b2) = (right(0), right(1));
-            let inverse = 1.0 / (m11 * m22 - m12 * m21);
+            let (inverse, b1, b2) = (1.0 / (m11 * m22 - m12 * m21), right(0), right(1));
             let tilt = [(b1 * m22 - m12 * b2) * inverse, (m11 * b2 - b1 * m21) * inverse];
             for m in 0..3 {
                 step[m][i] = known[m] + turned[0][m] * tilt[0] + turned[1][m] * tilt[1];
