@@ -436,7 +436,8 @@ mod tests {
     use glam::{DVec2, DVec3};
 
     fn octagon(turn: f64, size: impl Fn(usize) -> f64) -> Vec<Polygon> {
-        let corner = |i: usize| size(i) * DVec2::from_angle(turn + 0.785_398 * i as f64);
+        let corner =
+            |i: usize| size(i) * DVec2::from_angle(turn + std::f64::consts::FRAC_PI_4 * i as f64);
         vec![Polygon { outer: (0..8).map(corner).collect(), holes: Vec::new() }]
     }
 
