@@ -432,7 +432,7 @@ fn norm(residual: &[Abreast; 7], i: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::mechanics::{Options, solve_pads};
-    use crate::model::{Contact, Polygon, Status, Wrench};
+    use crate::model::{Contact, Polygon, Slip, Status, Wrench};
     use glam::{DVec2, DVec3};
 
     fn octagon(turn: f64, size: impl Fn(usize) -> f64) -> Vec<Polygon> {
@@ -476,5 +476,42 @@ mod tests {
         }
         // Newton's method contracts at once from a third of these far starts.
         assert!(close > 20, "{close} of 61 loads have close bounds");
+    }
+    /// Loads that lift a pad somewhere have no bounds here, however near the start; those that press
+    /// both wholly have.
+    #[test]
+    fn a_load_that_lifts_a_pad_has_no_bounds() {
+        let contact = Contact {
+            face_i: octagon(0.1, |i| 0.01 + 0.001 * (i % 3) as f64),
+            face_ii: octagon(0.4, |i| 0.011 - 0.0013 * (i % 2) as f64),
+        };
+        let (pads, force, distance) = (Pads::new(&contact).unwrap(), 40.0, 0.02);
+        let areas =
+            [&contact.face_i, &contact.face_ii].map(|face| crate::geometry::patch_area(face));
+        let (mut lifted, mut bounded) = (0, 0);
+        for i in 0..80 {
+            let t = 0.37 * i as f64;
+            let size = 0.01 * (1 + i % 40) as f64;
+            let wrench = Wrench {
+                force: 4.0 * DVec3::new(t.cos(), (1.7 * t).sin(), 0.0),
+                moment: DVec3::new(size * t.sin(), size * t.cos(), 0.05),
+            };
+            let score = solve_pads(&pads, distance, force, &wrench, &Options::default());
+            let Some(Slip::Rotation { c, sense }) = score.slip else { continue };
+            let load = pads.load(distance, force, &wrench);
+            // At the solution itself.
+            let turn = Twist::about((DVec2::from(c) - pads.origin) / pads.length);
+            let sense = f64::from(sense);
+            let twist = Twist { u1: sense * turn.u1, u2: sense * turn.u2, omega: sense };
+            let found = bounds(&pads, &[(load, twist)])[0];
+            let left = [score.contact_area_i, score.contact_area_ii];
+            if left.iter().zip(areas).any(|(left, whole)| *left < whole * (1.0 - 1e-6)) {
+                assert_eq!(found, None, "{left:?} of {areas:?}");
+                lifted += 1;
+            } else {
+                bounded += usize::from(found.is_some());
+            }
+        }
+        assert!(lifted > 20 && bounded > 5, "{lifted} lift, {bounded} have bounds");
     }
 }
