@@ -488,6 +488,7 @@ mod tests {
 
     /// Every flag that is a field, with a value that is not its default.
     const LINE: &str = "gripfast plan part.stl --gripper my.toml --mass 350g --force 40N --unit in --max-memory 2GB --outside-buffers \
+        --faceted \
         --accel 2g --loads gravity,ball:3 --spacing 2mm --angle-step 7deg --edge-angles false --curved \
         --min-contact 0.3 --min-pad-share 0.1 --max-offset 9mm --approach -z:45deg --ground +z:1mm \
         --keep-out 0mm,0mm,0mm:1mm,1mm,1mm --scene cell.toml --faces 0,2 --faces-in 0mm,0mm,0mm:1mm,1mm,1mm \
