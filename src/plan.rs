@@ -54,7 +54,7 @@ use crate::model::Negative;
 use crate::part::{MassProperties, Part, Symmetry};
 use crate::propose::{Explanation, ProposeOptions, Proposer};
 use crate::rank;
-use crate::request::{Choice, Polish, Request};
+use crate::request::{Choice, KEEP, Polish, Request};
 use crate::results::{GripSet, LoadCase, PartSummary, Provenance, RankedGrip, Resolved, Summary};
 use crate::units::{Force, Length};
 use noise::Noise;
@@ -68,9 +68,6 @@ pub use negatives::near_misses;
 pub use output::{GLB_TOP, WHOLE, solve_every_load};
 pub use outside::{Assessed, Assessment, Standing, explain};
 pub use prepare::{PlanBuilder, most_threads};
-
-/// Most grips kept so that enough are left when one is shown for all turns of a part.
-const MOST_TURNED: usize = 10_000;
 
 /// The main job, ready to run.
 #[derive(Debug)]
@@ -450,7 +447,7 @@ impl Plan {
             return kept;
         }
         let turns = std::f64::consts::TAU / self.propose.angle_step;
-        kept.max((selection.top as f64 * turns).ceil() as usize).min(kept.max(MOST_TURNED))
+        kept.max(((selection.top as f64 * turns).ceil() as usize).min(KEEP))
     }
 
     /// The grips for the list: all, or as many that differ as the request wants to keep.

@@ -108,10 +108,11 @@ pub struct Ranking {
 /// Scores and orders `grips`; their `rank`, `score` and `holds` are set here. `centre_of_mass` and `size`
 /// (the diagonal of the bounding box) are the part's \[m\], in the part frame.
 ///
-/// Grips that hold come first, then those that slip, and both in the order of falling score. Among scores within [`TIE`] of each other the grip nearest to
-/// the centre of mass comes first, then the one whose contacts are more symmetric about the plane in
-/// which the jaws close and more alike, then the lower id. The order depends neither on that in which
-/// the grips come nor on differences below [`TIE`].
+/// Grips that hold come first, then those that slip, and both in the order of falling score. Among
+/// scores within [`TIE`] of each other the grip nearest to the centre of mass comes first, then the
+/// one whose contacts are more symmetric about the plane in which the jaws close and more alike, then
+/// the lower id. The order depends neither on that in which the grips come nor on differences below
+/// [`TIE`].
 pub fn rank(
     grips: Vec<RankedGrip>,
     centre_of_mass: DVec3,
@@ -300,6 +301,36 @@ impl Families {
     }
 }
 
+/// Sorts grips in order into families of those that a symmetry of the part maps to each other, that
+/// exchanging the jaws does, or, whatever they score, a turn about the axis of a round part.
+struct Alike {
+    centre_of_mass: DVec3,
+    equal: Families,
+    turns: Option<Turns>,
+    /// The family of each family of turns.
+    of_turns: Vec<usize>,
+}
+
+impl Alike {
+    fn new(centre_of_mass: DVec3, symmetry: Option<Symmetry>, jaws_alike: bool) -> Self {
+        let turns = symmetry.map(|symmetry| Turns::new(symmetry, jaws_alike));
+        Self { centre_of_mass, equal: Families::default(), turns, of_turns: Vec::new() }
+    }
+
+    /// The family of the next grip, by its number; a new one has the next number.
+    fn take(&mut self, score: f64, grip: &RankedGrip) -> usize {
+        let turned = self.turns.as_mut().map(|turns| turns.take(grip));
+        let family = match turned.and_then(|turned| self.of_turns.get(turned)) {
+            Some(&family) => family,
+            None => self.equal.take(score, grip, self.centre_of_mass),
+        };
+        if turned == Some(self.of_turns.len()) {
+            self.of_turns.push(family);
+        }
+        family
+    }
+}
+
 /// Keeps the first of each set of equal grips, from grips in order; each one kept names the others.
 fn merge(
     grips: Vec<(f64, RankedGrip)>,
@@ -307,20 +338,9 @@ fn merge(
     options: &Options,
 ) -> Vec<(f64, RankedGrip)> {
     let mut kept: Vec<(f64, RankedGrip)> = Vec::with_capacity(grips.len());
-    let mut families = Families::default();
-    let mut turns = options.symmetry.map(|symmetry| Turns::new(symmetry, options.jaws_alike));
-    // The place in `kept` of each family of turns.
-    let mut places: Vec<usize> = Vec::new();
+    let mut alike = Alike::new(centre_of_mass, options.symmetry, options.jaws_alike);
     for (score, mut grip) in grips {
-        let turned = turns.as_mut().map(|turns| turns.take(&grip));
-        let place = match turned.and_then(|turned| places.get(turned)) {
-            Some(&place) => place,
-            None => families.take(score, &grip, centre_of_mass),
-        };
-        if turned == Some(places.len()) {
-            places.push(place);
-        }
-        if let Some((_, first)) = kept.get_mut(place) {
+        if let Some((_, first)) = kept.get_mut(alike.take(score, &grip)) {
             first.merged.push(grip.grip.id);
         } else {
             grip.merged.clear();
@@ -334,49 +354,43 @@ fn merge(
 /// symmetry of the part maps them to each other, or exchanging the jaws does. Its own id where it is
 /// the first. A turn about the axis of a round part leaves a grip in its family whatever it scores.
 pub fn families(set: &GripSet) -> Vec<u64> {
-    let centre_of_mass = set.part.mass.centre_of_mass;
-    let turned = turned(set);
-    let mut families = Families::default();
-    let mut firsts: Vec<u64> = Vec::new();
-    let mut of_id: BTreeMap<u64, u64> = BTreeMap::new();
-    let mut family = |grip: &RankedGrip, turned: u64| {
-        let id = grip.grip.id;
-        let first = of_id.get(&turned).copied().unwrap_or_else(|| {
-            let score = grip.score.unwrap_or(f64::INFINITY);
-            let family = families.take(score, grip, centre_of_mass);
-            if family == firsts.len() {
-                firsts.push(id);
-            }
-            firsts[family]
-        });
-        of_id.insert(id, first);
-        first
-    };
-    set.grips.iter().zip(turned).map(|(grip, turned)| family(grip, turned)).collect()
+    let symmetry = set.part.symmetry;
+    let mut alike =
+        Alike::new(set.part.mass.centre_of_mass, symmetry, symmetry.is_some() && jaws_alike(set));
+    firsts(&set.grips, |grip| alike.take(grip.score.unwrap_or(f64::INFINITY), grip))
 }
 
 /// For each of the ranked grips of a set, best first, the id of the first one that a turn about the
 /// axis of the part maps it to; its own where it is the first, or the part is not round.
 pub fn turned(set: &GripSet) -> Vec<u64> {
-    let own = || set.grips.iter().map(|grip| grip.grip.id).collect();
-    let Some(symmetry) = set.part.symmetry else { return own() };
-    // Without a gripper to read nothing is said of exchanging its jaws.
-    let alike = set.read_gripper().is_ok_and(|gripper| gripper.is_symmetric());
-    first_turns(&set.grips, symmetry, alike)
+    match set.part.symmetry {
+        Some(symmetry) => first_turns(&set.grips, symmetry, jaws_alike(set)),
+        None => set.grips.iter().map(|grip| grip.grip.id).collect(),
+    }
 }
 
 /// As [`turned`], of grips that are not in a set yet.
 pub(crate) fn first_turns(grips: &[RankedGrip], symmetry: Symmetry, alike: bool) -> Vec<u64> {
     let mut turns = Turns::new(symmetry, alike);
+    firsts(grips, |grip| turns.take(grip))
+}
+
+/// The id of the first of each grip's family; families are numbered as they come.
+fn firsts(grips: &[RankedGrip], mut family: impl FnMut(&RankedGrip) -> usize) -> Vec<u64> {
     let mut firsts: Vec<u64> = Vec::new();
     let first = |grip: &RankedGrip| {
-        let family = turns.take(grip);
+        let family = family(grip);
         if family == firsts.len() {
             firsts.push(grip.grip.id);
         }
         firsts[family]
     };
     grips.iter().map(first).collect()
+}
+
+/// Without a gripper to read nothing is said of exchanging its jaws.
+fn jaws_alike(set: &GripSet) -> bool {
+    set.read_gripper().is_ok_and(|gripper| gripper.is_symmetric())
 }
 
 /// At most `top` of the ranked `grips` that differ in place, approach and face pair, best first.

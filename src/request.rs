@@ -350,7 +350,7 @@ impl Default for Output {
 }
 
 /// Grips kept where the request does not say how many.
-const KEEP: usize = 10_000;
+pub(crate) const KEEP: usize = 10_000;
 /// Most displaced poses for each grip.
 const MOST_SAMPLES: u32 = 1_000_000;
 /// Most poses that are no grips in a result.

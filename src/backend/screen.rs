@@ -408,14 +408,30 @@ impl Screen<'_> {
     }
 }
 
+/// Power of a load on a twist.
+#[inline(always)]
+fn power(loads: &Loads, n: &[f32; PARTS], lane: usize) -> f32 {
+    let w = &loads.wrench;
+    (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs()
+}
+
+/// Dissipation of a twist under a load's pressure on different faces.
+#[inline(always)]
+fn dissipation(planes: &Planes, n: &[f32; PARTS], lane: usize) -> f32 {
+    let d = planes.at_i[lane] * n[3]
+        + planes.at_ii[lane] * n[4]
+        + planes.slope[0][lane] * n[5]
+        + planes.slope[1][lane] * n[6];
+    larger(d, LEAST_DISSIPATION)
+}
+
 /// The largest value of each load on congruent faces.
 #[inline(always)]
 fn highest(loads: &Loads, parts: &[[f32; PARTS]]) -> Lanes {
     let mut value = [0.0_f32; LANES];
-    let w = &loads.wrench;
     for n in parts {
         for lane in 0..LANES {
-            let mu = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
+            let mu = power(loads, n, lane);
             value[lane] = larger(mu, value[lane]);
         }
     }
@@ -427,15 +443,10 @@ fn highest(loads: &Loads, parts: &[[f32; PARTS]]) -> Lanes {
 fn strongest_of(loads: &Loads, planes: &Planes, parts: &[[f32; PARTS]]) -> Lanes {
     // The largest of the quotients power / dissipation, without a division for each.
     let (mut value, mut least) = ([-1.0_f32; LANES], [1.0_f32; LANES]);
-    let w = &loads.wrench;
     for n in parts {
         for lane in 0..LANES {
-            let power = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
-            let d = planes.at_i[lane] * n[3]
-                + planes.at_ii[lane] * n[4]
-                + planes.slope[0][lane] * n[5]
-                + planes.slope[1][lane] * n[6];
-            let d = larger(d, LEAST_DISSIPATION);
+            let power = power(loads, n, lane);
+            let d = dissipation(planes, n, lane);
             let better = power * least[lane] > value[lane] * d;
             value[lane] = pick_number(better, power, value[lane]);
             least[lane] = pick_number(better, d, least[lane]);
@@ -469,11 +480,10 @@ impl Field<'_> {
     #[inline(always)]
     pub(super) fn strongest(&self, loads: &Loads, planes: &Planes) -> ([u32; LANES], Lanes) {
         let (mut best, mut value) = ([0_u32; LANES], [-1.0_f32; LANES]);
-        let w = &loads.wrench;
         if self.header.faces == 1 {
             for (k, n) in self.table.parts().iter().enumerate() {
                 for lane in 0..LANES {
-                    let mu = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
+                    let mu = power(loads, n, lane);
                     let better = mu > value[lane];
                     best[lane] = pick(better, k as u32, best[lane]);
                     value[lane] = larger(mu, value[lane]);
@@ -485,12 +495,8 @@ impl Field<'_> {
         let mut least = [1.0_f32; LANES];
         for (k, n) in self.table.parts().iter().enumerate() {
             for lane in 0..LANES {
-                let power = (w[0][lane] * n[0] + w[1][lane] * n[1] + w[2][lane] * n[2]).abs();
-                let d = planes.at_i[lane] * n[3]
-                    + planes.at_ii[lane] * n[4]
-                    + planes.slope[0][lane] * n[5]
-                    + planes.slope[1][lane] * n[6];
-                let d = larger(d, LEAST_DISSIPATION);
+                let power = power(loads, n, lane);
+                let d = dissipation(planes, n, lane);
                 let better = power * least[lane] > value[lane] * d;
                 best[lane] = pick(better, k as u32, best[lane]);
                 value[lane] = pick_number(better, power, value[lane]);

@@ -10,6 +10,7 @@ use crate::contact::{ABREAST, Abreast, Frictions, Twist, frictions, widest};
 use super::branch::COUPLING_SEARCH;
 use super::compare::{CONTRACTION, WITHIN};
 use super::pads::{Load, Pads};
+use super::pressure::stiffness_rows;
 
 /// Share apart at which bounds are close enough to leave out most loads.
 const CLOSE: f64 = 1e-3;
@@ -146,7 +147,7 @@ impl Equations {
 
     #[inline(always)]
     fn residuals(&mut self, pads: &Pads, loads: &Loads) {
-        let k = stiffness(pads);
+        let k = stiffness_rows(&pads.moments);
         for i in 0..ABREAST {
             let g = [self.g[0][i], self.g[1][i], self.g[2][i]];
             let d = g[0] * self.v[0][i] + g[1] * self.v[1][i] + g[2] * self.v[2][i];
@@ -190,7 +191,7 @@ impl Equations {
     /// Newton's step.
     #[inline(always)]
     fn step(&self, pads: &Pads, loads: &Loads) -> [Abreast; 7] {
-        let k = stiffness(pads);
+        let k = stiffness_rows(&pads.moments);
         let mut step = [ZERO; 7];
         for i in 0..ABREAST {
             let r = |row: usize| self.residual[row][i];
@@ -262,7 +263,7 @@ impl Equations {
     /// As [`super::compare`] measures what a step can change of the dissipation.
     #[inline(always)]
     fn change(&self, pads: &Pads, step: &[Abreast; 7], radius: f64) -> Abreast {
-        let k = stiffness(pads);
+        let k = stiffness_rows(&pads.moments);
         let mut change = ZERO;
         for i in 0..ABREAST {
             let fastest = |x: f64, y: f64, z: f64| (x * x + y * y).sqrt() + z.abs() * radius;
@@ -339,22 +340,10 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// [`super::pressure::stiffness`] of the whole areas, by rows.
-#[inline(always)]
-fn stiffness(pads: &Pads) -> [[f64; 4]; 4] {
-    let [a, b] = &pads.moments;
-    [
-        [a[0], 0.0, a[1], a[2]],
-        [0.0, b[0], -b[1], -b[2]],
-        [a[1], -b[1], a[3] + b[3], a[4] + b[4]],
-        [a[2], -b[2], a[4] + b[4], a[5] + b[5]],
-    ]
-}
-
 /// The pressure without coupling, on the whole areas.
 #[inline(always)]
 fn without_coupling(pads: &Pads, loads: &Loads) -> [Abreast; 4] {
-    let k = stiffness(pads);
+    let k = stiffness_rows(&pads.moments);
     let (a1, a2) = (k[0][2] / k[0][0], k[0][3] / k[0][0]);
     let (b1, b2) = (k[1][2] / k[1][1], k[1][3] / k[1][1]);
     let s11 = k[2][2] - a1 * k[0][2] - b1 * k[1][2];

@@ -44,25 +44,19 @@ pub(crate) fn first_moment(m: &[f64; 6], p: [f64; 3]) -> DVec2 {
 
 /// Stiffness: `(N_I, N_II, X1, X2) = K q` with `X = int_I x p_I - int_II x p_II`.
 pub(crate) fn stiffness(m: &[[f64; 6]; 2]) -> Matrix4<f64> {
-    let [a, b] = m;
-    Matrix4::new(
-        a[0],
-        0.0,
-        a[1],
-        a[2], //
-        0.0,
-        b[0],
-        -b[1],
-        -b[2], //
-        a[1],
-        -b[1],
-        a[3] + b[3],
-        a[4] + b[4], //
-        a[2],
-        -b[2],
-        a[4] + b[4],
-        a[5] + b[5],
-    )
+    // Symmetric: rows are columns.
+    Matrix4::from(stiffness_rows(m))
+}
+
+/// [`stiffness`] by rows.
+#[inline(always)]
+pub(super) fn stiffness_rows([a, b]: &[[f64; 6]; 2]) -> [[f64; 4]; 4] {
+    [
+        [a[0], 0.0, a[1], a[2]],
+        [0.0, b[0], -b[1], -b[2]],
+        [a[1], -b[1], a[3] + b[3], a[4] + b[4]],
+        [a[2], -b[2], a[4] + b[4], a[5] + b[5]],
+    ]
 }
 
 /// Distance of the contact moment `target = (X1, X2)` inside the region `N_I conv A_I - N_II conv

@@ -248,7 +248,7 @@ impl Part {
         let mut part = Self::build(soup, unit, options.faceted, &path.display().to_string())?;
         part.name = read::stem(path);
         part.file = path.to_path_buf();
-        (part.unit_m, part.unit_source) = (unit.metres(), source);
+        part.unit_source = source;
         if let Some(stated) = of_file.filter(|&stated| stated != unit) {
             part.health.warnings.push(format!(
                 "the file states the unit {stated}; its numbers were read in {unit}, as asked"

@@ -121,8 +121,7 @@ impl<'a> Proposer<'a> {
         }
         // Beside planes that give nothing there is nothing to be slow for.
         let every = ProposeOptions { curved: Some(true), ..options.clone() };
-        let proposer = Self::within_budget(part, gripper, &every)?;
-        Ok(Self { options: options.clone(), ..proposer })
+        Self::within_budget(part, gripper, &every)
     }
 
     /// Whether any candidate is free of interference; looks at them until one is.
