@@ -8,6 +8,7 @@ use super::equilibrium::{Solver, State, Vector7};
 use super::pads::{Load, Pads};
 use super::pressure::{self, face_pressure};
 use super::slip;
+use super::states::LimitStates;
 use crate::contact::{Loops, Twist};
 use crate::error::{Error, Result};
 use crate::model::{Bounds, Contact, LARGEST_SCALE, Score, Slip, Status, Wrench};
@@ -86,7 +87,11 @@ pub fn limit_states(
     let mut solver = Solver::new(&pads, load, options.refiner);
     let seed = options.seed.map(|twist| pads.scaled_twist(twist));
     let known = solver.branch(seed);
-    let found = solver.limit_states(known.as_slice());
+    let found = match load.half_distance {
+        // Friction has no lever on the pressure: the branch is all there is.
+        0.0 => LimitStates { states: known.into_iter().collect(), complete: true },
+        _ => solver.limit_states(known.as_slice()),
+    };
     let unique = found.complete && found.states.len() == 1;
     Ok(found
         .states

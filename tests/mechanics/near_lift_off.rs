@@ -86,6 +86,34 @@ fn further_states_of_narrow_contacts_are_seen() {
     }
 }
 
+/// Found by [`many_other_kinds`]: on arms of 10:1 the second state is far from the first, of which 3.7 %
+/// of a pad's contact are left.
+#[test]
+fn a_further_state_far_from_a_small_contact_is_seen() {
+    let bar = case_of(Kind::Bars, 322).unwrap();
+    let score = solve(&bar);
+    assert_eq!(score.status, Status::Ambiguous, "{score:?}");
+    let scan = Problem::new(&bar).unwrap().scan_to_the_rim(40, 20);
+    let all = states(&bar);
+    assert_eq!((all.len(), scan.zeros.len()), (2, 2), "{all:?}");
+    for (state, zero) in all.iter().zip(&scan.zeros) {
+        assert!((state.mu_s.unwrap() / zero.mu - 1.0).abs() < 1e-8, "{state:?} {}", zero.mu);
+    }
+}
+
+/// With the jaws together friction has no lever on the pressure, and no contact is too small for that.
+#[test]
+fn with_the_jaws_together_there_is_one_state() {
+    for number in 150..200 {
+        let Some(case) = case_of(Kind::Any, number) else { continue };
+        let together = Case { distance: 0.0, ..case };
+        let (answer, all) = (solve(&together), states(&together));
+        assert_eq!(all.len(), usize::from(answer.mu_s.is_some()), "{number}: {all:?} {answer:?}");
+        let told = |state: &Score| (state.status, state.mu_s) == (answer.status, answer.mu_s);
+        assert!(all.iter().all(told), "{number}: {all:?} {answer:?}");
+    }
+}
+
 /// A limit state was found with fifty digits: the load is not refused.
 #[test]
 fn a_state_on_the_last_of_a_contact_is_found() {
@@ -124,6 +152,12 @@ fn a_state_is_found_where_one_pad_is_nearly_pulled_off() {
 fn solve(case: &Case) -> Score {
     let options = Options::default();
     mechanics::solve(&case.contact, case.distance, case.force, &case.wrench, &options).unwrap()
+}
+
+fn states(case: &Case) -> Vec<Score> {
+    let options = Options::default();
+    mechanics::limit_states(&case.contact, case.distance, case.force, &case.wrench, &options)
+        .unwrap()
 }
 
 /// A case with its load scaled to close by that at which answers end and refusals begin, on either
