@@ -231,10 +231,11 @@ impl Solver<'_> {
                     let last = across.dot(near.g) * rising.signum();
                     let crossing = before + (h - before) * (last / (last - value)).clamp(0.1, 0.9);
                     let between = self.state_near(here.x + crossing * way, Some(&near.z));
-                    let found = [between, Some(node.z)]
+                    let between = between.and_then(|z| self.node(&z));
+                    let found = [between, Some(node)]
                         .into_iter()
                         .flatten()
-                        .find_map(|z| self.settle_at(z).filter(|other| !same(state, other)));
+                        .find_map(|at| self.settle_at(at).filter(|other| !same(state, other)));
                     if found.is_some() {
                         return found;
                     }
@@ -248,22 +249,28 @@ impl Solver<'_> {
         None
     }
 
-    /// The limit state near `z`: by Newton's method on the map, then on all seven equations.
-    fn settle_at(&mut self, mut z: Vector7) -> Option<State> {
+    /// The limit state near a point of the map: by Newton's method on the map, then on all seven
+    /// equations.
+    pub(super) fn settle_at(&mut self, at: Node) -> Option<State> {
+        let z = self.descend(at).z;
+        self.newton(z, 1.0, 15)
+    }
+
+    /// Newton's method on the map.
+    fn descend(&mut self, mut at: Node) -> Node {
         for _ in 0..SETTLE_MOST {
-            let node = self.node(&z)?;
-            if node.g.length() < SETTLED {
+            if at.g.length() < SETTLED {
                 break;
             }
-            let step = node.slope.inverse() * node.g;
-            let next = [1.0, 0.3, 0.1].into_iter().find_map(|t| {
-                let z = self.state_near(node.x - t * step, Some(&node.z))?;
-                self.node(&z).filter(|next| next.g.length() < node.g.length())
+            let step = at.slope.inverse() * at.g;
+            let next = [1.0, 0.4, 0.15, 0.05].into_iter().find_map(|t| {
+                let z = self.state_near(at.x - t * step, Some(&at.z))?;
+                self.node(&z).filter(|next| next.g.length() < at.g.length())
             });
             let Some(next) = next else { break };
-            z = next.z;
+            at = next;
         }
-        self.newton(z, 1.0, 15)
+        at
     }
 
     /// Derivative of `g` at a coupling. Its determinant is positive where the branch starts and
@@ -340,7 +347,7 @@ fn flattest(slope: DMat2) -> (DVec2, f64) {
 /// there is more room).
 const PARTNER_SHARES: [f64; 11] = [1e-3, 4e-3, 0.015, 0.05, 0.15, 0.4, 0.8, 1.6, 4.0, 10.0, 30.0];
 
-/// Most steps of [`Solver::settle_at`] on the map, and the value at which they end.
+/// Most steps of [`Solver::descend`], and the value at which they end.
 const SETTLE_MOST: usize = 12;
 const SETTLED: f64 = 1e-7;
 

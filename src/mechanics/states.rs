@@ -247,30 +247,12 @@ impl<'s, 'a> Map<'s, 'a> {
             return;
         }
         let direct = self.solver.newton(node.z, 1.0, 15);
-        let found = direct.or_else(|| {
-            let z = self.descend(*node).z;
-            self.solver.newton(z, 1.0, 15)
-        });
+        let found = direct.or_else(|| self.solver.settle_at(*node));
         if let Some(state) = found
             && !states.iter().any(|known| same(known, &state))
         {
             states.push(state);
         }
-    }
-
-    /// Newton's method on the map.
-    fn descend(&mut self, mut at: Node) -> Node {
-        for _ in 0..10 {
-            let step = -(at.slope.inverse() * at.g);
-            let next = [1.0, 0.4, 0.15, 0.05].into_iter().find_map(|t| {
-                self.look(at.x + t * step, Some(&at)).filter(|next| next.g.length() < at.g.length())
-            });
-            match next {
-                Some(next) if step.is_finite() => at = next,
-                _ => break,
-            }
-        }
-        at
     }
 
     /// Newton's method from the points with the smallest values.
