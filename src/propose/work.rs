@@ -351,7 +351,7 @@ impl Proposer<'_> {
     ) -> Touched {
         if let Some(relief) = &site.relief {
             let rings = [0, 1].map(|side: usize| pads.turned[side].ring());
-            return self.pressed(relief, relief.touched(rings, place, angle, jaws), known);
+            return self.pressed(relief, relief.touched(rings, place, angle, jaws), jaws, known);
         }
         if pads.alike && pads.sides(patches).all(|(side, _)| whole[side]) {
             return Arc::clone(&self.whole).into();
@@ -412,7 +412,13 @@ impl Proposer<'_> {
     }
 
     /// What is pressed of the surfaces under the pads.
-    fn pressed(&self, relief: &Relief, surfaces: Surfaces, known: &mut Known) -> Touched {
+    fn pressed(
+        &self,
+        relief: &Relief,
+        surfaces: Surfaces,
+        jaws: Jaws,
+        known: &mut Known,
+    ) -> Touched {
         let step = self.same();
         let mut key = Vec::new();
         for piece in surfaces.face_i.iter().chain([&Piece::default()]).chain(&surfaces.face_ii) {
@@ -423,7 +429,7 @@ impl Proposer<'_> {
             key.push(i64::MIN);
         }
         let touched = || Touched {
-            contact: Arc::new(relief.outlines(&surfaces)),
+            contact: Arc::new(relief.outlines(&surfaces, jaws)),
             surfaces: Some(Arc::new(surfaces.clone())),
         };
         known.entry(key).or_insert_with(touched).clone()

@@ -65,6 +65,15 @@ pub(super) struct FaceDissipation {
 
 /// Most steps towards a normal force.
 const STEPS: u32 = 200;
+/// Share of a force that rounding may leave.
+const ROUNDING: f64 = 1e-13;
+
+/// What carries a force: the compression at the pad's plane, and what is pressed.
+struct Carrying {
+    delta: f64,
+    regions: Vec<Region>,
+    area: f64,
+}
 
 impl Face {
     pub(super) fn new(pieces: &[Piece], stiffness: f64, sign: f64) -> Self {
@@ -134,9 +143,27 @@ impl Face {
         (self.sign * direction.dot(field.origin), felt)
     }
 
-    /// The pressure that carries `load` at a tilt. The force grows convexly with the compression,
-    /// so that Newton's method comes down to the answer from above after its first step.
+    /// The pressure that carries `load` at a tilt; `start`: a compression near that of the pad's plane.
     pub(super) fn carry(&self, load: f64, tilt: DVec2, start: Option<f64>) -> Option<Pressed<'_>> {
+        let Carrying { delta, regions, area } = self.carrying(load, tilt, start, 2e-16)?;
+        Some(self.measure(delta, tilt, regions, load, area))
+    }
+
+    /// The compression at the pad's plane that carries `load` without tilt, looked for from `start` on
+    /// \[m\].
+    pub(super) fn compression(&self, load: f64, start: f64) -> Option<f64> {
+        Some(self.carrying(load, DVec2::ZERO, Some(start), ROUNDING)?.delta)
+    }
+
+    /// What carries `load` at a tilt, but for a share of `within` of it, or for rounding. The force grows convexly with the compression, so that Newton's
+    /// method comes down to the answer from above after its first step.
+    fn carrying(
+        &self,
+        load: f64,
+        tilt: DVec2,
+        start: Option<f64>,
+        within: f64,
+    ) -> Option<Carrying> {
         let nearest = self
             .fields
             .iter()
@@ -156,11 +183,11 @@ impl Face {
                 step *= 2.0;
                 continue;
             }
-            if error.abs() <= 2e-16 * load
+            if error.abs() <= within * load
                 || best.is_some_and(|(_, least)| error.abs() >= least)
-                    && error.abs() <= 1e-13 * load
+                    && error.abs() <= ROUNDING * load
             {
-                return Some(self.measure(delta, tilt, regions, load, area));
+                return Some(Carrying { delta, regions, area });
             }
             if best.is_none_or(|(_, least)| error.abs() < least) {
                 best = Some((delta, error.abs()));
@@ -169,7 +196,7 @@ impl Face {
         }
         let (delta, error) = best?;
         let (regions, area, _) = self.press(delta, tilt);
-        (error <= 1e-9 * load).then(|| self.measure(delta, tilt, regions, load, area))
+        (error <= 1e-9 * load).then_some(Carrying { delta, regions, area })
     }
 
     fn measure(

@@ -190,6 +190,13 @@ impl Pads {
         Some([squeezed(&self.faces[0])?, squeezed(&self.faces[1])?])
     }
 
+    /// Compressions at the pads' planes \[m\] under a squeeze with `force` \[N\], looked for from `near`
+    /// on; `None` without contact.
+    pub(crate) fn compressions(&self, force: f64, near: [f64; 2]) -> Option<[f64; 2]> {
+        let [one, two] = &self.faces;
+        Some([one.compression(force, near[0])?, two.compression(force, near[1])?])
+    }
+
     /// Axes in the pad plane about which the part can turn without any change of the pressure, at a
     /// squeeze with `force` \[N\]: none, one or two unit vectors.
     pub fn free_axes(&self, distance: f64, force: f64) -> Vec<DVec2> {

@@ -40,6 +40,8 @@ pub(in crate::propose) struct Relief {
     pub(in crate::propose) pressed: [Patch; 2],
     layer: Layer,
     force: f64,
+    /// Compressions at the planes of these pads \[m\], near which those of others are looked for.
+    deltas: [f64; 2],
 }
 
 impl Relief {
@@ -51,7 +53,8 @@ impl Relief {
         pads: &[Ring; 2],
         place: DVec2,
     ) -> Option<Self> {
-        let relief = Self { pieces, pressed: Default::default(), layer, force };
+        let deltas = [0.0; 2];
+        let relief = Self { pieces, pressed: Default::default(), layer, force, deltas };
         let rings = pads.each_ref().map(|pad| moved_ring(pad, place));
         let under = relief.under(
             [&rings[0], &rings[1]],
@@ -73,7 +76,7 @@ impl Relief {
         let pressed = [0, 1].map(|side: usize| {
             pieces[side].iter().flat_map(|piece| pressed(piece, deltas[side])).collect()
         });
-        Self { pieces, pressed, layer, force }
+        Self { pieces, pressed, layer, force, deltas }
     }
 
     /// As seen from another origin and turn.
@@ -127,17 +130,20 @@ impl Relief {
         self.under([&rings[0], &rings[1]], &map, jaws)
     }
 
-    /// The outlines of what is pressed without a load; empty where nothing is.
-    pub(in crate::propose) fn outlines(&self, surfaces: &Surfaces) -> Contact {
-        let squeezed = Pads::new(surfaces).ok().and_then(|pads| pads.squeezed(self.force));
-        let Some([one, two]) = squeezed else { return Contact::default() };
+    /// The outlines of what is pressed without a load of surfaces [`touched`](Self::touched); empty
+    /// where nothing is.
+    pub(in crate::propose) fn outlines(&self, surfaces: &Surfaces, jaws: Jaws) -> Contact {
+        let near = match jaws {
+            Jaws::Straight => self.deltas,
+            Jaws::Exchanged => [self.deltas[1], self.deltas[0]],
+        };
+        let pads = Pads::new(surfaces).ok();
+        let deltas = pads.and_then(|pads| pads.compressions(self.force, near));
+        let Some([one, two]) = deltas else { return Contact::default() };
         let outline = |pieces: &[Piece], delta: f64| -> Patch {
             pieces.iter().flat_map(|piece| pressed(piece, delta)).collect()
         };
-        Contact {
-            face_i: outline(&surfaces.face_i, one.delta),
-            face_ii: outline(&surfaces.face_ii, two.delta),
-        }
+        Contact { face_i: outline(&surfaces.face_i, one), face_ii: outline(&surfaces.face_ii, two) }
     }
 
     /// Directions of the crests, in the site's `(x, y)`.
