@@ -278,6 +278,43 @@ fn a_bore_is_gripped_from_inside_about_its_axis() {
 }
 
 #[test]
+fn a_tapered_bore_is_gripped_from_inside_and_slides_towards_its_wide_end() {
+    let (radii, length) = ([0.0305, 0.0295], 0.04);
+    let tangent = (radii[0] - radii[1]) / length;
+    let radius = |z: f64| 0.030 - tangent * z;
+    let part = lathe(radii, length, 68, true);
+    let kinds: Vec<_> = part.curved.iter().map(|face| (face.shape.name(), face.outside)).collect();
+    assert_eq!(kinds, [("cone", false)]);
+    // The walls push along the axis with the tangent of the force; a load adds to it or does not.
+    let along = |name: &str, z: f64| load(name, DVec3::new(0.0, 0.0, z), DVec3::ZERO);
+    for (loads, more) in
+        [(vec![along("none", 0.0)], 0.0), (vec![along("up", 6.0), along("down", -6.0)], 6.0)]
+    {
+        let set = planned(part.clone(), "generic", loads, Side::Inside, (0.008, 45.0));
+        let found = curved(&set);
+        assert!(found.len() > 10, "{} {:?}", found.len(), set.summary.rejections);
+        for ranked in found {
+            let frame = ranked.grip.part_from_grip;
+            assert!(ranked.grip.inside && frame.rotation.z_axis.z.abs() < 1e-9);
+            assert!(frame.origin.truncate().length() < 1e-7, "on the axis: {}", frame.origin);
+            // The narrowest place under the pads, of 20 by 20 mm.
+            let top = (frame.origin.z + 0.010).min(0.5 * length);
+            let width = 2.0 * radius(top);
+            assert!((ranked.grip.width - width).abs() < 1e-6, "{} {width}", ranked.grip.width);
+            let mu = tangent + more / (2.0 * FORCE);
+            let found = ranked.worst.mu_s.unwrap();
+            assert!((found / mu - 1.0).abs() < 1e-6, "{found} {mu} {:?}", ranked.worst);
+            assert_eq!(ranked.worst.status, Status::Ok);
+            // More of the pad is pressed where the bore is narrower.
+            let surfaces = ranked.grip.surfaces.as_ref().unwrap();
+            assert!(surfaces.face_i.iter().chain(&surfaces.face_ii).all(|piece| {
+                matches!(piece.gap, gripfast::model::Gap::Cone { radius, .. } if radius < 0.0)
+            }));
+        }
+    }
+}
+
+#[test]
 fn a_cone_needs_the_tangent_of_its_half_angle_and_more_to_be_turned() {
     let radii = [0.0150, 0.0140];
     let part = lathe(radii, 0.05, 68, false);

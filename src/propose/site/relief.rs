@@ -406,25 +406,28 @@ impl Look<'_> {
                 self.outline(face, &window, gap, pieces);
                 true
             }
-            Shape::Cone { apex, axis, half_angle, along } if face.outside => {
+            Shape::Cone { apex, axis, half_angle, along } => {
                 let Some(direction) = level(axis) else { return false };
                 let (apex, slope) = (place(apex), half_angle.tan());
+                let sense = if face.outside { 1.0 } else { -1.0 };
                 // Where the plane meets it, or at the end that comes nearest.
                 let behind = self.side * (self.height - apex.z);
-                let radius = behind.clamp(slope * along[0], slope * along[1]);
+                let radius = (sense * behind).clamp(slope * along[0], slope * along[1]);
                 if radius <= 0.0 {
                     return false;
                 }
-                let height = behind - radius;
-                if height < self.reach {
+                let height = behind - sense * radius;
+                if height < self.reach || !face.outside {
                     let at = apex.truncate() + direction * (radius / slope);
-                    let (length, across) = (along[1] - along[0], half(radius, height));
+                    let across = if face.outside { half(radius, height) } else { 0.7 * radius };
+                    let length = along[1] - along[0];
                     let corner = |x: f64, y: f64| {
                         apex.truncate() + (along[0] + x * length) * direction + y * direction.perp()
                     };
                     let window = [(0.0, -across), (1.0, -across), (1.0, across), (0.0, across)]
                         .map(|(x, y)| corner(x, y));
-                    let gap = Gap::Cone { radius, slope: -slope, axis: direction, at, height };
+                    let (radius, slope) = (sense * radius, -sense * slope);
+                    let gap = Gap::Cone { radius, slope, axis: direction, at, height };
                     self.outline(face, &window, gap, pieces);
                 }
                 true

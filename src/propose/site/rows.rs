@@ -34,6 +34,9 @@ struct Posture {
     /// How far the pads reach down and up, and the fingers.
     reach: [f64; 2],
     fingers: [f64; 2],
+    /// The same to either side, along the rows.
+    aside: f64,
+    fingers_aside: f64,
     /// Their outlines at the first angle.
     pads: [Ring; 2],
 }
@@ -48,10 +51,11 @@ impl Finder<'_> {
         let (mut tapers, too_small) = self.drafted();
         round.add(Rejection::PairTooSmall, too_small);
         if self.options.outside {
-            self.cones(&mut tapers);
+            self.cones(PairKind::External, &mut tapers);
         }
         if self.options.inside {
             self.bores(&mut tapers);
+            self.cones(PairKind::Internal, &mut tapers);
         }
         let mut sites = Vec::new();
         if tapers.is_empty() {
@@ -180,16 +184,23 @@ impl Finder<'_> {
             // With exchanged jaws the pads are mirrored.
             let mirrored = |ring: &Ring| super::super::work::mirrored(ring);
             let rings = pads.iter().cloned().chain(pads.iter().map(mirrored));
-            let mut reach = [0.0_f64; 2];
+            let (mut reach, mut aside) = ([0.0_f64; 2], 0.0_f64);
+            let sideways = |ring: &Ring| support(ring, DVec2::X).max(support(ring, DVec2::NEG_X));
             for ring in rings.map(|ring| turned(&ring)) {
                 reach[0] = reach[0].max(support(&ring, DVec2::NEG_Y));
                 reach[1] = reach[1].max(support(&ring, DVec2::Y));
+                aside = aside.max(sideways(&ring));
             }
             let around = turned(&bodies);
             let fingers = [DVec2::NEG_Y, DVec2::Y].map(|way| support(&around, way));
+            let fingers_aside = sideways(&around);
+            let alike = |a: f64, b: f64| (a - b).abs() < SAME_REACH;
+            let hollow = taper.surface.is_hollow();
             let same = |known: &&mut Posture| {
-                (0..2).all(|k| (known.reach[k] - reach[k]).abs() < SAME_REACH)
-                    && (0..2).all(|k| (known.fingers[k] - fingers[k]).abs() < SAME_REACH)
+                (0..2).all(|k| alike(known.reach[k], reach[k]))
+                    && (0..2).all(|k| alike(known.fingers[k], fingers[k]))
+                    && (!hollow || alike(known.aside, aside))
+                    && (!hollow || alike(known.fingers_aside, fingers_aside))
             };
             match postures.iter_mut().find(same) {
                 Some(posture) => posture.angles.push(angle),
@@ -197,6 +208,8 @@ impl Finder<'_> {
                     angles: vec![angle],
                     reach,
                     fingers,
+                    aside,
+                    fingers_aside,
                     pads: pads.each_ref().map(turned),
                 }),
             }
@@ -218,16 +231,24 @@ impl Finder<'_> {
         let heights = taper.heights_at(top);
         let width = (heights[0] - heights[1]).abs();
         // How far the pads, and fingers wider than these, stand off the planes at the heights.
-        let [sag, off] = match taper.surface {
-            Surface::Bore => {
-                let (half, radius) = (below.max(above), 0.5 * width);
-                if half > WIDEST * radius {
-                    return Err(Rejection::PadTooWide);
-                }
-                let fingers = posture.fingers[0].max(posture.fingers[1]).clamp(half, radius);
-                [half, fingers].map(|half| radius - (radius * radius - half * half).sqrt())
+        let beyond = taper.slope * (posture.fingers[1] - above).max(0.0);
+        let hollow = |half: f64, fingers: f64| {
+            let radius = 0.5 * width;
+            if half > WIDEST * radius {
+                return Err(Rejection::PadTooWide);
             }
-            _ => [0.0, taper.slope * (posture.fingers[1] - above).max(0.0)],
+            let sags = [half, fingers.clamp(half, radius)];
+            Ok(sags.map(|half| radius - (radius * radius - half * half).sqrt()))
+        };
+        let [sag, off] = match taper.surface {
+            // Rows lie along the bore,
+            Surface::Bore => hollow(below.max(above), posture.fingers[0].max(posture.fingers[1]))?,
+            // or across it.
+            Surface::TaperedBore => {
+                let [sag, off] = hollow(posture.aside, posture.fingers_aside)?;
+                [sag, off + beyond]
+            }
+            Surface::Plane | Surface::Cone => [0.0, beyond],
         };
         Stroke::new(taper.kind, self.gripper, self.options).check(width)?;
         let layer = self.gripper.layer();
@@ -278,10 +299,12 @@ impl Finder<'_> {
         let com = axes_from_part * self.centre_of_mass;
         let com = taper.level().dot(com.truncate() - middle);
         let along = [bounds.min.x, bounds.max.x];
-        let positions: Vec<DVec2> = steps(along, beyond, self.options.spacing(self.gripper), com)
-            .into_iter()
-            .map(|x| DVec2::new(x, 0.0))
-            .collect();
+        let places = match taper.surface {
+            // Off the middle one edge of a pad would touch alone.
+            Surface::TaperedBore => vec![0.0],
+            _ => steps(along, beyond, self.options.spacing(self.gripper), com),
+        };
+        let positions: Vec<DVec2> = places.into_iter().map(|x| DVec2::new(x, 0.0)).collect();
         Site {
             kind: taper.kind,
             part_from_site: Frame {

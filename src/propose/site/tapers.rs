@@ -1,5 +1,5 @@
-//! Surfaces that lean against flat pads: opposite planes that are not parallel, outside cones, and
-//! bores, whose walls curve towards a pad.
+//! Surfaces that lean against flat pads: opposite planes that are not parallel, cones, and bores,
+//! straight or tapered, whose walls curve towards a pad.
 
 use std::collections::BTreeMap;
 
@@ -33,6 +33,14 @@ pub(super) enum Surface {
     Plane,
     Cone,
     Bore,
+    TaperedBore,
+}
+
+impl Surface {
+    /// Whether the walls curve towards the pads, which touch with their edges.
+    pub(super) fn is_hollow(self) -> bool {
+        matches!(self, Surface::Bore | Surface::TaperedBore)
+    }
 }
 
 /// Two surfaces opposite each other that do not lie in the pads' planes. Places are `(x, y)` along
@@ -74,14 +82,14 @@ impl Taper {
         let (radius, height) = (0.5 * (one - two).abs(), lean * self.slope * (top - y));
         match self.surface {
             Surface::Plane => Gap::Plane { height, slope: DVec2::new(0.0, -lean * self.slope) },
-            Surface::Cone => Gap::Cone {
-                radius,
+            Surface::Bore | Surface::TaperedBore if lean == 0.0 => Gap::default(),
+            Surface::Cone | Surface::TaperedBore => Gap::Cone {
+                radius: if self.surface.is_hollow() { -radius } else { radius },
                 slope: -lean * self.slope,
                 axis: DVec2::Y,
                 at: DVec2::ZERO,
                 height,
             },
-            Surface::Bore if lean == 0.0 => Gap::default(),
             Surface::Bore => {
                 Gap::Cylinder { radius: -radius, axis: DVec2::X, at: DVec2::ZERO, height: 0.0 }
             }
@@ -218,12 +226,15 @@ impl Finder<'_> {
         Some((area, taper))
     }
 
-    /// Outside cones, in directions all round.
-    pub(super) fn cones(&mut self, tapers: &mut Vec<Taper>) {
+    /// Cones, in directions all round: from outside, or tapered bores from inside.
+    pub(super) fn cones(&mut self, kind: PairKind, tapers: &mut Vec<Taper>) {
         let part = self.part;
-        let ids: Vec<u32> = self.round_faces().map(|face| face.id).collect();
-        for face in ids.into_iter().filter_map(|id| part.curved_face(id)) {
+        let outside = kind == PairKind::External;
+        for face in part.curved.iter().filter(|face| face.outside == outside && face.reachable) {
             let Shape::Cone { apex, axis, half_angle, along } = face.shape else { continue };
+            if !self.may_touch(face.id) {
+                continue;
+            }
             if half_angle >= STEEPEST {
                 continue;
             }
@@ -235,20 +246,29 @@ impl Finder<'_> {
                 let direction = self.direction(closing);
                 let axes_from_part = axes(self.directions[direction]);
                 let apex = axes_from_part * apex;
-                let uphill = (axes_from_part * axis).truncate().normalize();
+                // Uphill is where a body grows thicker, and a bore narrower.
+                let widening = (axes_from_part * axis).truncate().normalize();
+                let sense = if outside { 1.0 } else { -1.0 };
+                let uphill = sense * widening;
                 let (slope, y) = (half_angle.tan(), uphill.dot(apex.truncate()));
                 let x = (-uphill.perp()).dot(apex.truncate());
-                let [least, most] = along.map(|along| DVec2::new(x, y + along));
+                let ends = along.map(|along| DVec2::new(x, y + sense * along));
+                let chords = match face.facets {
+                    Some(facets) if !outside => {
+                        along[1] * slope * (1.0 - (std::f64::consts::PI / facets).cos())
+                    }
+                    _ => 0.0,
+                };
                 tapers.push(Taper {
-                    kind: PairKind::External,
-                    surface: Surface::Cone,
+                    kind,
+                    surface: if outside { Surface::Cone } else { Surface::TaperedBore },
                     direction,
                     sides: [vec![face.id], vec![face.id]],
                     uphill,
                     slope,
                     heights: [apex.z - slope * y, apex.z + slope * y],
-                    bounds: Bounds2 { min: least, max: most },
-                    chords: 0.0,
+                    bounds: Bounds2 { min: ends[0].min(ends[1]), max: ends[0].max(ends[1]) },
+                    chords,
                 });
             }
         }
