@@ -176,7 +176,7 @@ fn pieces(text: &str) -> Vec<String> {
     let pieces: Vec<&str> = text.split(',').map(str::trim).collect();
     let last = pieces.last().copied().unwrap_or_default();
     let bare = |piece: &str| piece.trim_end().parse::<f64>().is_ok();
-    let ends = (0..last.len()).rev().filter(|end| last.is_char_boundary(*end));
+    let ends = (0..=last.len()).rev().filter(|end| last.is_char_boundary(*end));
     let unit = ends.map(|end| last.split_at(end)).find(|(number, _)| bare(number));
     let unit = unit.map_or("", |(_, unit)| unit);
     let whole = |piece: &&str| match bare(piece) {
@@ -337,6 +337,8 @@ mod tests {
         for text in ["24,16", "24mm,16", "24mm 16mm", "24mm", "x", "24mm,"] {
             assert!(values::<2>(text, PAD, Quantity::Length).is_err(), "{text}");
         }
+        let bare = values::<2>("24, 160", PAD, Quantity::Length).unwrap_err().to_string();
+        assert!(bare.contains("'24' has no unit"), "{bare}");
         // What is given as a flag is refused at once.
         let wrong = asker.range(Some("60mm,2mm".to_owned()), STROKE, Quantity::Length).unwrap_err();
         assert!(wrong.to_string().contains("does not rise"), "{wrong}");
