@@ -158,6 +158,25 @@ pub enum Slip {
     },
 }
 
+impl Slip {
+    /// Share of the motion below which its turning is not worth telling.
+    const LEAST_TURN: f64 = 0.02;
+
+    /// Whether all points within `reach` \[m\] of the grip's middle move alike but for two percent:
+    /// the part slides, though no limit state of a round part is without a trace of a turn.
+    pub fn slides(&self, reach: f64) -> bool {
+        match self {
+            Self::Translation { .. } => true,
+            Self::None => false,
+            Self::Rotation { c: [x, y], .. } => reach < Self::LEAST_TURN * x.hypot(*y),
+            Self::Spin { omega: [o1, o2, o3], velocity: [u1, u2], .. } => {
+                let rate = o1.hypot(*o2).hypot(*o3);
+                rate * reach < Self::LEAST_TURN * u1.hypot(*u2)
+            }
+        }
+    }
+}
+
 /// One of the two faces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Face {
@@ -405,5 +424,26 @@ impl Grip {
     /// for an inside grip.
     pub fn distance(&self) -> f64 {
         if self.inside { -self.width } else { self.width }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motion_with_a_trace_of_a_turn_is_a_slide() {
+        let spin = |o1: f64, u: [f64; 2]| Slip::Spin {
+            omega: [o1, 0.0, 0.0],
+            velocity: u,
+            rolls_on: None,
+        };
+        let about = |x: f64| Slip::Rotation { c: [x, 0.0], sense: 1 };
+        // A cylinder of 20 mm pulled along its axis, and one that rolls.
+        assert!(spin(-0.0018, [-1.0, -0.175]).slides(0.01));
+        assert!(!spin(1.0, [0.0, 0.01]).slides(0.01));
+        assert!(about(2e3).slides(0.02) && !about(0.03).slides(0.02));
+        assert!(Slip::Translation { direction: [1.0, 0.0] }.slides(0.01));
+        assert!(!Slip::None.slides(0.01));
     }
 }

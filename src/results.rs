@@ -326,6 +326,13 @@ fn one() -> f64 {
 }
 
 impl RankedGrip {
+    /// Whether the part all but slides under the worst load: see [`Slip::slides`].
+    pub fn slides(&self) -> bool {
+        let faces = self.faces.iter().flatten().flat_map(|face| face.extent);
+        let reach = faces.map(|[x, y]| x.hypot(y)).fold(self.grip.width / 2.0, f64::max);
+        self.worst.slip.is_some_and(|slip| slip.slides(reach))
+    }
+
     /// Friction needed under the worst load; `None` where no limit state holds it.
     pub fn friction_needed(&self) -> Option<f64> {
         self.worst.mu_s.filter(|_| self.worst.status.holds())

@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::model::Frame;
 use crate::part::{Mesh, Part, ReadOptions, Unit};
 use crate::request::Candidates;
+use crate::text::with_shape;
 use crate::units::Quantity;
 
 /// A scene in SI units, in the world frame.
@@ -218,13 +219,17 @@ impl Scene {
     /// # Errors
     /// As [`Self::read`].
     pub fn parse(place: &str, text: &str, folder: &Path) -> Result<Self> {
+        const SHAPES: [(&str, &str); 1] = [(
+            "expected a sequence",
+            "obstacles stand in double brackets, one table for each: [[obstacle]]",
+        )];
         let file: File = toml::from_str(text).map_err(|error| {
             let line = error
                 .span()
                 .map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
             Error::format(
                 format!("{place}:{line}"),
-                error.message().to_owned(),
+                with_shape(error.message(), &SHAPES),
                 "docs/formats.md shows a scene file with all its fields",
             )
         })?;

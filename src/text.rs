@@ -46,6 +46,27 @@ fn replaced(text: &str, hidden: impl Fn(char) -> bool) -> Cow<'_, str> {
     Cow::Owned(plain)
 }
 
+/// A number of things, each of which is `one`: `1 grip`, `2 grips`.
+pub fn counted(count: u64, one: &str) -> String {
+    format!("{count} {one}{}", if count == 1 { "" } else { "s" })
+}
+
+/// What TOML's reader says of a value of another shape, with what to write instead: of `own` the
+/// advice whose words the message holds, else that for any file of ours.
+pub(crate) fn with_shape(message: &str, own: &[(&str, &str)]) -> String {
+    const ANY: [(&str, &str); 4] = [
+        ("expected an array of length 2", "give two texts with units, e.g. [\"0mm\", \"85mm\"]"),
+        (
+            "expected an array of length 3",
+            "give three texts with units, e.g. [\"40mm\", \"20mm\", \"8mm\"]",
+        ),
+        ("expected a string", "give a text with its unit, e.g. \"12mm\""),
+        ("expected f64", "give a plain number, without unit and quotes, e.g. 0.5"),
+    ];
+    let advice = own.iter().chain(&ANY).find(|(words, _)| message.contains(words));
+    advice.map_or(message.to_owned(), |(_, advice)| format!("{message}: {advice}"))
+}
+
 /// `text` for an element or a quoted attribute of SVG, XML or HTML.
 pub fn markup(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
@@ -72,6 +93,11 @@ mod tests {
         assert_eq!(shown("a\u{202e}b\nc\td\u{9b}"), "a\\u{202e}b\\nc\\td\\u{9b}");
         assert_eq!(shown_lines("a\n\tb\u{1b}"), "a\n\tb\\u{1b}");
         assert!(matches!(shown("Gr\u{fc}\u{df}e, \u{2264} 5 \u{b5}m"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn one_is_no_plural() {
+        assert_eq!([counted(0, "grip"), counted(1, "grip")], ["0 grips", "1 grip"]);
     }
 
     #[test]

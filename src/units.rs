@@ -47,6 +47,22 @@ pub enum Quantity {
 pub const STANDARD_GRAVITY: f64 = 9.80665;
 
 impl Quantity {
+    /// Every kind.
+    pub const ALL: [Self; 12] = [
+        Self::Length,
+        Self::Mass,
+        Self::Force,
+        Self::Moment,
+        Self::Inertia,
+        Self::Angle,
+        Self::Acceleration,
+        Self::Density,
+        Self::Pressure,
+        Self::Stiffness,
+        Self::Time,
+        Self::Memory,
+    ];
+
     /// Name and factor to SI of each accepted unit.
     pub fn units(self) -> &'static [(&'static str, f64)] {
         match self {

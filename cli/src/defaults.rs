@@ -134,7 +134,7 @@ mod tests {
     fn a_flag_given_twice_is_refused() {
         use clap::Parser;
         for line in [
-            "gripfast plan x -g a --mass 1kg --mass 2kg",
+            "gripfast plan x -g a --com 1mm,0mm,0mm --com 2mm,0mm,0mm",
             "gripfast plan x -g a --mass 1kg --spacing 1mm --spacing 2mm",
             "gripfast export g.json -o a.csv -o b.csv",
         ] {

@@ -9,6 +9,7 @@ use gripfast::export::{self, Convention, Dialect, Format, Joint, Options, Origin
 use gripfast::part::Part;
 use gripfast::plan::GLB_TOP;
 use gripfast::results::{GripSet, PadFriction};
+use gripfast::text::counted;
 use gripfast::units::Quantity;
 
 use crate::choice::ChoiceArgs;
@@ -20,7 +21,7 @@ use crate::choice::ChoiceArgs;
 gripfast export a.json b.json -o all.csv --holding --diverse --top 20\n  \
 gripfast export grips.json --format isaac_grasp -o grips.yaml --joint panda_finger_joint1:0.5 --origin 103.4mm\n  \
 gripfast export grips.json --format moveit -o -\n\nFORMATS (docs/formats.md describes each field):\n  \
-json, jsonl   native          csv, parquet  a table\n  isaac_grasp   YAML            graspgen      JSON\n  moveit        YAML            graspnet      .npz\n  acronym       HDF5            glb           part with grippers, to look at\n  usd           OpenUSD text      intrinsic     JSON\n  robot         mm and the angles of --dialect"
+json, jsonl   native          csv, parquet  a table\n  isaac_grasp   YAML            graspgen      JSON\n  moveit        YAML            graspnet      .npz\n  acronym       HDF5            glb           part with grippers, to look at\n  usd           OpenUSD text    intrinsic     JSON\n  robot         mm and the angles of --dialect"
 )]
 pub(crate) struct Args {
     /// Result file written by `gripfast plan -o`, JSON or JSON Lines. Several go into one table (csv,
@@ -170,7 +171,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             None => None,
         };
         let frame = frame.map_or("grip frames".to_owned(), |frame| format!("tool frame {frame}"));
-        crate::terminal::say(&format!("{}: {count} grips, {frame}", args.output.display()));
+        crate::terminal::say(&format!(
+            "{}: {}, {frame}",
+            args.output.display(),
+            counted(count as u64, "grip")
+        ));
     }
     Ok(ExitCode::from(u8::from(count == 0)))
 }

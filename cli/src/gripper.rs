@@ -45,7 +45,7 @@ enum Action {
         /// Shipped name or gripper file.
         gripper: String,
         /// Draw it with its dimensions into this SVG file.
-        #[arg(long, value_name = "FILE")]
+        #[arg(long, alias = "plot", value_name = "FILE")]
         svg: Option<PathBuf>,
     },
     /// Makes a gripper file from a robot model (URDF): stroke and motion from its joints, boxes round
@@ -67,7 +67,7 @@ Name the two links that touch the part. Expand xacro files first."
         #[arg(long)]
         name: Option<String>,
         /// Draw it with its dimensions into this SVG file.
-        #[arg(long, value_name = "FILE")]
+        #[arg(long, alias = "plot", value_name = "FILE")]
         svg: Option<PathBuf>,
     },
     /// Makes a gripper file: asks for the dimensions on a terminal, or takes them as flags.

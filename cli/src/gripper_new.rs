@@ -57,7 +57,8 @@ type Question = (&'static str, &'static str, &'static str);
 
 const NAME: Question = ("--name", "name of the gripper", "Bench gripper");
 const STROKE: Question = ("--stroke", "smallest and largest distance of the pads", "2mm,60mm");
-const FORCE: Question = ("--force", "smallest and largest force of one jaw", "15N,120N");
+const FORCE: Question =
+    ("--force", "smallest and largest force of one jaw (half of a sum of both)", "15N,120N");
 const PAD: Question = ("--pad", "size of the pads along the finger and across", "24mm,16mm");
 const FINGER: Question = (
     "--finger",
@@ -168,6 +169,23 @@ impl Asker {
     }
 }
 
+/// The pieces of a list as people write one: `24mm,16mm`, `24 x 16 mm`, `0 to 60mm`. The unit of the
+/// last piece is that of those before it that have none.
+fn pieces(text: &str) -> Vec<String> {
+    let text = text.replace(['x', '\u{d7}', ';'], ",").replace("to", ",").replace("..", ",");
+    let pieces: Vec<&str> = text.split(',').map(str::trim).collect();
+    let last = pieces.last().copied().unwrap_or_default();
+    let bare = |piece: &str| piece.trim_end().parse::<f64>().is_ok();
+    let ends = (0..=last.len()).rev().filter(|end| last.is_char_boundary(*end));
+    let unit = ends.map(|end| last.split_at(end)).find(|(number, _)| bare(number));
+    let unit = unit.map_or("", |(_, unit)| unit);
+    let whole = |piece: &&str| match bare(piece) {
+        true => format!("{piece}{unit}"),
+        false => (*piece).to_owned(),
+    };
+    pieces.iter().map(whole).collect()
+}
+
 /// So many values of a quantity, none of them negative.
 fn values<const N: usize>(
     text: &str,
@@ -175,8 +193,11 @@ fn values<const N: usize>(
     quantity: Quantity,
 ) -> gripfast::error::Result<[f64; N]> {
     let wrong = |what: String| Error::input(flag, what, format!("give e.g. {example}"));
-    let pieces = text.split(',').map(|piece| quantity.parse(flag, piece.trim()));
-    let values: Vec<f64> = pieces.collect::<gripfast::error::Result<_>>()?;
+    if text.is_empty() {
+        return Err(wrong("no answer; the example is not taken by itself".to_owned()));
+    }
+    let values = pieces(text).into_iter().map(|piece| quantity.parse(flag, &piece));
+    let values: Vec<f64> = values.collect::<gripfast::error::Result<_>>()?;
     let values: [f64; N] =
         values.try_into().map_err(|_| wrong(format!("'{text}' is not {N} values")))?;
     if values.iter().any(|value| *value < 0.0) {
@@ -200,6 +221,11 @@ pub(crate) fn run(args: NewArgs) -> anyhow::Result<()> {
         ));
     }
     let mut asker = Asker::new();
+    if asker.input.is_some() && args.name.is_none() {
+        terminal::say(
+            "Lengths and forces with their units, several joined by commas; Ctrl-C ends.",
+        );
+    }
     let name = asker.name(args.name)?;
     let stroke = asker.range(args.stroke, STROKE, Quantity::Length)?;
     let force = asker.range(args.force, FORCE, Quantity::Force)?;
@@ -288,7 +314,7 @@ mod tests {
 
     #[test]
     fn a_wrong_answer_is_asked_for_again() {
-        let lines = "\nBench\n0,60\n60mm,2mm\n2mm\n-2mm,60mm\n2mm, 60mm\nhigh\n\n";
+        let lines = "\nBench\n0,60\n\n60mm,2mm\n2mm\n-2mm,60mm\n2mm, 60mm\nhigh\n\n";
         let mut asker = Asker { input: Some(Box::new(lines.as_bytes())) };
         assert_eq!(asker.name(None).unwrap(), "Bench");
         let stroke = asker.range(None, STROKE, Quantity::Length).unwrap();
@@ -296,6 +322,23 @@ mod tests {
         assert_eq!(asker.friction(None).unwrap(), None);
         let ended = asker.values::<3>(None, PALM, Quantity::Length).unwrap_err().to_string();
         assert!(ended.contains("ended before an answer"), "{ended}");
+        for text in [
+            "24mm,16mm",
+            "24 x 16 mm",
+            "24mm x 16mm",
+            "24,16mm",
+            "24 to 16mm",
+            "24000e-3 x 16000e-3mm",
+            "2.4\u{d7}1.6cm",
+        ] {
+            let [a, b] = values(text, PAD, Quantity::Length).unwrap();
+            assert!((a - 0.024).abs() < 1e-12 && (b - 0.016).abs() < 1e-12, "{text}: {a} {b}");
+        }
+        for text in ["24,16", "24mm,16", "24mm 16mm", "24mm", "x", "24mm,"] {
+            assert!(values::<2>(text, PAD, Quantity::Length).is_err(), "{text}");
+        }
+        let bare = values::<2>("24, 160", PAD, Quantity::Length).unwrap_err().to_string();
+        assert!(bare.contains("'24' has no unit"), "{bare}");
         // What is given as a flag is refused at once.
         let wrong = asker.range(Some("60mm,2mm".to_owned()), STROKE, Quantity::Length).unwrap_err();
         assert!(wrong.to_string().contains("does not rise"), "{wrong}");

@@ -35,10 +35,12 @@ mod solve;
 mod terminal;
 mod why;
 
+use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use gripfast::units::Quantity;
 
 /// Finds and ranks every two-finger grip (grasp) on a CAD part by the smallest friction coefficient
 /// that holds it.
@@ -119,7 +121,7 @@ fn version() -> &'static str {
 }
 
 /// Parses the command line, or says what is wrong with it and ends.
-fn parse(line: Vec<std::ffi::OsString>) -> Cli {
+fn parse(line: Vec<OsString>) -> Cli {
     let mut command = command();
     let matches =
         command.try_get_matches_from_mut(&line).unwrap_or_else(|error| plain(error, &line).exit());
@@ -128,7 +130,7 @@ fn parse(line: Vec<std::ffi::OsString>) -> Cli {
 
 /// An error of the command line with advice that helps: a value that begins with a dash is joined to
 /// its flag, a file is no subcommand, and a gripper or a scene comes from somewhere.
-fn plain(mut error: clap::Error, line: &[std::ffi::OsString]) -> clap::Error {
+fn plain(mut error: clap::Error, line: &[OsString]) -> clap::Error {
     use clap::error::{ContextKind, ContextValue, ErrorKind};
     let text = |error: &clap::Error, kind| match error.get(kind) {
         Some(ContextValue::String(text)) => text.clone(),
@@ -141,10 +143,20 @@ fn plain(mut error: clap::Error, line: &[std::ffi::OsString]) -> clap::Error {
                 rest.starts_with(|sign: char| sign.is_ascii_digit() || sign == '.')
             });
             error.remove(ContextKind::Suggested);
-            match value {
-                true => joined(&argument, line),
-                false => return error,
+            match (value, apart(&argument, line)) {
+                (true, _) => joined(&argument, line),
+                (false, Some(text)) => format!("write a number and its unit as one word: {text}"),
+                (false, None) => return error,
             }
+        }
+        ErrorKind::ValueValidation | ErrorKind::InvalidValue => {
+            let flag = text(&error, ContextKind::InvalidArg);
+            let start = format!("{}=", flag.split(' ').next().unwrap_or_default());
+            let stands = |word: &OsString| word.to_string_lossy().starts_with(&start);
+            if !line.iter().any(stands) || std::env::args_os().any(|word| stands(&word)) {
+                return error;
+            }
+            format!("this value stands in {}", defaults::FILE)
         }
         ErrorKind::InvalidSubcommand
             if Path::new(&text(&error, ContextKind::InvalidSubcommand)).exists() =>
@@ -179,8 +191,16 @@ fn plain(mut error: clap::Error, line: &[std::ffi::OsString]) -> clap::Error {
     error
 }
 
+/// A number and a unit that stand apart on the command line, as one word; `unit` is the second.
+fn apart(unit: &str, line: &[OsString]) -> Option<String> {
+    let known = Quantity::ALL.iter().any(|kind| kind.units().iter().any(|known| known.0 == unit));
+    let words: Vec<_> = line.iter().map(|word| word.to_string_lossy()).collect();
+    let pair = words.windows(2).find(|pair| pair[1] == unit && pair[0].parse::<f64>().is_ok())?;
+    known.then(|| format!("{}{unit}", pair[0]))
+}
+
 /// How the value that was taken for the flag `argument` is joined to the flag before it.
-fn joined(argument: &str, line: &[std::ffi::OsString]) -> String {
+fn joined(argument: &str, line: &[OsString]) -> String {
     let words: Vec<_> = line.iter().map(|word| word.to_string_lossy()).collect();
     let own = words.windows(2).find(|pair| {
         pair[0].starts_with("--") && !pair[0].contains('=') && pair[1].starts_with(argument)

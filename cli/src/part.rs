@@ -52,7 +52,7 @@ pub(crate) struct Args {
     #[arg(long)]
     faceted: bool,
     /// Drawing (SVG): three views with the faces numbered.
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, alias = "svg", value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// One JSON object in SI units on standard output.
     #[arg(long)]

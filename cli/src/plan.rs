@@ -7,7 +7,7 @@ mod table;
 mod watch;
 
 use std::io::{IsTerminal, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
@@ -29,7 +29,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if variants.len() > 1 {
         if why.is_some() || print {
             let flag = if print { "--print-request" } else { "--why" };
-            let problem = "is about one gripper, force and friction, and several are given";
+            let problem = "is about one gripper, mass, force and friction, and several are given";
             return Err(Error::input(flag, problem, "give one of each").into());
         }
         return several::run(&args.request()?, &variants);
@@ -62,7 +62,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let output = &plan.request().output;
     let watched = std::io::stdout().is_terminal() && std::io::stderr().is_terminal();
     if watched && !output.quiet && !output.json {
-        terminal::say(&hint(&outcome, output.output.as_deref()));
+        // An interrupted run wrote its result under another name.
+        let written = output.output.as_ref().and(outcome.written.first());
+        let best = outcome.set.grips.first().map(|best| best.grip.id);
+        terminal::say(&hint(best, written.map(PathBuf::as_path)));
     }
     Ok(match interrupt.code() {
         Some(code) if !outcome.set.provenance.complete => ExitCode::from(code),
@@ -167,21 +170,34 @@ fn notes(plan: &Plan, outcome: &Outcome) {
 }
 
 /// The commands to run next.
-fn hint(outcome: &Outcome, file: Option<&Path>) -> String {
-    let Some(best) = outcome.set.grips.first() else {
+fn hint(best: Option<u64>, written: Option<&Path>) -> String {
+    let Some(best) = best else {
         return "next: --report page.html shows the reasons and what would help".to_owned();
     };
-    match file.filter(|file| file.extension().is_none_or(|ending| ending == "json")) {
+    match written.filter(|file| file.extension().is_none_or(|ending| ending == "json")) {
         Some(file) => {
             let file = file.display();
             format!(
-                "next: gripfast why {file} {}; gripfast report {file}; gripfast export {file} -o \
-                 grips.csv; gripfast pick {file} --scene cell.toml",
-                best.grip.id
+                "next: gripfast why {file} {best}; gripfast report {file}; gripfast export {file} -o \
+                 grips.csv; gripfast pick {file} --scene cell.toml"
             )
         }
         None => "next: -o grips.json keeps the grips for `gripfast why`, `report`, `export` and \
                  `pick`; --report page.html shows them"
             .to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_commands_to_run_next_name_the_file_that_was_written() {
+        let after = hint(Some(7), Some(Path::new("grips.interrupted.json")));
+        assert!(after.contains("gripfast why grips.interrupted.json 7;"), "{after}");
+        for none in [None, Some(Path::new("grips.csv"))] {
+            assert!(hint(Some(7), none).contains("-o grips.json keeps"), "{none:?}");
+        }
     }
 }

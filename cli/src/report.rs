@@ -10,6 +10,7 @@ use gripfast::part::Part;
 use gripfast::plan::{WHOLE, near_misses, solve_every_load};
 use gripfast::report;
 use gripfast::results::GripSet;
+use gripfast::text::counted;
 
 use crate::choice::ChoiceArgs;
 
@@ -63,9 +64,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         .with_context(|| format!("cannot read back {}", output.display()))?
         .len();
     crate::terminal::say(&format!(
-        "{}: {} grips, {:.1} MB",
+        "{}: {}, {:.1} MB",
         output.display(),
-        set.grips.len(),
+        counted(set.grips.len() as u64, "grip"),
         size as f64 / 1e6
     ));
     Ok(ExitCode::SUCCESS)

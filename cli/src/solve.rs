@@ -32,7 +32,7 @@ pub(crate) struct Args {
     explain: bool,
     /// Also draws the contact pair as SVG: pads, pressure, separation line, slip centre, friction
     /// directions.
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, alias = "svg", value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// Pads that separate under the load: solve with the contact left, or discard as the paper
     /// does.

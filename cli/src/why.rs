@@ -37,12 +37,17 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let set = GripSet::read(&args.grips)?;
     let file = args.grips.display().to_string();
     let Some(ranked) = set.grips.iter().find(|ranked| ranked.grip.id == args.id) else {
-        return Err(Error::input(
-            &file,
-            format!("holds no grip {}", args.id),
-            "see the ids in `gripfast plan`'s table, or explain a pose with `gripfast plan --why`",
-        )
-        .into());
+        let remedy = match set.grips.iter().find(|ranked| ranked.rank == args.id) {
+            Some(ranked) => format!("give the id: that of rank {} is {}", args.id, ranked.grip.id),
+            None => {
+                "see the ids in `gripfast plan`'s table, or explain a pose with `gripfast plan \
+                     --why`"
+                    .to_owned()
+            }
+        };
+        return Err(
+            Error::input(&file, format!("holds no grip with the id {}", args.id), remedy).into()
+        );
     };
     let part = crate::export::read_part(&set, &args.grips, args.part.as_deref())?;
     let explanation = plan::explain(&set, ranked, &part)?;
@@ -108,7 +113,11 @@ fn surface(out: &mut impl Write, ranked: &RankedGrip) -> std::io::Result<()> {
             face.compression * mm
         )?;
     }
-    if let Some(Slip::Spin { rolls_on, .. }) = ranked.worst.slip {
+    if let Some(Slip::Spin { .. }) = ranked.worst.slip
+        && ranked.slides()
+    {
+        writeln!(out, "  about to slide along the pads, all but without turning")?;
+    } else if let Some(Slip::Spin { rolls_on, .. }) = ranked.worst.slip {
         let how = rolls_on.map_or("spins, both faces slip".to_owned(), |face| {
             format!("rolls on face {face:?} and slips on the other")
         });

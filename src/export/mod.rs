@@ -93,8 +93,16 @@ impl Format {
     pub fn parse(place: &str, name: &str) -> Result<Self> {
         let wanted = name.to_ascii_lowercase().replace('-', "_");
         Self::ALL.iter().find(|known| known.1 == wanted).map(|known| known.0).ok_or_else(|| {
-            let names = Self::ALL.map(|known| known.1).join(", ");
-            Error::input(place, format!("'{name}' is not a format"), format!("use one of: {names}"))
+            let names = Self::ALL.map(|known| known.1);
+            let meant = names.iter().find(|known| wanted.len() > 2 && known.starts_with(&wanted));
+            let dialect = Dialect::ALL.iter().any(|known| known.1 == wanted);
+            let meant = if dialect {
+                format!("'{wanted}' is a dialect of the format robot; ")
+            } else {
+                meant.map_or(String::new(), |known| format!("did you mean '{known}'? "))
+            };
+            let remedy = format!("{meant}use one of: {}", names.join(", "));
+            Error::input(place, format!("'{name}' is not a format"), remedy)
         })
     }
 

@@ -103,6 +103,8 @@ fn unknown(name: &str) -> Error {
         .min()
         .filter(|(distance, short)| *distance <= 1 + short.len() / 3)
         .map_or(String::new(), |(_, short)| format!("did you mean '{short}'? "));
+    let file = format!("{name}.toml");
+    let close = if is_file(&file) { format!("did you mean '{file}'? ") } else { close };
     let names: Vec<&str> = CATALOGUE.iter().map(|entry| entry.0).collect();
     Error::new(
         ErrorKind::NotFound,

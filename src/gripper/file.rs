@@ -14,6 +14,7 @@ use super::{Body, Gripper, Jaw, Moving, Shape, Source, Travel, layer, mesh, rect
 use crate::error::{Error, Result};
 use crate::geometry::{convex_hull, is_convex, polygon, ring_area};
 use crate::model::Frame;
+use crate::text::with_shape;
 use crate::units::Quantity;
 
 #[derive(Deserialize)]
@@ -141,23 +142,21 @@ pub fn read(path: &Path) -> Result<Gripper> {
     parse_in(&text, &place, path.parent())
 }
 
-/// What TOML's reader says of a value of another shape, with the shapes that this file has.
-fn shape(message: &str) -> String {
-    let hint = if message.contains("expected an array of length 2") {
-        "give two texts with units, e.g. stroke = [\"0mm\", \"85mm\"] or force = [\"20N\", \"235N\"]"
-    } else if message.contains("expected an array of length 3") {
-        "give three texts with units along x1, x2, x3, e.g. [\"40mm\", \"20mm\", \"8mm\"]"
-    } else if message.contains("expected a sequence") {
-        "bodies stand in double brackets, one table for each: [[finger]], [[palm]]"
-    } else if message.contains("expected a string") {
-        "give a text with its unit, e.g. \"12mm\""
-    } else if message.contains("expected f64") {
-        "give a plain number, without unit and quotes, e.g. 0.5"
-    } else {
-        return message.to_string();
-    };
-    format!("{message}: {hint}")
-}
+/// What to write where TOML's reader finds another shape.
+const SHAPES: [(&str, &str); 3] = [
+    (
+        "expected an array of length 2",
+        "give two texts with units, e.g. stroke = [\"0mm\", \"85mm\"] or force = [\"20N\", \"235N\"]",
+    ),
+    (
+        "expected an array of length 3",
+        "give three texts with units along x1, x2, x3, e.g. [\"40mm\", \"20mm\", \"8mm\"]",
+    ),
+    (
+        "expected a sequence",
+        "bodies stand in double brackets, one table for each: [[finger]], [[palm]]",
+    ),
+];
 
 /// Parses the text of a gripper file; `place` names it in messages. Such a text cannot name mesh
 /// files.
@@ -176,7 +175,11 @@ fn parse_in(text: &str, place: &str, folder: Option<&Path>) -> Result<Gripper> {
         let line = error.span().map_or(String::new(), |span| {
             format!(":{}", text[..span.start.min(text.len())].matches('\n').count() + 1)
         });
-        Error::format(format!("{place}{line}"), shape(error.message()), remedy(error.message()))
+        Error::format(
+            format!("{place}{line}"),
+            with_shape(error.message(), &SHAPES),
+            remedy(error.message()),
+        )
     })?;
     let reader = Reader { place, folder };
     if file.name.trim().is_empty() {

@@ -18,6 +18,9 @@ export const pressure = (t) => ramp(PRESSURE, t);
 /** Colours of reasons, told apart by the colour-blind too (Okabe and Ito 2008); what is left is grey. */
 export const REASONS = ['#d55e00', '#0072b2', '#e69f00', '#009e73', '#cc79a7', '#56b4e9', '#f0e442'];
 
+/** What stops a rejected candidate. */
+export const HIT = '#c8102e';
+
 /** The colour of a reason for which candidates were rejected. */
 export function reasonColour(report, name) {
   const place = report.header.reasons.filter((reason) => !reason.startsWith('face_pair')).indexOf(name);
@@ -31,8 +34,8 @@ export const gradient = (scale, steps = 12) =>
 /** Maps mu_s to 0..1 between the best and the 95th percentile, so that a few hopeless grips do not flatten the rest. */
 export function frictionScale(values) {
   const sorted = Float32Array.from(values.filter(Number.isFinite)).sort();
-  if (sorted.length === 0) return { low: 0, high: 1, at: () => 1 };
+  if (sorted.length === 0) return { low: 0, high: 1, most: 1, at: () => 1 };
   const low = sorted[0];
   const high = Math.max(sorted[Math.ceil((sorted.length - 1) * 0.95)], low * 1.0001 + 1e-9);
-  return { low, high, at: (mu) => (Number.isFinite(mu) ? (mu - low) / (high - low) : 1) };
+  return { low, high, most: sorted.at(-1), at: (mu) => (Number.isFinite(mu) ? (mu - low) / (high - low) : 1) };
 }

@@ -43,10 +43,12 @@ export function drawCompare(root, report, pinned, chosen) {
     const row = body.insertRow();
     row.append(node('th', name, { scope: 'row' }));
     const values = value && [pinned, chosen].map((i) => better * value(i));
+    // What reads the same is not better.
+    const differ = text(pinned) !== text(chosen);
     [pinned, chosen].forEach((i, k) => {
       const cell = row.insertCell();
       cell.textContent = text(i);
-      const best = values && better && values[k] > values[1 - k] + 1e-6 * Math.abs(values[k]);
+      const best = values && differ && values[k] > values[1 - k] + 1e-6 * Math.abs(values[k]);
       if (best) cell.append(node('span', ' \u2713', { class: 'best', 'aria-label': ', better' }));
     });
   }

@@ -4,6 +4,7 @@
 
 import { css, gradient, pressure as scale } from './colour.js';
 import { inMm, niceStep, number, pressureUnit } from './format.js';
+import { motionOf } from './motion.js';
 import { inside } from './pads.js';
 
 const SVG = 'http://www.w3.org/2000/svg';
@@ -40,9 +41,9 @@ function frame(pad, rings, slip) {
       [left, right, bottom, top] = [Math.min(left, x - 0.06 * size), Math.max(right, x + 0.06 * size), Math.min(bottom, y - 0.06 * size), Math.max(top, y + 0.06 * size)];
     }
   }
-  // Square drawings, side by side, keep their place whatever the grip.
-  const side = 1.22 * Math.max(right - left, top - bottom);
-  return { x: (left + right) / 2, y: (bottom + top) / 2, side };
+  // Square drawings, side by side, keep their place whatever the grip. Below, scale and axes have room.
+  const side = 1.3 * Math.max(right - left, top - bottom);
+  return { x: (left + right) / 2, y: (bottom + top) / 2 - 0.045 * side, side };
 }
 
 /** Fills the two figures in `root` for grip `i` of the report under load `load` (left out: the worst one). */
@@ -76,22 +77,28 @@ export function drawContact(root, report, i, prefix = '', load = report.column.l
   const legend = root.querySelector('.pressure-legend');
   legend.querySelector('.bar').style.background = gradient(scale);
   legend.querySelector('.max').textContent = state.known ? `${number(largest / unit)}\u00a0${unitName}` : 'unknown';
-  root.querySelector('.slip').textContent = slipWords(slip);
+  root.querySelector('.slip').textContent = slipWords(report, i, slip);
 }
 
-/** Direction in the pads' plane of an axis along `(a, b)`. */
-function axisWords([a, b]) {
-  const length = Math.hypot(a, b);
-  if (Math.abs(b) < 1e-3 * length) return 'x\u2081';
-  if (Math.abs(a) < 1e-3 * length) return 'x\u2082';
-  return `(${number(a / length)}, ${number(b / length)})`;
+/** A direction in the grip's frame: along an axis of the pads, or by its components. */
+function axisWords(axis) {
+  const along = axis.findIndex((v) => Math.abs(v) > 1 - 1e-6);
+  if (along >= 0) return ['x\u2081', 'x\u2082', 'x\u2083'][along];
+  const [a, b, c] = axis.map((v) => number(Math.abs(v) < 1e-6 ? 0 : v));
+  return `(${a}, ${b}${Number(c) === 0 ? '' : `, ${c}`})`;
 }
 
-function slipWords(slip) {
-  if (slip.type === 'rotation') return `Would slip by turning about the centre (${inMm(slip.c[0])}, ${inMm(slip.c[1])})\u00a0mm; arrows: friction on the part.`;
-  if (slip.type === 'translation') return 'Would slip straight, without turning; arrows: friction on the part.';
-  if (slip.type === 'spin') return `Would ${slip.rolls ? 'roll' : 'spin'} about an axis along ${axisWords(slip.omega)}: it ${slip.rolls ? `stays on pad ${slip.rolls} and slips on the other` : 'slips on both pads'}; arrows: friction on the part.`;
-  if (slip.type === 'none') return 'No load in the pad plane: nothing slips at any friction.';
+/** The incipient motion of grip `i` in words. */
+function slipWords(report, i, slip) {
+  const motion = motionOf(report, i, slip);
+  const { type, on, pitch } = motion;
+  const arrows = '; arrows: friction on the part.';
+  if (type === 'turns') return `Would slip by turning about the centre (${inMm(motion.foot[0])}, ${inMm(motion.foot[1])})\u00a0mm${arrows}`;
+  if (type === 'slides') return `Would slip straight, ${slip.type === 'translation' ? 'without turning' : 'all but without turning'}${arrows}`;
+  if (type === 'rolls') return `Would roll about an axis along ${axisWords(motion.axis)}: it stays on pad ${on} and slips on the other${arrows}`;
+  const along = pitch ? ` and slide ${number(Math.abs(pitch) * 2e3 * Math.PI)}\u00a0mm along it each turn` : '';
+  if (type === 'spins') return `Would spin about an axis along ${axisWords(motion.axis)}${along}: it slips on both pads${arrows}`;
+  if (type === 'none') return 'No load in the pad plane: nothing slips at any friction.';
   return 'No slip limit was found for this load.';
 }
 

@@ -103,7 +103,7 @@ export class Detail {
     tile('mu', `${about}${number(this.report.mu(i))}`, this.report.estimate ? `estimate at ${newtons(this.report.now.force)}` : 'at the worst load');
     const safety = this.report.safety(i);
     tile('safety', Number.isFinite(safety) ? `${about}${number(safety)}\u00d7` : c.mu[i] === 0 ? '\u221e' : NONE, padFriction ? `pad friction ${chosen(padFriction)}${asked === 1 ? '' : `, ${chosen(asked)}\u00d7 asked`}` : 'pad friction not stated');
-    const range = { above: ' \u2013 more than the gripper has', below: ' \u2013 less than its least' }[this.report.forceRange(i)] ?? '';
+    const range = { above: ' \u2013 more than the gripper has', below: ' \u2013 below the gripper\u2019s least' }[this.report.forceRange(i)] ?? '';
     tile('squeeze', `${this.report.squeezeEstimate && Number.isFinite(c.force_needed[i]) ? '\u2248\u2009' : ''}${newtons(this.report.squeeze(i))}`, padFriction ? `per jaw${range}` : 'pad friction not stated');
     tile('width', mm(c.width[i]), c.inside[i] ? 'from face to face, held from inside' : 'from face to face');
     this.find('.more').replaceChildren(

@@ -1,12 +1,11 @@
 // Rejected candidates in the view: dots by reason, and one of them with the body that stops it.
 
 import { BufferAttribute, BufferGeometry, Color, Float32BufferAttribute, Group, LineBasicMaterial, LineSegments, Matrix4, MeshStandardMaterial, Points, PointsMaterial, Vector3 } from 'three';
-import { reasonColour } from './colour.js';
+import { HIT, reasonColour } from './colour.js';
 import { gapsOf, palmAlong } from './take.js';
 import { dotTexture, target } from './signs.js';
 
 const MM = 1000;
-const HIT = '#c8102e';
 
 const vector = (list) => new Vector3(...list);
 const basis = ({ x1, x2, x3 }) => new Matrix4().makeBasis(vector(x1), vector(x2), vector(x3));

@@ -1,8 +1,8 @@
 // The part with the chosen grip in three dimensions. Draws only when something changed. The world is in millimetres.
 
 import {
-  AmbientLight, Box3, Box3Helper, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, FrontSide, Group, HemisphereLight, LineBasicMaterial, LineSegments,
-  Matrix4, Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Points, PointsMaterial, Quaternion, Raycaster, Scene, Spherical, Vector2, Vector3,
+  AmbientLight, Box3, Box3Helper, BufferAttribute, BufferGeometry, CatmullRomCurve3, Color, DirectionalLight, DoubleSide, FrontSide, Group, HemisphereLight, LineBasicMaterial, LineSegments,
+  Matrix4, Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Points, PointsMaterial, Quaternion, Raycaster, Scene, Spherical, TubeGeometry, Vector2, Vector3,
   WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
@@ -10,19 +10,26 @@ import { friction } from './colour.js';
 import { verdict } from './detail.js';
 import { Jaws } from './jaws.js';
 import { Misses } from './misses.js';
-import { approachSign, dotTexture, fixtures, frameSign, LoadSign } from './signs.js';
+import { motionOf } from './motion.js';
+import { approachSign, dotTexture, fixtures, frameSign, LoadSign, MotionSign } from './signs.js';
 import { gaps, palmAlong, palmPlace } from './take.js';
 
 const MM = 1000;
 const MOVE_MS = 260;
-const PLAY_MS = 1800;
+const PLAY_MS = 2600;
+/** Shares of it at which the approach ends and the jaws begin to close. */
+const [ARRIVED, CLOSING] = [0.5, 0.55];
+/** Places of a jaw at which its way is drawn. */
+const STEPS = 24;
+/** Radius of the part in the view [px] at which dots have their full size, and the least share of that. */
+const [DOTTED, LEAST_DOT] = [260, 0.5];
 /** Share of the view's width that what is framed fills, and the height [px] that it leaves free below the buttons. */
 const [FILL, MARGIN] = [0.86, 16];
 const UP = new Vector3(0, 0, 1);
 
 const PALETTE = {
-  light: { part: '#b4bdc8', edge: '#4b5663', jaw: '#4a6785', jawEdge: '#2f4a66', pad: '#d9762b', load: '#a3158f', fixture: '#8a6d00', ghost: '#0a7d6c', approach: '#0a5fb4', sky: '#ffffff', ground: '#9aa3ad' },
-  dark: { part: '#76828f', edge: '#11161b', jaw: '#9db4cc', jawEdge: '#c9d8e6', pad: '#f0964d', load: '#ef6bd8', fixture: '#d9b84a', ghost: '#4fd1bd', approach: '#6db3f8', sky: '#f2f6fa', ground: '#4a535d' },
+  light: { part: '#b4bdc8', edge: '#4b5663', jaw: '#4a6785', jawEdge: '#2f4a66', pad: '#d9762b', load: '#a3158f', fixture: '#8a6d00', ghost: '#0a7d6c', approach: '#0a5fb4', motion: '#18212b', sky: '#ffffff', ground: '#9aa3ad' },
+  dark: { part: '#76828f', edge: '#11161b', jaw: '#9db4cc', jawEdge: '#c9d8e6', pad: '#f0964d', load: '#ef6bd8', fixture: '#d9b84a', ghost: '#4fd1bd', approach: '#6db3f8', motion: '#ffffff', sky: '#f2f6fa', ground: '#4a535d' },
 };
 
 const vector = (list) => new Vector3(...list);
@@ -105,6 +112,7 @@ export class View {
       contactEdge: new LineBasicMaterial(),
       pressed: new MeshBasicMaterial({ vertexColors: true, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: -3, polygonOffsetUnits: -3 }),
       load: new MeshBasicMaterial({ depthTest: false, transparent: true }),
+      motion: new MeshBasicMaterial({ depthTest: false, transparent: true }),
       ghost: new LineBasicMaterial({ transparent: true, opacity: 0.9 }),
       fixture: new MeshBasicMaterial({ opacity: 0.14, ...glass }),
       fixtureEdge: new LineBasicMaterial({ transparent: true, opacity: 0.5 }),
@@ -170,10 +178,12 @@ export class View {
       own.setAttribute('position', geometry.attributes.position);
       own.setAttribute('color', geometry.attributes.color);
       own.setIndex(new BufferAttribute(new Uint32Array(2 * n), 1));
-      const material = new PointsMaterial({ size: cross ? size + 2 : size, sizeAttenuation: false, vertexColors: true, map: dotTexture(cross ? 'cross' : 'disc'), alphaTest: 0.35, transparent: true });
+      const ownSize = cross ? size + 2 : size;
+      const material = new PointsMaterial({ size: ownSize, sizeAttenuation: false, vertexColors: true, map: dotTexture(cross ? 'cross' : 'disc'), alphaTest: 0.35, transparent: true });
       material.onBeforeCompile = raise;
       const points = new Points(own, material);
       points.frustumCulled = false;
+      points.userData.size = ownSize;
       this.dots.add(points);
       return points;
     });
@@ -197,7 +207,7 @@ export class View {
 
   setTheme(dark) {
     const colours = PALETTE[dark ? 'dark' : 'light'];
-    for (const name of ['part', 'edge', 'jaw', 'jawEdge', 'pad', 'load', 'fixture', 'ghost', 'approach']) this.materials[name].color.set(colours[name]);
+    for (const name of ['part', 'edge', 'jaw', 'jawEdge', 'pad', 'load', 'fixture', 'ghost', 'approach', 'motion']) this.materials[name].color.set(colours[name]);
     this.materials.palm.color.set(colours.jaw);
     this.materials.fixtureEdge.color.set(colours.fixture);
     for (const name of ['padEdge', 'contact', 'contactEdge']) this.materials[name].color.set(colours.pad);
@@ -230,7 +240,7 @@ export class View {
   setGrip(i, glide = true) {
     const known = this.grip >= 0;
     this.grip = i;
-    this.load.visible = false;
+    this.load.visible = this.motionSign.visible = false;
     this.misses.show(-1);
     if (i < 0) return this.standAside();
     const { x1, x2, x3, origin } = this.report.pose(i);
@@ -239,6 +249,8 @@ export class View {
     this.jaws.contacts.forEach((contact) => (contact.visible = true));
     this.width = this.report.column.width[i];
     this.inside = this.report.column.inside[i] === 1;
+    this.drawWays();
+    this.showMotion(this.report.state(i));
     this.glide(to, known && glide);
   }
 
@@ -246,7 +258,35 @@ export class View {
   setLoad(load, state) {
     this.load.show(this.report.header.loads[load].wrench, this.radius / MM);
     if (state?.pieces && this.grip >= 0) this.jaws.setContact(this.report.contact(this.grip), state);
+    this.showMotion(state);
     this.render();
+  }
+
+  /** Draws how the part would begin to slip with the pads in `state`. */
+  showMotion(state) {
+    if (this.grip < 0 || !state) return;
+    const pad = this.report.header.gripper?.pad.map(([x, y]) => Math.hypot(x, y)) ?? [(0.3 * this.radius) / MM];
+    this.motionSign.show(motionOf(this.report, this.grip, state.slip), 0.8 * Math.max(...pad));
+  }
+
+  /** The way of the front edge of either pad as the jaws close from where they are opened to. */
+  drawWays() {
+    const { gripper } = this.report.header;
+    this.ways.visible = false;
+    if (!gripper) return;
+    const [holding, free] = gaps(this.report, this.grip);
+    const [kept, front] = [this.opening, Math.max(...gripper.pad.map(([x]) => x))];
+    const tracks = [[], []];
+    for (let k = 0; k <= STEPS; k++) {
+      this.opening = free + (k / STEPS) * (holding - free);
+      this.placeJaws();
+      this.jaws.fingers.forEach(({ position }, side) => tracks[side].push([position.x + front, position.y, position.z]));
+    }
+    this.opening = kept;
+    this.ways.children.forEach((way, side) => {
+      way.geometry.dispose();
+      way.geometry = new TubeGeometry(new CatmullRomCurve3(tracks[side].map(vector)), STEPS, 0.02 * front, 8);
+    });
   }
 
   /** Shows rejected candidate `k` in place of the grip (-1: the grip again). */
@@ -254,7 +294,7 @@ export class View {
     cancelAnimationFrame(this.motion);
     this.moving = false;
     if (k < 0) return this.setGrip(this.grip, false);
-    this.load.visible = false;
+    this.load.visible = this.motionSign.visible = this.ways.visible = false;
     this.misses.show(k);
     this.render();
   }
@@ -298,6 +338,7 @@ export class View {
     // From inside, the fingers' outer faces touch, and the jaws let go by closing.
     const [holding, free] = gaps(this.report, this.grip);
     const opening = this.open ? free : holding;
+    this.ways.visible = this.open;
     const step = (t) => {
       root.quaternion.slerpQuaternions(from.q, to.q, t);
       root.position.lerpVectors(from.p, to.p, t);
@@ -335,11 +376,13 @@ export class View {
     const away = Math.max((1.1 * this.radius) / MM, 0.04);
     const ease = (t) => t * t * (3 - 2 * t);
     const step = (t) => {
-      const way = ease(Math.min(t / 0.6, 1)) - 1;
+      const way = ease(Math.min(t / ARRIVED, 1)) - 1;
       root.position.set(...origin).addScaledVector(vector(x1), way * away);
-      this.opening = free + ease(Math.max((t - 0.65) / 0.35, 0)) * (holding - free);
+      this.opening = free + ease(Math.max((t - CLOSING) / (1 - CLOSING), 0)) * (holding - free);
       this.placeJaws();
+      this.ways.visible = t >= ARRIVED;
       this.jaws.contacts.forEach((contact) => (contact.visible = t >= 1));
+      this.motionSign.visible = t >= 1 && this.motionSign.drawn;
       this.draw();
     };
     this.moving = true;
@@ -375,6 +418,7 @@ export class View {
       this.misses.points.visible = visible;
       if (!visible && this.misses.shown >= 0 && this.grip >= 0) this.onMiss(-1);
     }
+    if (what === 'motion') this.jaws.root[visible ? 'add' : 'remove'](this.motionSign);
     if (what === 'load') this.world[visible ? 'add' : 'remove'](this.load);
     if (what === 'glass' && this.partMesh) {
       const material = this.materials.part;
@@ -411,7 +455,12 @@ export class View {
     const { gripper } = this.report.header;
     const pad = gripper ? Math.max(...gripper.pad.map((point) => point[0])) : 0;
     this.approach = approachSign(this.materials.approach, Math.max((0.5 * this.radius) / MM, 2 * pad), pad);
-    this.jaws.root.add(this.approach);
+    this.motionSign = new MotionSign(this.materials.motion);
+    this.motionSign.visible = false;
+    this.ways = new Group().add(...[0, 1].map(() => new Mesh(new BufferGeometry(), this.materials.approach)));
+    this.ways.visible = false;
+    this.ways.children.forEach((way) => (way.renderOrder = 9));
+    this.jaws.root.add(this.approach, this.motionSign, this.ways);
     if (!gripper?.flange) return;
     this.flange = frameSign(gripper.flange, 0.022 / MM);
     this.jaws.palm.add(this.flange);
@@ -583,6 +632,10 @@ export class View {
     this.camera.near = Math.max(distance - reach, distance * 0.01, this.radius * 0.002);
     this.camera.far = distance + reach;
     this.camera.updateProjectionMatrix();
+    // Seen from afar, dots of one size would cover the part.
+    const seen = (this.radius / (distance * Math.tan((this.camera.fov * Math.PI) / 360))) * (this.host.clientHeight / 2);
+    const share = Math.min(1, Math.max(LEAST_DOT, seen / DOTTED));
+    for (const { material, userData } of this.dots.children) material.size = share * userData.size;
     this.renderer.render(this.scene, this.camera);
     this.listeners.forEach((listener) => listener());
   }

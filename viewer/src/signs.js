@@ -115,6 +115,37 @@ export class LoadSign extends Group {
   }
 }
 
+/** The incipient motion of the part: an arrow where it slides, a turning arrow about an axis where it turns. */
+export class MotionSign extends Group {
+  constructor(material) {
+    super();
+    this.straight = new Group().add(
+      new Mesh(new CylinderGeometry(0.02, 0.02, 1.1, 12).translate(0, 0.55, 0), material),
+      new Mesh(new ConeGeometry(0.07, 0.26, 20).translate(0, 1.23, 0), material),
+    );
+    const turn = 1.6 * Math.PI;
+    this.turning = new Group().add(
+      new Mesh(new TorusGeometry(0.5, 0.02, 10, 48, turn), material),
+      new Mesh(new ConeGeometry(0.07, 0.22, 20).rotateZ(-0.1 * Math.PI).translate(0.5 * Math.cos(turn) + 0.06, 0.5 * Math.sin(turn) + 0.09, 0), material),
+    );
+    // The axis in dashes, both ways from where it passes the middle of the grip.
+    for (let k = -5; k <= 5; k++) this.turning.add(new Mesh(new CylinderGeometry(0.014, 0.014, 0.17, 8).rotateX(Math.PI / 2).translate(0, 0, 0.29 * k), material));
+    this.add(this.straight, this.turning);
+    this.traverse((object) => (object.renderOrder = 11));
+  }
+
+  /** Shows `motion` (see `motionOf`), with arrows of the size `size` [m]. */
+  show(motion, size) {
+    this.visible = this.drawn = Boolean(motion.direction ?? motion.axis);
+    this.straight.visible = Boolean(motion.direction);
+    this.turning.visible = Boolean(motion.axis);
+    this.scale.setScalar(size);
+    this.position.set(...(motion.foot ?? [0, 0, 0]));
+    if (motion.direction) this.straight.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), vector(motion.direction));
+    if (motion.axis) this.turning.quaternion.setFromUnitVectors(UP, vector(motion.axis));
+  }
+}
+
 /** An arrow along x1 that ends before the pads; `length` and `pad` [m]. */
 export function approachSign(material, length, pad) {
   const arrow = new Group().add(

@@ -184,13 +184,21 @@ export function tellingMiss(report) {
   return first ? nearest.get(first.name) : -1;
 }
 
+/** Whether the part is smaller than the pads, as one is in a file of another unit than was taken. */
+function tiny({ header: { part, gripper } }) {
+  if (!gripper) return false;
+  const pad = [0, 1].map((k) => Math.max(...gripper.pad.map((point) => point[k])) - Math.min(...gripper.pad.map((point) => point[k])));
+  return Math.max(...part.bbox_max.map((high, k) => high - part.bbox_min[k])) < Math.min(...pad);
+}
+
 /** Writes the panel and answers with its headline, or null where grips hold. `show(k)` shows rejected candidate k; null without a view. */
 export function drawWhy(root, report, show) {
   if (!nothingHolds(report)) return null;
   const { summary, gripper } = report.header;
   const list = reasons(report);
   const fallen = list.reduce((sum, entry) => sum + (entry.pairs ? 0 : entry.n), 0);
-  const advice = new Set(list.map((entry) => entry.help).filter(Boolean));
+  const unit = report.n === 0 && tiny(report) ? 'The whole part is smaller than the pads: if its file is in another unit, state that (--unit).' : '';
+  const advice = new Set([unit, ...list.map((entry) => entry.help)].filter(Boolean));
   let [title, lead] = ['No grip holds this part', ''];
   if (report.n > 0) {
     const slip = allSlip(report);

@@ -9,6 +9,7 @@ import { join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { chromium } from 'playwright-core';
 import { friction, pressure, REASONS } from '../src/colour.js';
+import { motionOf } from '../src/motion.js';
 
 const [folder, shots] = process.argv.slice(2).map((path) => resolve(path));
 const [small, large, none, slipping, curved] = ['small', 'large', 'none', 'slipping', 'curved'].map((name) => join(folder, `${name}.html`));
@@ -491,7 +492,7 @@ async function gripper(page) {
   const seen = await page.evaluate(() => new Promise((done) => {
     const { view } = window.gripfast;
     const seen = [];
-    const look = () => seen.push({ place: view.jaws.root.position.toArray(), opening: view.opening });
+    const look = () => seen.push({ place: view.jaws.root.position.toArray(), opening: view.opening, ways: view.ways.visible, slip: view.motionSign.visible });
     view.listeners.push(look);
     document.querySelector('[data-act="play"]').click();
     const wait = () => (view.moving ? requestAnimationFrame(wait) : (view.listeners.splice(view.listeners.indexOf(look), 1), done(seen)));
@@ -524,15 +525,30 @@ async function gripper(page) {
   };
   // Between the steps of the table straight lines leave the arc by up to 0.016 mm.
   check('opened jaws stand on their arc', Math.abs(open.palm - open.finger - along(open.opening)) < 2e-5 && Math.abs(open.finger) > 0.008 && open.finger === open.other && arc.nearer > 0.009 && arc.nearer < 0.013, `${JSON.stringify(open)} ${arc.nearer}`);
+  // The ways end where the pads' front edges stand, opened and closed.
+  const ends = await page.evaluate(() => {
+    const { view, report } = window.gripfast;
+    const front = Math.max(...report.header.gripper.pad.map(([x]) => x));
+    const free = report.column.width[view.grip] + Math.min(2 * (report.header.asked.opening ?? Infinity), report.header.gripper.stroke[1] - report.column.width[view.grip]);
+    return view.ways.children.flatMap(({ geometry: { parameters: { path: { points } } } }, side) => [[points[0], free], [points.at(-1), view.width]].map(([point, gap]) => {
+      view.opening = gap;
+      view.placeJaws();
+      const { position } = view.jaws.fingers[side];
+      return Math.hypot(point.x - position.x - front, point.y - position.y, point.z - position.z);
+    }));
+  });
+  check('their ways end where they stand', ends.length === 4 && ends.every((off) => off < 1e-6) && (await page.evaluate(() => window.gripfast.view.ways.visible)), ends.join());
   await page.click('[data-toggle="open"]');
   await rest(page);
   check('the approach is played', seen.length > 2 && way > 0.02, `${seen.length} pictures, ${(way * 1e3).toFixed(0)} mm`);
   const widest = Math.max(...seen.map(({ opening }) => opening));
   check('with the jaws opened as planned', asked === null ? widest > before.opening : Math.abs(widest - before.opening - 2 * asked) < 1e-6, `${widest - before.opening}, asked for ${asked} per jaw`);
+  const closing = seen.filter(({ opening }) => opening < widest - 1e-6 && opening > before.opening + 1e-6);
+  check('the ways of the pads are drawn as they close', closing.length > 0 && closing.every(({ ways, slip }) => ways && !slip) && !(await page.evaluate(() => window.gripfast.view.ways.visible)), `${closing.length} pictures`);
   check('and ends in the grip', JSON.stringify(after) === JSON.stringify(before), `${JSON.stringify(before)} ${JSON.stringify(after)}`);
   await page.click('#key summary');
   const legend = await page.innerText('#key');
-  check('a legend explains the colours', ['disc holds', 'Part', 'Gripper', 'Pads', 'Approach', 'Load', 'Flange'].every((word) => legend.includes(word)), legend);
+  check('a legend explains the colours', ['disc holds', 'Part', 'Gripper', 'Pads', 'pads touch', 'Approach', 'ways of the pads', 'Load', 'begin to slip', 'Pinned', 'Flange'].every((word) => legend.includes(word)), legend);
   const hexes = await page.evaluate(() => [...document.querySelectorAll('#key .sign.box, #key .sign.line')].map((sign) => getComputedStyle(sign).backgroundColor));
   check('its colours are those of the view, all different', new Set(hexes).size === hexes.length, hexes.join());
   check('the flange frame is drawn', await page.evaluate(() => window.gripfast.view.flange.parent !== null && window.gripfast.view.flange.children.length === 6));
@@ -706,6 +722,17 @@ async function tablet() {
   await page.close();
 }
 
+/** Where three columns just fit, the view is narrow: its legend and its note have room one above the other. */
+async function narrow() {
+  const page = await open(large, { width: 1000, height: 800 });
+  await page.click('#key summary');
+  const [key, note, bar] = await page.evaluate(() => ['#key', '#note', '#toolbar'].map((name) => document.querySelector(name).getBoundingClientRect().toJSON()));
+  check('the legend stands between buttons and note', key.top > bar.bottom && key.bottom <= note.top && note.height > 0 && key.height > 200, JSON.stringify([key, note, bar]));
+  await legible(page, 'where the view is narrow');
+  await shot(page, 'narrow');
+  await page.close();
+}
+
 async function phone() {
   const page = await open(small, { width: 390, height: 844 });
   const wide = () => page.evaluate(() => document.documentElement.scrollWidth - window.innerWidth);
@@ -876,13 +903,44 @@ async function barrel() {
   check('the strip is drawn in the view', found.mesh.every((count) => count > 500), found.mesh.join());
   const map = await colours(page, '.contact figure:nth-child(1) svg');
   check('and on the unrolled face', (await page.locator('.contact figure image').count()) === 2 && map.different > 25, JSON.stringify(map));
-  const spins = await page.evaluate(() => {
-    const { report, state } = window.gripfast;
-    return state.order.findIndex((i) => report.slip(i).type === 'spin');
+  // Of the stored motions about more than x3 those that turn, by how far the faces move of it.
+  const motions = await page.evaluate(() => {
+    const { report, state, detail, view } = window.gripfast;
+    const found = { turns: [] };
+    for (const i of state.order) {
+      for (const load of report.hardestFirst(i)) {
+        const slip = report.state(i, load)?.slip;
+        if (slip?.type !== 'spin') continue;
+        const share = (Math.hypot(...slip.omega) * report.column.width[i]) / 2 / Math.hypot(...slip.velocity);
+        if (share > 0.5 && found.turns.length < 40) found.turns.push([i, load, slip]);
+      }
+    }
+    const cross = ([a, b, c], [d, e, f]) => [b * f - c * e, c * d - a * f, a * e - b * d];
+    return Object.fromEntries(Object.entries(found).map(([kind, list]) => [kind, list.map(([i, load, slip]) => {
+      view.setGrip(i, false);
+      detail.show(i);
+      detail.pick(load);
+      const sign = view.motionSign;
+      const [foot, axis] = [sign.position.toArray(), [0, 0, 1]];
+      const { x, y, z, w } = sign.turning.quaternion;
+      // The axis turned as the sign is.
+      const t = cross([x, y, z], axis).map((v) => 2 * v);
+      const turned = cross([x, y, z], t).map((v, k) => axis[k] + w * t[k] + v);
+      // A point on the axis moves along it alone.
+      const motion = cross(slip.omega, foot).map((v, k) => v + (slip.velocity[k] ?? 0));
+      const off = Math.hypot(...cross(motion, turned));
+      const along = slip.omega.reduce((sum, v, k) => sum + v * turned[k], 0) / Math.hypot(...slip.omega);
+      const face = { I: 0.5, II: -0.5 }[slip.rolls];
+      return { words: document.querySelector('.contact .slip').textContent, rolls: slip.rolls, off, along, straight: sign.straight.visible, turning: sign.turning.visible, from: face === undefined ? 0 : Math.abs(foot[2] - face * report.column.width[i]) };
+    })]));
   });
-  await page.click(`.row[data-position="${spins}"]`);
+  check('a spin is told', motions.turns.length > 0 && motions.turns.every(({ words, rolls }) => (rolls ? new RegExp(`Would roll about an axis .* stays on pad ${rolls} `) : /Would spin about an axis/).test(words)), JSON.stringify(motions.turns.slice(0, 3)));
+  check('and drawn about the axis whose points do not move across it', motions.turns.every(({ off, along, turning, straight }) => turning && !straight && off < 1e-5 && along > 1 - 1e-6));
+  check('a rolling part turns about a line of the pad that it stays on', motions.turns.every(({ from }) => from < 1e-5), JSON.stringify(motions.turns.find(({ from }) => !(from < 1e-5))));
+  console.log(`     ${motions.turns.length} motions turn (${motions.turns.filter(({ rolls }) => rolls).length} roll)`);
+  const turning = await page.evaluate(() => window.gripfast.state.order.findIndex((i) => window.gripfast.report.slip(i).type === 'spin'));
+  await page.click(`.row[data-position="${turning}"]`);
   await rest(page);
-  check('a spin is told', /Would (spin|roll) about an axis/.test(await page.textContent('.contact .slip')), await page.textContent('.contact .slip'));
   const friction = await page.evaluate(() => {
     const { report, state } = window.gripfast;
     const pad = report.state(state.chosen);
@@ -925,12 +983,31 @@ async function tenThousand() {
   await page.close();
 }
 
+/** What a slip record is told as. */
+function motions() {
+  const report = { header: { gripper: { pad: [[0.01, 0.01], [-0.01, -0.01]] } }, column: { width: [0.02] } };
+  const near = (a, b) => a.every((v, k) => Math.abs(v - b[k]) < 1e-9);
+  const told = (slip) => motionOf(report, 0, slip);
+  const straight = told({ type: 'spin', omega: [-0.0018, 0, 3e-7], velocity: [-1, -0.175], rolls: '' });
+  check('a cylinder pulled along its axis is told to slide', straight.type === 'slides' && near(straight.direction, [-1, -0.175, 0].map((v) => v / Math.hypot(1, 0.175))), JSON.stringify(straight));
+  const far = told({ type: 'rotation', c: [0, 1970], sense: 1 });
+  check('a turn about a place two kilometres off too', far.type === 'slides' && near(far.direction, [1, 0, 0]), JSON.stringify(far));
+  const turn = told({ type: 'rotation', c: [0, 0.03], sense: -1 });
+  check('one about a place beside the pad not', turn.type === 'turns' && near(turn.foot, [0, 0.03, 0]) && near(turn.axis, [0, 0, -1]), JSON.stringify(turn));
+  const roll = told({ type: 'spin', omega: [2, 0, 0], velocity: [0, 0.02], rolls: 'I' });
+  check('a part that rolls on pad I turns about a line of it', roll.type === 'rolls' && near(roll.foot, [0, 0, 0.01]) && near(roll.axis, [1, 0, 0]) && roll.pitch === 0, JSON.stringify(roll));
+  const screw = told({ type: 'spin', omega: [2, 0, 0], velocity: [0.01, 0], rolls: '' });
+  check('one that spins may slide along its axis', screw.type === 'spins' && Math.abs(screw.pitch - 0.005) < 1e-12, JSON.stringify(screw));
+}
+
 try {
   scales();
+  motions();
   await wholePage();
   await asking();
   await linkAndTheme();
   await tablet();
+  if (existsSync(large)) await narrow();
   await phone();
   await nothing();
   await barrel();

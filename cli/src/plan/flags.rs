@@ -61,9 +61,9 @@ pub(crate) struct Args {
 /// The flags of a job, whatever its part, gripper and loads are.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct JobArgs {
-    /// Mass of the part, e.g. 350g.
+    /// Mass of the part, e.g. 350g. `plan` compares several, each given with its own --mass.
     #[arg(long, conflicts_with = "density")]
-    mass: Option<Mass>,
+    mass: Vec<Mass>,
     /// Density of the part's material, e.g. 2700kg/m3.
     #[arg(long)]
     density: Option<Density>,
@@ -344,9 +344,11 @@ impl Args {
         self.output.why.clone()
     }
 
-    /// What is compared: every gripper given, with every force and every friction of the pads.
+    /// What is compared: every gripper given, with every mass of the part, every force and every
+    /// friction of the pads.
     pub(super) fn variants(&self) -> gripfast::error::Result<Vec<Variant>> {
-        several::variants(&self.gripper, &self.job.force, &self.job.scoring.pad_friction)
+        let job = &self.job;
+        several::variants(&self.gripper, &job.mass, &job.force, &job.scoring.pad_friction)
     }
 
     /// Makes sure that nothing is given several times, which only `plan` compares.
@@ -394,9 +396,10 @@ fn given_several_times(flag: &str) -> Error {
 impl JobArgs {
     /// Makes sure that nothing is given several times, which only `plan` compares.
     pub(crate) fn single(&self) -> gripfast::error::Result<()> {
-        match (self.force.len(), self.scoring.pad_friction.len()) {
-            (2.., _) => Err(given_several_times("--force")),
-            (_, 2..) => Err(given_several_times("--pad-friction")),
+        match (self.mass.len(), self.force.len(), self.scoring.pad_friction.len()) {
+            (2.., _, _) => Err(given_several_times("--mass")),
+            (_, 2.., _) => Err(given_several_times("--force")),
+            (_, _, 2..) => Err(given_several_times("--pad-friction")),
             _ => Ok(()),
         }
     }
@@ -404,11 +407,14 @@ impl JobArgs {
     /// Sets the fields of a request for which a flag was given once.
     pub(crate) fn give(self, request: &mut Request) -> gripfast::error::Result<()> {
         // One takes the place of the other.
-        if self.mass.is_some() || self.density.is_some() {
+        if !self.mass.is_empty() || self.density.is_some() {
             (request.mass, request.density) = (None, None);
         }
+        if let [mass] = self.mass[..] {
+            request.mass = Some(mass);
+        }
         give!(self => request;
-            mass, density, com, inertia, unit, max_memory, outside_buffers, faceted, accel);
+            density, com, inertia, unit, max_memory, outside_buffers, faceted, accel);
         if let [force] = self.force[..] {
             request.force = Some(force);
         }

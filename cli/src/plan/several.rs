@@ -1,4 +1,4 @@
-//! Several grippers, forces or pads side by side: the same request planned with each.
+//! Several grippers, masses, forces or pads side by side: the same request planned with each.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use gripfast::error::Error;
 use gripfast::plan::{Outcome, Plan};
 use gripfast::request::Request;
 use gripfast::results::RankedGrip;
-use gripfast::units::Force;
+use gripfast::units::{Force, Mass, decimal};
 
 use super::layout::{self, Column, number, width, words, wrapped};
 use super::watch::{Interrupt, Watch};
@@ -19,6 +19,7 @@ use crate::terminal;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Variant {
     gripper: Option<String>,
+    mass: Option<Mass>,
     force: Option<Force>,
     pad_friction: Option<f64>,
     /// What tells it from the others, for the names of files.
@@ -27,30 +28,38 @@ pub(super) struct Variant {
     label: String,
 }
 
-/// Every gripper with every force and every friction of the pads.
+/// Every gripper with every mass of the part, every force and every friction of the pads.
 ///
 /// # Errors
 /// When one is given twice.
 pub(super) fn variants(
     grippers: &[String],
+    masses: &[Mass],
     forces: &[Force],
     frictions: &[f64],
 ) -> gripfast::error::Result<Vec<Variant>> {
     let mut variants: Vec<Variant> = Vec::new();
-    let all = |count: usize| 0..count.max(1);
-    for (gripper, force, friction) in all(grippers.len()).flat_map(|gripper| {
-        all(forces.len()).flat_map(move |force| {
-            all(frictions.len()).map(move |friction| (gripper, force, friction))
-        })
-    }) {
-        let (gripper, force) = (grippers.get(gripper), forces.get(force).copied());
-        let pad_friction = frictions.get(friction).copied();
+    let counts = [grippers.len(), masses.len(), forces.len(), frictions.len()];
+    // The last one turns fastest.
+    for number in 0..counts.map(|count| count.max(1)).iter().product() {
+        let mut rest: usize = number;
+        let mut place = [0; 4];
+        for (place, count) in place.iter_mut().zip(counts).rev() {
+            (*place, rest) = (rest % count.max(1), rest / count.max(1));
+        }
+        let (gripper, mass) = (grippers.get(place[0]), masses.get(place[1]).copied());
+        let (force, pad_friction) =
+            (forces.get(place[2]).copied(), frictions.get(place[3]).copied());
         let mut words = Vec::new();
         if let Some(gripper) = gripper.filter(|_| grippers.len() > 1) {
             let name = Path::new(gripper).file_name().unwrap_or_default().to_string_lossy();
             words.push(name.strip_suffix(".toml").unwrap_or(&name).to_owned());
         }
         let mut label = String::new();
+        if let Some(mass) = mass.filter(|_| masses.len() > 1) {
+            words.push(format!("{}kg", mass.0));
+            label += &format!(", {}", weighed(mass));
+        }
         if let Some(force) = force.filter(|_| forces.len() > 1) {
             words.push(format!("{}N", force.0));
             label += &format!(", {} N", force.0);
@@ -61,18 +70,23 @@ pub(super) fn variants(
         }
         let tag = words.join("-");
         if variants.iter().any(|variant| variant.tag == tag) {
-            let flag = match (grippers.len(), forces.len()) {
-                (2.., _) => "--gripper",
-                (_, 2..) => "--force",
-                _ => "--pad-friction",
-            };
+            let flags = ["--gripper", "--mass", "--force", "--pad-friction"];
+            let flag = flags[counts.iter().position(|count| *count > 1).unwrap_or(0)];
             let remedy =
-                "give each gripper, force and friction once, files under names of their own";
+                "give each gripper, mass, force and friction once, files under names of their own";
             return Err(Error::input(flag, format!("'{tag}' is given twice"), remedy));
         }
-        variants.push(Variant { gripper: gripper.cloned(), force, pad_friction, tag, label });
+        variants.push(Variant { gripper: gripper.cloned(), mass, force, pad_friction, tag, label });
     }
     Ok(variants)
+}
+
+/// A mass in grams, or in kilograms from one on.
+fn weighed(mass: Mass) -> String {
+    match mass.0 {
+        0.0..1.0 => format!("{} g", decimal(mass.0 * 1e3, 3)),
+        kilograms => format!("{} kg", decimal(kilograms, 3)),
+    }
 }
 
 /// Plans each variant, prints their best grips in one table, and writes the files of each under a
@@ -82,7 +96,7 @@ pub(super) fn run(request: &Request, variants: &[Variant]) -> anyhow::Result<Exi
         return Err(Error::input(
             "--json",
             "prints one result, and several plans are asked for",
-            "give one gripper, force and friction, or -o FILE for a file of each",
+            "give one gripper, mass, force and friction, or -o FILE for a file of each",
         )
         .into());
     }
@@ -94,6 +108,7 @@ pub(super) fn run(request: &Request, variants: &[Variant]) -> anyhow::Result<Exi
         if let Some(gripper) = &variant.gripper {
             request.gripper.clone_from(gripper);
         }
+        request.mass = variant.mass.or(request.mass);
         request.force = variant.force.or(request.force);
         let scoring = &mut request.scoring;
         scoring.pad_friction = variant.pad_friction.or(scoring.pad_friction);
@@ -137,10 +152,15 @@ struct Compared {
 fn print(outcomes: &[Compared]) -> anyhow::Result<()> {
     let (mut out, width) = (terminal::output(), width());
     if let Some(compared) = outcomes.first() {
-        writeln!(out, "{}", table::part(&compared.outcome.set))?;
+        let set = &compared.outcome.set;
+        let mass = |compared: &Compared| compared.outcome.set.part.mass.mass;
+        let same = outcomes.iter().all(|other| mass(other) == mass(compared));
+        writeln!(out, "{}", if same { table::part(set) } else { table::solid(set) })?;
     }
     for Compared { name, outcome, .. } in outcomes {
-        writeln!(out, "{name}: {}", table::verdict(&outcome.set))?;
+        let unsolved =
+            table::unsolved(&outcome.set).map_or(String::new(), |text| format!("; {text}"));
+        writeln!(out, "{name}: {}{unsolved}", table::verdict(&outcome.set))?;
         if !outcome.set.any_holds()
             && let Some(reasons) = table::reasons(&outcome.set)
         {

@@ -12,6 +12,7 @@ use gripfast::mechanics::squeeze_pressure;
 use gripfast::model::{Contact, Slip, Status};
 use gripfast::plan::OUTRANKED;
 use gripfast::results::{Comparison, EarlierScore, ForceRange, GripSet, RankedGrip};
+use gripfast::text::counted;
 use gripfast::units::decimal;
 
 use super::layout::{Column, grid, number, words, wrapped};
@@ -29,6 +30,9 @@ pub(super) fn print(
         writeln!(out, "\nno grip holds this part: see the reasons above")?;
         if set.summary.pairs == 0 {
             writeln!(out, "{}", no_pairs(&set.summary.rejections, gripper))?;
+        }
+        if let Some(text) = tiny(set, gripper) {
+            writeln!(out, "{text}")?;
         }
         return Ok(());
     }
@@ -134,6 +138,23 @@ fn legend(
     texts
 }
 
+/// A part that is smaller than the pads, as one is in a file of another unit than was taken.
+fn tiny(set: &GripSet, gripper: &Gripper) -> Option<String> {
+    let size = set.part.bbox_max - set.part.bbox_min;
+    let pad = gripper.pad_sizes()[0];
+    (size.max_element() < pad.min_element()).then(|| {
+        format!(
+            "the whole part is {} x {} x {} mm, smaller than the pads ({} x {} mm): where its file is \
+             in another unit, state that, e.g. --unit in, --unit cm or --unit m",
+            length(size.x * 1e3),
+            length(size.y * 1e3),
+            length(size.z * 1e3),
+            length(pad.x * 1e3),
+            length(pad.y * 1e3),
+        )
+    })
+}
+
 /// What a grip does with the force needed.
 pub(super) fn usable(safety: f64) -> String {
     match safety {
@@ -160,20 +181,16 @@ fn summary(out: &mut impl Write, set: &GripSet, gripper: &Gripper) -> std::io::R
     writeln!(out, "{}", part(set))?;
     writeln!(
         out,
-        "{} at {} N per jaw, {} loads, {} face pairs, {} candidates",
+        "{} at {} N per jaw, {}, {}, {}",
         gripper.name,
         decimal(set.provenance.resolved.force.0, 3),
-        set.loads.len(),
-        set.summary.pairs,
-        set.summary.candidates,
+        counted(set.loads.len() as u64, "load"),
+        counted(set.summary.pairs, "face pair"),
+        counted(set.summary.candidates, "candidate"),
     )?;
     writeln!(out, "{}", verdict(set))?;
-    if let Some(outranked) = set.summary.rejections.get(OUTRANKED) {
-        writeln!(
-            out,
-            "{outranked} more were not solved: their bounds put them behind the best {}",
-            set.grips.len()
-        )?;
+    if let Some(text) = unsolved(set) {
+        writeln!(out, "{text}")?;
     }
     if let Some(reasons) = reasons(set) {
         writeln!(out, "rejected: {reasons}")?;
@@ -181,19 +198,30 @@ fn summary(out: &mut impl Write, set: &GripSet, gripper: &Gripper) -> std::io::R
     Ok(())
 }
 
+/// How many grips were not solved, where there are such.
+pub(super) fn unsolved(set: &GripSet) -> Option<String> {
+    let count = set.summary.rejections.get(OUTRANKED)?;
+    let best = set.grips.len();
+    Some(format!("{count} more were not solved: their bounds put them behind the best {best}"))
+}
+
 /// The part: size, mesh and mass.
 pub(super) fn part(set: &GripSet) -> String {
     let mass = &set.part.mass;
+    let centre = tuple(&(mass.centre_of_mass * 1e3).to_array(), 2);
+    format!("{}, {} kg, centre of mass {centre} mm", solid(set), kilograms(mass.mass))
+}
+
+/// The part without its mass.
+pub(super) fn solid(set: &GripSet) -> String {
     let size = (set.part.bbox_max - set.part.bbox_min) * 1e3;
     format!(
-        "{}: {} x {} x {} mm, {} triangles, {} kg, centre of mass {} mm",
+        "{}: {} x {} x {} mm, {}",
         set.part.file,
         length(size.x),
         length(size.y),
         length(size.z),
-        set.part.triangles,
-        kilograms(mass.mass),
-        tuple(&(mass.centre_of_mass * 1e3).to_array(), 2)
+        counted(set.part.triangles as u64, "triangle"),
     )
 }
 
@@ -470,6 +498,7 @@ fn slip(grip: &RankedGrip) -> String {
         Some(Slip::Rotation { c, .. }) if c[0].hypot(c[1]) > SLIDES => "slides".into(),
         Some(Slip::Rotation { c, .. }) => tuple(&[c[0] * 1e3, c[1] * 1e3], 2),
         Some(Slip::Translation { .. }) => "slides".into(),
+        Some(Slip::Spin { .. }) if grip.slides() => "slides".into(),
         Some(Slip::Spin { rolls_on: Some(_), .. }) => "rolls".into(),
         Some(Slip::Spin { .. }) => "spins".into(),
         _ => "-".into(),

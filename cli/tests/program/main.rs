@@ -9,6 +9,7 @@ mod docs_commands;
 mod export;
 mod faults;
 mod figures;
+mod first_steps;
 mod flag_names;
 mod gripper;
 mod hostile;

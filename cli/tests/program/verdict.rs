@@ -333,10 +333,24 @@ fn grippers_are_compared_and_flags_given_twice_are_refused() {
         gripfast(at, &format!("{base} {one} -o alone.json"));
         assert_eq!(set.grips, GripSet::read(&at.join("alone.json")).unwrap().grips);
     }
+    // Masses: the part is told without its mass.
+    let output = gripfast(at, &format!("{base} -g robotiq-2f85 --mass 2kg -o masses.json"));
+    let out = text(&output.stdout);
+    assert!(
+        out.contains("Robotiq 2F-85, 350 g: ") && out.contains("Robotiq 2F-85, 2 kg: "),
+        "{out}"
+    );
+    assert!(out.lines().next().unwrap().ends_with("688 triangles"), "{out}");
+    for (tag, mass) in [("0.35kg", 0.35), ("2kg", 2.0)] {
+        let set = GripSet::read(&at.join(format!("masses.{tag}.json"))).unwrap();
+        assert!((set.part.mass.mass - mass).abs() < 1e-12, "{tag}");
+    }
     for (line, word) in [
         (format!("{base} {two} --force 40N --force 40N"), "given twice"),
         (format!("{base} {two} --poses x.csv").replacen("plan", "assess", 1), "several times"),
-        (format!("{base} {two} --mass 1kg"), "multiple times"),
+        (format!("{base} {two} --mass 0.35kg"), "given twice"),
+        (format!("{base} {two} --mass 1kg --poses x.csv").replacen("plan", "assess", 1), "several"),
+        (format!("{base} {two} --accel 1g"), "multiple times"),
         (format!("{base} -g generic -g generic"), "given twice"),
         (format!("{base} {two} --json"), "--json"),
         (format!("{base} {two} --why 0mm,0mm,0deg,0"), "--why"),
