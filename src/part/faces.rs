@@ -4,11 +4,12 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::curves::{self, Curves};
 use super::facets::Facets;
+use super::given::{GivenFace, GivenFaces};
 use super::noise::{self, Noise};
 use super::orient::Role;
 use super::regions::{self, Flatness, Regions};
 use super::repair::Repaired;
-use super::{CurvedFace, PlanarFace, boundary};
+use super::{CurvedFace, FaceSource, PlanarFace, boundary};
 use crate::geometry::polygon::{Moments, patch_moments};
 use crate::model::Frame;
 
@@ -23,8 +24,9 @@ const FLOOR: f64 = 5e-7;
 /// the diagonal.
 const NARROWEST: f64 = 5e-4;
 
-/// All planar faces of the part by falling area, and the curved ones; facets of curved surfaces ([`Facets`]) and regions
-/// narrower than 5e-4 of the part's diagonal are left out. Says so in the part's warnings when
+/// All planar faces of the part by falling area, and the curved ones: those that the file states
+/// ([`GivenFaces`]), and among the other triangles those that are recognised. There facets of curved
+/// surfaces ([`Facets`]) and regions narrower than 5e-4 of the part's diagonal are left out. Says so in the part's warnings when
 /// faces had to be found with wider tolerances, and when noise has broken planes up. `faceted`: no
 /// facet is that of a curved surface.
 pub(super) fn faces(part: &mut Repaired, faceted: bool) -> (Vec<PlanarFace>, Vec<CurvedFace>) {
@@ -35,19 +37,20 @@ pub(super) fn faces(part: &mut Repaired, faceted: bool) -> (Vec<PlanarFace>, Vec
             uncertainty: (JITTER[level] * part.diagonal).max(factor * part.noise),
         }
     });
-    let mut regions = regions::grow(part, fine);
-    let mut facets = Facets::new(part, &regions);
+    let given = GivenFaces::new(part);
+    let mut regions = regions::grow(part, &given, fine);
+    let mut facets = Facets::new(part, &given, &regions);
     let is_rough = facets.are_rough(part, &regions, rough.distance);
     if is_rough {
-        regions = regions::grow(part, rough);
-        facets = Facets::new(part, &regions);
+        regions = regions::grow(part, &given, rough);
+        facets = Facets::new(part, &given, &regions);
         part.health.warnings.push(format!(
             "flat faces are rough: corners up to {:.2} um off a plane were taken for flat (a clean mesh of this size needs {:.2})",
             rough.distance * 1e6,
             fine.distance * 1e6
         ));
     }
-    if let Some(Noise { share, distance }) = noise::measure(part, &regions) {
+    if let Some(Noise { share, distance }) = noise::measure(part, &given, &regions) {
         let taken = if is_rough { rough } else { fine }.distance;
         part.health.warnings.push(format!(
             "flat faces are noisy: on {:.0} % of the surface corners lie {:.1} um (root mean square) off the planes that fit them, {:.1} times the {:.2} um \
@@ -61,19 +64,19 @@ pub(super) fn faces(part: &mut Repaired, faceted: bool) -> (Vec<PlanarFace>, Vec
     }
     if faceted {
         facets.is_facet.fill(false);
-        return (outline(part, &regions, &facets), Vec::new());
+        return (outline(part, &given, &regions, &facets), Vec::new());
     }
     let floor =
         if is_rough { rough.distance } else { (FLOOR * part.diagonal).max(4.0 * part.noise) };
     let Curves { faces: mut curved, is_curved, flats } =
-        curves::curved_faces(part, &regions, &facets.borders, floor);
+        curves::curved_faces(part, &regions, &facets.borders, &given, floor);
     for (is_facet, is_curved) in facets.is_facet.iter_mut().zip(is_curved) {
         *is_facet |= is_curved;
     }
     for flat in flats {
         facets.is_facet[flat as usize] = false;
     }
-    let planar = outline(part, &regions, &facets);
+    let planar = outline(part, &given, &regions, &facets);
     for (face, id) in curved.iter_mut().zip(planar.len() as u32..) {
         face.id = id;
     }
@@ -81,16 +84,22 @@ pub(super) fn faces(part: &mut Repaired, faceted: bool) -> (Vec<PlanarFace>, Vec
 }
 
 /// The faces among the regions, with boundaries, sorted and numbered.
-fn outline(part: &Repaired, regions: &Regions, facets: &Facets) -> Vec<PlanarFace> {
+fn outline(
+    part: &Repaired,
+    given: &GivenFaces,
+    regions: &Regions,
+    facets: &Facets,
+) -> Vec<PlanarFace> {
     let tolerance = simplify_tolerance(part);
     let mut faces: Vec<PlanarFace> = Vec::new();
     for (index, region) in regions.all.iter().enumerate() {
-        if facets.is_facet[index]
-            || 4.0 * region.area < NARROWEST * part.diagonal * facets.borders.perimeter[index]
-        {
+        let triangles = regions.triangles(index);
+        let is_given = given.face(triangles[0]).is_some_and(GivenFace::is_plane);
+        let is_narrow =
+            4.0 * region.area < NARROWEST * part.diagonal * facets.borders.perimeter[index];
+        if facets.is_facet[index] || (is_narrow && !is_given) {
             continue;
         }
-        let triangles = regions.triangles(index);
         let mut frame = face_frame(region.plane.normal, region.centre);
         let rings = |frame: &Frame| {
             boundary::polygons(
@@ -125,6 +134,7 @@ fn outline(part: &Repaired, regions: &Regions, facets: &Facets) -> Vec<PlanarFac
             part_from_face: frame,
             polygons,
             triangles,
+            source: if is_given { FaceSource::File } else { FaceSource::Mesh },
             shell,
             reachable: part.shells[shell as usize].role == Role::Body,
         });

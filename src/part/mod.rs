@@ -21,6 +21,7 @@ mod curves;
 pub mod drawing;
 mod faces;
 mod facets;
+mod given;
 pub mod health;
 mod mass;
 mod noise;
@@ -81,6 +82,17 @@ pub struct MassProperties {
     pub inertia: DMat3,
 }
 
+/// Where it is known from what a face is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum FaceSource {
+    /// Recognised from the triangles of the mesh.
+    Mesh,
+    /// The file states it: STEP.
+    File,
+}
+
 /// One planar face of the part with its boundary.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanarFace {
@@ -102,6 +114,8 @@ pub struct PlanarFace {
     pub polygons: Vec<Polygon>,
     /// Indices of its triangles in the mesh.
     pub triangles: Vec<u32>,
+    /// Where the plane comes from.
+    pub source: FaceSource,
     /// Number of the shell (connected surface) that the face lies on.
     pub shell: u32,
     /// False for the walls of an internal void, or of a body wholly inside another: no finger gets

@@ -3,6 +3,7 @@
 
 use rustc_hash::FxHashMap;
 
+use super::given::GivenFaces;
 use super::regions::{self, Flatness, Regions};
 use super::repair::Repaired;
 use super::topology::NONE;
@@ -31,7 +32,7 @@ pub(super) struct Noise {
 /// Looks for planes that fell into single triangles when regions were grown as `fine` ones: patches
 /// that a wide tolerance gathers, most of whose area lies in single triangles, bent both ways. A
 /// tessellated cylinder falls into strips, and a sphere into triangles that are bent one way.
-pub(super) fn measure(part: &Repaired, fine: &Regions) -> Option<Noise> {
+pub(super) fn measure(part: &Repaired, given: &GivenFaces, fine: &Regions) -> Option<Noise> {
     let single = |region: u32| fine.triangles(region as usize).len() == 1;
     let total: f64 = fine.all.iter().map(|region| region.area).sum();
     let alone: f64 = fine
@@ -46,6 +47,7 @@ pub(super) fn measure(part: &Repaired, fine: &Regions) -> Option<Noise> {
     }
     let coarse = regions::grow(
         part,
+        given,
         Flatness { distance: WITHIN * part.diagonal, uncertainty: WITHIN / 2.0 * part.diagonal },
     );
     // Area and mean square distance of each broken plane.

@@ -10,6 +10,7 @@ use glam::DVec3;
 use nalgebra::Matrix3;
 
 use super::Mesh;
+use super::given::{GivenFaces, Stated};
 use super::repair::Repaired;
 use super::topology::NONE;
 
@@ -142,8 +143,9 @@ fn twice_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-/// Partitions the triangles into planar regions.
-pub(super) fn grow(part: &Repaired, flatness: Flatness) -> Regions {
+/// Partitions the triangles into planar regions. A plane that the file states is a region as it is;
+/// others end where faces do that the file states.
+pub(super) fn grow(part: &Repaired, given: &GivenFaces, flatness: Flatness) -> Regions {
     let mesh = &part.mesh;
     let count = mesh.triangles.len();
     let Flatness { distance, uncertainty } = flatness;
@@ -151,12 +153,29 @@ pub(super) fn grow(part: &Repaired, flatness: Flatness) -> Regions {
     let mut region_of = vec![NONE; count];
     let mut regions = Vec::new();
     let mut refused = Vec::new();
+    for face in &given.all {
+        let Stated::Plane { origin, normal } = face.surface else { continue };
+        let mut sums = Sums::new(origin);
+        let begin = order.len();
+        for &triangle in &face.triangles {
+            let corners = mesh.corners(triangle);
+            let cross = twice_normal(corners);
+            sums.add(corners, cross, cross.length() / 2.0);
+            region_of[triangle as usize] = regions.len() as u32;
+            order.push(triangle);
+        }
+        let plane = Plane { normal, offset: normal.dot(origin), tilt: 0.0 };
+        let centre = sums.centre();
+        let centre = centre - normal * (normal.dot(centre - origin));
+        regions.push(Region { begin, end: order.len(), plane, area: sums.area, centre });
+    }
     for seed in seeds(mesh) {
         if region_of[seed as usize] != NONE {
             continue;
         }
         let number = regions.len() as u32;
         let begin = order.len();
+        let own = given.of(seed);
         let corners = mesh.corners(seed);
         let cross = twice_normal(corners);
         let mut sums = Sums::new(corners[0]);
@@ -184,6 +203,9 @@ pub(super) fn grow(part: &Repaired, flatness: Flatness) -> Regions {
                         continue;
                     }
                     let other = twin / 3;
+                    if given.of(other) != own {
+                        continue;
+                    }
                     if take(mesh, other, &plane, distance, uncertainty, &mut sums) {
                         region_of[other as usize] = number;
                         order.push(other);

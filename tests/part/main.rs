@@ -9,6 +9,10 @@ mod hostile;
 mod solids;
 #[cfg(feature = "step")]
 mod step;
+#[cfg(feature = "step")]
+mod step_faces;
+#[cfg(feature = "step")]
+mod step_solids;
 #[path = "../support/mod.rs"]
 mod support;
 mod truth;

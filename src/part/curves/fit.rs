@@ -8,7 +8,7 @@ use super::Axis;
 /// Profile of a surface of revolution in the plane of the place `s` along the axis (from its
 /// origin) and the distance `r` from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Profile {
+pub(in crate::part) enum Profile {
     /// `r = radius + s tan(slope)`: a cylinder where the slope is zero, else a cone.
     Line {
         /// Distance from the axis at its origin \[m\].
@@ -27,7 +27,7 @@ pub(super) enum Profile {
 
 /// Which parameters a fit may move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(in crate::part) enum Kind {
     Cylinder,
     Cone,
     Sphere,
@@ -57,7 +57,7 @@ impl Kind {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Surface {
+pub(in crate::part) struct Surface {
     pub axis: Axis,
     pub profile: Profile,
 }
@@ -94,13 +94,13 @@ impl Surface {
     }
 
     /// Distance from the surface \[m\], positive on the side away from the axis or the tube.
-    pub(super) fn distance(&self, point: DVec3) -> f64 {
+    pub(in crate::part) fn distance(&self, point: DVec3) -> f64 {
         let (s, r, _) = self.place(point);
         self.level(s, r).0
     }
 
     /// Distance and unit normal of the surface of equal distance through `point`.
-    pub(super) fn distance_and_normal(&self, point: DVec3) -> (f64, DVec3) {
+    pub(in crate::part) fn distance_and_normal(&self, point: DVec3) -> (f64, DVec3) {
         let (s, r, away) = self.place(point);
         let (distance, by_r, by_s) = self.level(s, r);
         (distance, away * by_r + self.axis.direction * by_s)
@@ -108,7 +108,7 @@ impl Surface {
 
     /// The radius that residuals are compared with \[m\]: of a cylinder, of a cone at the axis'
     /// origin, of a sphere or of a tube.
-    pub(super) fn radius(&self) -> f64 {
+    pub(in crate::part) fn radius(&self) -> f64 {
         match self.profile {
             Profile::Line { radius, .. } => radius.abs(),
             Profile::Circle { minor, .. } => minor,
@@ -121,6 +121,16 @@ impl Surface {
             Profile::Line { radius, .. } => radius.abs(),
             Profile::Circle { major, minor } => major + minor,
         }
+    }
+
+    /// The same surface with all lengths times `scale`.
+    pub(in crate::part) fn scaled(mut self, scale: f64) -> Self {
+        self.axis.origin *= scale;
+        match &mut self.profile {
+            Profile::Line { radius, .. } => *radius *= scale,
+            Profile::Circle { major, minor } => (*major, *minor) = (*major * scale, *minor * scale),
+        }
+        self
     }
 
     /// Greatest distance of `points` \[m\].

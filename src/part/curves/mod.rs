@@ -7,6 +7,9 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use super::FaceSource;
+
+mod describe;
 mod find;
 mod fit;
 mod grow;
@@ -17,6 +20,7 @@ mod seed;
 mod trim;
 
 pub(super) use find::{Curves, curved_faces};
+pub(super) use fit::{Kind, Profile, Surface};
 
 /// A line in the part frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -135,9 +139,11 @@ pub struct CurvedFace {
     pub outside: bool,
     /// Greatest distance of its vertices in the mesh from the shape \[m\].
     pub residual: f64,
-    /// Facets that a whole turn would have at the width of this face's facets. `None` where the
-    /// shape comes from a CAD kernel.
+    /// Facets that a whole turn would have at the width of this face's facets. `None` where that is
+    /// not known.
     pub facets: Option<f64>,
+    /// Where the shape comes from.
+    pub source: FaceSource,
     /// Area of its triangles [m^2].
     pub area: f64,
     /// Area centroid of its triangles \[m\], not a point of the surface.
@@ -161,7 +167,7 @@ impl CurvedFace {
     /// Whether so few facets (up to 16) make its turn that it may be meant as facets: an octagonal
     /// bar, or a coarse cylinder.
     pub fn is_doubtful(&self) -> bool {
-        self.facets.is_some_and(|facets| facets < DOUBTFUL)
+        self.source != FaceSource::File && self.facets.is_some_and(|facets| facets < DOUBTFUL)
     }
 
     /// Whether both are surfaces of revolution about one axis, within their residuals and a
