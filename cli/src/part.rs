@@ -9,10 +9,10 @@ use clap::Args as ClapArgs;
 use comfy_table::{CellAlignment, Table, presets};
 use glam::DVec3;
 use gripfast::part::{
-    CurvedFace, FacePair, FaceSource, Part, PlanarFace, ReadOptions, Shape, Symmetry, Unit,
-    UnitSource, drawing,
+    CurvedFace, FacePair, FaceSource, Part, PlanarFace, ReadOptions, Residual, Shape, Symmetry,
+    Unit, UnitSource, drawing,
 };
-use gripfast::units::Quantity;
+use gripfast::units::{Length, Quantity};
 use serde_json::json;
 
 use crate::{flags, terminal};
@@ -52,6 +52,10 @@ pub(crate) struct Args {
     /// Every facet is meant as a plane: none is taken for a curved face.
     #[arg(long)]
     faceted: bool,
+    /// For noisy and scanned parts: fits planes and round faces to corners within this distance, some
+    /// three times the noise, e.g. 0.2mm.
+    #[arg(long, value_name = "LENGTH")]
+    fit: Option<Length>,
     /// Drawing (SVG): three views with the faces numbered.
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
@@ -83,7 +87,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let options = ReadOptions::default()
         .with_unit(args.unit)
         .with_max_memory(max_memory)
-        .with_faceted(args.faceted);
+        .with_faceted(args.faceted)
+        .with_fit(args.fit.map(|fit| fit.0));
     let part = Part::read(&args.part, &options)?;
     let volume = part.mass_properties(1.0).volume;
     let density = match mass {
@@ -247,7 +252,7 @@ fn face_table(faces: &[PlanarFace], rows: usize) -> String {
             fixed(face.offset * 1e3, 3),
             face.polygons.iter().map(|polygon| polygon.holes.len()).sum::<usize>().to_string(),
             triple(face.centroid * 1e3, 2),
-            note(face.source, face.reachable, false, is_mixed),
+            note(face.source, face.fit, face.reachable, false, is_mixed),
         ]);
     }
     finish(&table, faces.len(), rows)
@@ -275,7 +280,7 @@ fn curved_table(faces: &[CurvedFace], rows: usize) -> String {
             triple(through * 1e3, 2),
             format!("{:.2}", face.residual * 1e6),
             face.facets.map_or(String::new(), |facets| format!("{facets:.0}")),
-            note(face.source, face.reachable, face.is_doubtful(), is_mixed),
+            note(face.source, face.fit, face.reachable, face.is_doubtful(), is_mixed),
         ]);
     }
     finish(&table, faces.len(), rows)
@@ -312,8 +317,18 @@ fn is_mixed(mut sources: impl Iterator<Item = FaceSource>) -> bool {
     sources.any(|source| Some(source) != first)
 }
 
-fn note(source: FaceSource, reachable: bool, doubtful: bool, mixed: bool) -> String {
+fn note(
+    source: FaceSource,
+    fit: Option<Residual>,
+    reachable: bool,
+    doubtful: bool,
+    mixed: bool,
+) -> String {
     let mut notes = Vec::new();
+    let residual = fit.map(|Residual { rms, greatest }| {
+        format!("fitted: rms {:.1} um, at most {:.1}", rms * 1e6, greatest * 1e6)
+    });
+    notes.extend(residual.as_deref());
     if mixed && source == FaceSource::Mesh {
         notes.push("from the mesh");
     }
@@ -348,7 +363,7 @@ fn to_json(part: &Part, pairs: &[FacePair], density: Option<f64>) -> serde_json:
         .map(|face| {
             json!({
                 "id": face.id, "area": face.area, "normal": face.normal, "offset": face.offset, "centroid": face.centroid,
-                "part_from_face": face.part_from_face, "polygons": face.polygons, "shell": face.shell, "reachable": face.reachable, "source": face.source,
+                "part_from_face": face.part_from_face, "polygons": face.polygons, "shell": face.shell, "reachable": face.reachable, "source": face.source, "fit": face.fit,
             })
         })
         .collect();
@@ -359,7 +374,7 @@ fn to_json(part: &Part, pairs: &[FacePair], density: Option<f64>) -> serde_json:
             json!({
                 "id": face.id, "shape": face.shape, "outside": face.outside, "residual": face.residual,
                 "facets": face.facets, "doubtful": face.is_doubtful(), "area": face.area,
-                "centroid": face.centroid, "shell": face.shell, "reachable": face.reachable, "source": face.source,
+                "centroid": face.centroid, "shell": face.shell, "reachable": face.reachable, "source": face.source, "fit": face.fit,
             })
         })
         .collect();

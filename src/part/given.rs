@@ -7,10 +7,10 @@
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
-use super::Mesh;
 use super::curves::{Axis, Kind, Profile, Surface};
 use super::repair::Repaired;
 use super::topology::NONE;
+use super::{FaceSource, Mesh, Residual};
 use crate::geometry::UnionFind;
 
 /// Distance of a corner from the surface of its face, as a share of the part's diagonal, up to which
@@ -74,7 +74,7 @@ impl Stated {
     }
 
     /// Distance of a point \[m\]; 0 where the profile is not known.
-    fn distance(&self, point: DVec3) -> f64 {
+    pub(super) fn distance(&self, point: DVec3) -> f64 {
         match self {
             Stated::Plane { origin, normal } => (point - *origin).dot(*normal).abs(),
             Stated::Round { kind: Kind::Revolution, .. } | Stated::Other => 0.0,
@@ -84,7 +84,7 @@ impl Stated {
 
     /// Cosine of the angle between the surface's normal at a point, away from the axis or tube, and
     /// `direction`.
-    fn facing(&self, point: DVec3, direction: DVec3) -> f64 {
+    pub(super) fn facing(&self, point: DVec3, direction: DVec3) -> f64 {
         match self {
             Stated::Plane { normal, .. } => normal.dot(direction),
             Stated::Round { kind: Kind::Revolution, surface } => {
@@ -207,6 +207,8 @@ pub(super) struct GivenFace {
     pub corners: Vec<DVec3>,
     /// Greatest distance of those from the surface \[m\].
     pub residual: f64,
+    /// Of a face that was fitted instead: how far corners lay off before they were moved onto it.
+    pub fit: Option<Residual>,
 }
 
 /// All faces that the file states.
@@ -306,6 +308,21 @@ impl GivenFaces {
         found
     }
 
+    /// Adds a face that was fitted to triangles of none.
+    pub(super) fn push(
+        &mut self,
+        mesh: &Mesh,
+        surface: Stated,
+        triangles: Vec<u32>,
+        fit: Residual,
+    ) {
+        self.of.resize(mesh.triangles.len(), NONE);
+        for &triangle in &triangles {
+            self.of[triangle as usize] = self.all.len() as u32;
+        }
+        self.all.push(GivenFace { fit: Some(fit), ..GivenFace::new(mesh, surface, triangles) });
+    }
+
     pub(super) fn is_empty(&self) -> bool {
         self.all.is_empty()
     }
@@ -330,7 +347,7 @@ impl GivenFace {
         let corners: Vec<DVec3> =
             vertices.into_iter().map(|vertex| mesh.vertices[vertex as usize]).collect();
         let surface = surface.turned_to(&corners);
-        let mut face = Self { surface, sign: 1.0, triangles, corners, residual: 0.0 };
+        let mut face = Self { surface, sign: 1.0, triangles, corners, residual: 0.0, fit: None };
         face.residual = face.off(&face.corners);
         let outward: f64 = face.facings(mesh).map(|(area, facing)| area * facing).sum();
         face.sign = outward.signum();
@@ -338,6 +355,10 @@ impl GivenFace {
             *normal *= std::mem::replace(&mut face.sign, 1.0);
         }
         face
+    }
+
+    pub(super) fn source(&self) -> FaceSource {
+        if self.fit.is_some() { FaceSource::Fit } else { FaceSource::File }
     }
 
     pub(super) fn is_plane(&self) -> bool {

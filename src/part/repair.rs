@@ -41,6 +41,11 @@ pub(super) struct Repaired {
 }
 
 impl Repaired {
+    /// Measures the shells again, after vertices have moved.
+    pub(super) fn measure_again(&mut self) {
+        orient::measure(&self.mesh, &self.shell_of, &mut self.shells, self.apex);
+    }
+
     /// Mass properties at density 1 of all material.
     pub(super) fn mass(&self) -> MassProperties {
         let mut total = Integrals::default();

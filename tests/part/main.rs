@@ -4,6 +4,7 @@
 
 mod curved;
 mod faceted;
+mod fit;
 mod formats;
 mod hostile;
 mod solids;

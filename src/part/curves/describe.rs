@@ -7,11 +7,11 @@ use glam::DVec3;
 use super::find::Face;
 use super::fit::{Kind, Profile, Surface};
 use super::{Axis, CurvedFace, Shape};
-use crate::part::FaceSource;
 use crate::part::given::{GivenFace, Stated};
 use crate::part::orient::Role;
 use crate::part::regions::Regions;
 use crate::part::repair::Repaired;
+use crate::part::{FaceSource, Residual};
 
 /// Gaps between triangles about an axis that are rounding \[rad\].
 const GAP: f64 = 1e-9;
@@ -29,6 +29,7 @@ struct Draft<'a> {
     turn: f64,
     facets: Option<f64>,
     source: FaceSource,
+    fit: Option<Residual>,
 }
 
 /// A surface found among the facets.
@@ -51,11 +52,12 @@ pub(super) fn found(part: &Repaired, regions: &Regions, face: &Face) -> Option<C
         turn: face.cut.turn,
         facets: Some(face.cut.facets),
         source: FaceSource::Mesh,
+        fit: None,
     };
     describe(part, draft)
 }
 
-/// A face that the file states; `None` for a plane.
+/// A face that the file states, or that was fitted; `None` for a plane.
 pub(super) fn given(part: &Repaired, face: &GivenFace) -> Option<CurvedFace> {
     let Stated::Round { kind, surface } = face.surface else { return None };
     let (turn, facets) = match kind {
@@ -71,16 +73,17 @@ pub(super) fn given(part: &Repaired, face: &GivenFace) -> Option<CurvedFace> {
         sign: face.sign,
         triangles: face.triangles.clone(),
         points: vec![&face.corners],
-        residual: face.residual,
+        residual: face.fit.map_or(face.residual, |fit| fit.greatest),
         turn,
         facets,
-        source: FaceSource::File,
+        source: face.source(),
+        fit: face.fit,
     };
     describe(part, draft)
 }
 
 /// The arc that triangles cover about an axis, and that of the widest of them \[rad\].
-fn arcs(part: &Repaired, triangles: &[u32], axis: Axis) -> (f64, f64) {
+pub(in crate::part) fn arcs(part: &Repaired, triangles: &[u32], axis: Axis) -> (f64, f64) {
     let (u, v) = axis.direction.any_orthonormal_pair();
     let mut widest = 0.0_f64;
     let mut spans: Vec<[f64; 2]> = Vec::with_capacity(triangles.len());
@@ -167,6 +170,7 @@ fn describe(part: &Repaired, draft: Draft<'_>) -> Option<CurvedFace> {
         residual: draft.residual,
         facets: draft.facets,
         source: draft.source,
+        fit: draft.fit,
         area,
         centroid: centroid / area,
         triangles,

@@ -85,10 +85,8 @@ pub(in crate::part) fn curved_faces(
         |facet: &u32| given.is_empty() || given.of(regions.triangles(*facet as usize)[0]) == NONE;
     let seeds: Vec<u32> =
         (0..regions.all.len() as u32).filter(is_open).filter(|&facet| is_bent(facet)).collect();
-    let mut described: Vec<CurvedFace> =
-        given.all.iter().filter_map(|face| describe::given(part, face)).collect();
+    let mut described = given_faces(part, given);
     if seeds.is_empty() {
-        sort(&mut described, part.diagonal);
         return Curves { faces: described, is_curved, flats: Vec::new() };
     }
     let floor = floor.max(quantum(part, regions, &seeds));
@@ -116,6 +114,15 @@ pub(in crate::part) fn curved_faces(
     sort(&mut described, part.diagonal);
     let flats = seeds.iter().copied().filter(|&seed| growth.is_flat(seed, &faces)).collect();
     Curves { faces: described, is_curved, flats }
+}
+
+/// The curved ones of the faces that the file states or that were fitted, by falling area, not
+/// numbered yet.
+pub(in crate::part) fn given_faces(part: &Repaired, given: &GivenFaces) -> Vec<CurvedFace> {
+    let mut described: Vec<CurvedFace> =
+        given.all.iter().filter_map(|face| describe::given(part, face)).collect();
+    sort(&mut described, part.diagonal);
+    described
 }
 
 /// As planar faces: areas that agree to 1e-6 count as equal.

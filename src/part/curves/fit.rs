@@ -51,7 +51,7 @@ impl Kind {
     }
 
     /// Number of parameters.
-    pub(super) fn freedoms(self) -> usize {
+    pub(in crate::part) fn freedoms(self) -> usize {
         self.is_free().iter().filter(|free| **free).count()
     }
 }
@@ -116,7 +116,7 @@ impl Surface {
     }
 
     /// The greatest radius about the axis: of a sphere, or of a torus outside \[m\].
-    pub(super) fn reach(&self) -> f64 {
+    pub(in crate::part) fn reach(&self) -> f64 {
         match self.profile {
             Profile::Line { radius, .. } => radius.abs(),
             Profile::Circle { major, minor } => major + minor,
@@ -140,7 +140,7 @@ impl Surface {
 
     /// The surface of this `kind` nearest to `points` (least squares), starting from `self`.
     /// `None` when it runs away.
-    pub(super) fn fitted(mut self, kind: Kind, points: &[DVec3]) -> Option<Surface> {
+    pub(in crate::part) fn fitted(mut self, kind: Kind, points: &[DVec3]) -> Option<Surface> {
         let stride = points.len().div_ceil(MOST_POINTS).max(1);
         // Not every second point, say: that may be one of two rings.
         let jitter = |k: usize| (k.wrapping_mul(0x9e37_79b9) >> 16) % stride;

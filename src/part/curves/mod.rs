@@ -7,7 +7,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::FaceSource;
+use super::{FaceSource, Residual};
 
 mod describe;
 mod find;
@@ -19,8 +19,10 @@ mod profile;
 mod seed;
 mod trim;
 
-pub(super) use find::{Curves, curved_faces};
+pub(super) use describe::arcs;
+pub(super) use find::{Curves, curved_faces, given_faces};
 pub(super) use fit::{Kind, Profile, Surface};
+pub(super) use seed::{cone_by_circles, cylinder_along, outer, smallest_direction, sphere_through};
 
 /// A line in the part frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -144,6 +146,8 @@ pub struct CurvedFace {
     pub facets: Option<f64>,
     /// Where the shape comes from.
     pub source: FaceSource,
+    /// Of a fitted face: how far the corners lay off it.
+    pub fit: Option<Residual>,
     /// Area of its triangles [m^2].
     pub area: f64,
     /// Area centroid of its triangles \[m\], not a point of the surface.
@@ -167,7 +171,7 @@ impl CurvedFace {
     /// Whether so few facets (up to 16) make its turn that it may be meant as facets: an octagonal
     /// bar, or a coarse cylinder.
     pub fn is_doubtful(&self) -> bool {
-        self.source != FaceSource::File && self.facets.is_some_and(|facets| facets < DOUBTFUL)
+        self.source == FaceSource::Mesh && self.facets.is_some_and(|facets| facets < DOUBTFUL)
     }
 
     /// Whether both are surfaces of revolution about one axis, within their residuals and a
@@ -213,6 +217,28 @@ impl CurvedFace {
 }
 
 impl Shape {
+    /// Kind and surface; the profile of a revolution is not known.
+    pub(super) fn surface(&self) -> (Kind, Surface) {
+        let line = |axis, radius, slope| Surface { axis, profile: Profile::Line { radius, slope } };
+        let circle =
+            |axis, major, minor| Surface { axis, profile: Profile::Circle { major, minor } };
+        match *self {
+            Shape::Cylinder { axis, radius, .. } => (Kind::Cylinder, line(axis, radius, 0.0)),
+            Shape::Cone { apex, axis, half_angle, along } => {
+                let middle = (along[0] + along[1]) / 2.0;
+                let origin = apex + axis * middle;
+                let axis = Axis { origin, direction: axis };
+                (Kind::Cone, line(axis, middle * half_angle.tan(), half_angle))
+            }
+            Shape::Sphere { centre, radius } => {
+                let axis = Axis { origin: centre, direction: DVec3::Z };
+                (Kind::Sphere, circle(axis, 0.0, radius))
+            }
+            Shape::Torus { axis, major, minor } => (Kind::Torus, circle(axis, major, minor)),
+            Shape::Revolution { axis, .. } => (Kind::Revolution, line(axis, 0.0, 0.0)),
+        }
+    }
+
     /// The radius that lengths are compared with \[m\].
     fn radius(&self) -> f64 {
         match *self {
