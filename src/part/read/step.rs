@@ -5,7 +5,7 @@ use std::ffi::{CStr, c_char, c_double, c_int, c_void};
 use std::io::{BufReader, BufWriter, Read, Write};
 use std::path::PathBuf;
 use std::process::{Command, ExitStatus, Stdio};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use glam::DVec3;
 
@@ -173,6 +173,9 @@ extern "C" fn enter(user: *mut c_void, name: *const c_char) {
 /// Triangles of a STEP text in millimetres into `sink`; the number of faces left out, or why it
 /// cannot be read.
 fn tessellate(bytes: &[u8], mut sink: Sink<'_>) -> std::result::Result<i32, String> {
+    // The kernel keeps units and other settings of a file in variables of the whole process.
+    static KERNEL: Mutex<()> = Mutex::new(());
+    let _alone = KERNEL.lock().unwrap_or_else(PoisonError::into_inner);
     let mut message = [0_u8; 256];
     #[allow(
         unsafe_code,
