@@ -53,6 +53,8 @@ pub struct Request {
     pub outside_buffers: bool,
     /// Whether every facet of the part is meant as a plane: none is taken for a curved face.
     pub faceted: bool,
+    /// Distance within which planes and round faces are fitted to a noisy part.
+    pub fit: Option<Length>,
     /// Gripper of the catalogue, or a gripper file.
     pub gripper: String,
     /// Mass of the part.
@@ -255,6 +257,7 @@ impl Default for Request {
             max_memory: None,
             outside_buffers: false,
             faceted: false,
+            fit: None,
             gripper: String::new(),
             mass: None,
             density: None,

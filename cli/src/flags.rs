@@ -25,12 +25,15 @@ pub(crate) fn message(error: &anyhow::Error) -> String {
 
 /// A warning of the library with the flag that answers it.
 pub(crate) fn warning(text: &str) -> String {
-    let unit = text
-        .split_once("; the unit ")
-        .and_then(|(_, rest)| rest.split_once(" would give"))
-        .map(|(unit, _)| unit);
-    match unit {
-        Some(unit) => format!("{text} ({} {unit})", flag("unit")),
+    let between = |before: &str, after: &str| {
+        let value = text.split_once(before)?.1;
+        Some(value.split_once(after)?.0)
+    };
+    if let Some(unit) = between("; the unit ", " would give") {
+        return format!("{text} ({} {unit})", flag("unit"));
+    }
+    match between("fit planes and round faces to corners within ", " mm") {
+        Some(tolerance) => format!("{text} ({} {tolerance}mm)", flag("fit")),
         None => text.to_string(),
     }
 }

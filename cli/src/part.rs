@@ -9,9 +9,10 @@ use clap::Args as ClapArgs;
 use comfy_table::{CellAlignment, Table, presets};
 use glam::DVec3;
 use gripfast::part::{
-    CurvedFace, FacePair, Part, PlanarFace, ReadOptions, Shape, Symmetry, Unit, UnitSource, drawing,
+    CurvedFace, FacePair, FaceSource, Part, PlanarFace, ReadOptions, Residual, Shape, Symmetry,
+    Unit, UnitSource, drawing,
 };
-use gripfast::units::Quantity;
+use gripfast::units::{Length, Quantity};
 use serde_json::json;
 
 use crate::{flags, terminal};
@@ -51,6 +52,10 @@ pub(crate) struct Args {
     /// Every facet is meant as a plane: none is taken for a curved face.
     #[arg(long)]
     faceted: bool,
+    /// For noisy and scanned parts: fits planes and round faces to corners within this distance, some
+    /// three times the noise, e.g. 0.2mm.
+    #[arg(long, value_name = "LENGTH")]
+    fit: Option<Length>,
     /// Drawing (SVG): three views with the faces numbered.
     #[arg(long, alias = "svg", value_name = "FILE.svg")]
     plot: Option<PathBuf>,
@@ -82,7 +87,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let options = ReadOptions::default()
         .with_unit(args.unit)
         .with_max_memory(max_memory)
-        .with_faceted(args.faceted);
+        .with_faceted(args.faceted)
+        .with_fit(args.fit.map(|fit| fit.0));
     let part = Part::read(&args.part, &options)?;
     let volume = part.mass_properties(1.0).volume;
     let density = match mass {
@@ -154,10 +160,12 @@ fn to_text(part: &Part, pairs: &[FacePair], density: Option<f64>, rows: usize) -
             ),
         );
     }
-    text += &format!("\n{} planar faces\n", part.faces.len());
+    let sources = part.faces.iter().map(|face| face.source);
+    text += &format!("\n{} planar faces{}\n", part.faces.len(), of_file(sources));
     text += &face_table(&part.faces, rows);
     if !part.curved.is_empty() {
-        text += &format!("\n{} curved faces\n", part.curved.len());
+        let sources = part.curved.iter().map(|face| face.source);
+        text += &format!("\n{} curved faces{}\n", part.curved.len(), of_file(sources));
         text += &curved_table(&part.curved, rows);
         if part.curved.iter().take(rows).any(CurvedFace::is_doubtful) {
             text += "faceted or round?: so few facets may be meant as planes; --faceted takes all for such\n";
@@ -182,6 +190,16 @@ fn to_text(part: &Part, pairs: &[FacePair], density: Option<f64>, rows: usize) -
     text += &format!("\n{} antiparallel pairs\n", pairs.len());
     text += &pair_table(pairs, rows);
     text
+}
+
+/// How many faces the file states; nothing where it states none.
+fn of_file(sources: impl ExactSizeIterator<Item = FaceSource> + Clone) -> String {
+    let all = sources.len();
+    match sources.filter(|source| *source == FaceSource::File).count() {
+        0 => String::new(),
+        count if count == all => ", as the file states them".to_string(),
+        count => format!(", {count} as the file states them, the others found in the mesh"),
+    }
 }
 
 fn table(header: &[&str]) -> Table {
@@ -225,6 +243,7 @@ fn triple(value: DVec3, decimals: usize) -> String {
 
 fn face_table(faces: &[PlanarFace], rows: usize) -> String {
     let mut table = table(&["face", "area mm2", "normal", "offset mm", "holes", "centre mm", ""]);
+    let is_mixed = is_mixed(faces.iter().map(|face| face.source));
     for face in faces.iter().take(rows) {
         table.add_row([
             face.id.to_string(),
@@ -233,7 +252,7 @@ fn face_table(faces: &[PlanarFace], rows: usize) -> String {
             fixed(face.offset * 1e3, 3),
             face.polygons.iter().map(|polygon| polygon.holes.len()).sum::<usize>().to_string(),
             triple(face.centroid * 1e3, 2),
-            if face.reachable { "" } else { "inside" }.to_string(),
+            note(face.source, face.fit, face.reachable, false, is_mixed),
         ]);
     }
     finish(&table, faces.len(), rows)
@@ -243,6 +262,7 @@ fn curved_table(faces: &[CurvedFace], rows: usize) -> String {
     let header =
         ["face", "kind", "", "area mm2", "size mm", "axis", "through mm", "off um", "facets", ""];
     let mut table = table(&header);
+    let is_mixed = is_mixed(faces.iter().map(|face| face.source));
     for face in faces.iter().take(rows) {
         let direction = face.shape.axis().map_or(String::new(), |axis| triple(axis.direction, 4));
         let through = match face.shape {
@@ -260,7 +280,7 @@ fn curved_table(faces: &[CurvedFace], rows: usize) -> String {
             triple(through * 1e3, 2),
             format!("{:.2}", face.residual * 1e6),
             face.facets.map_or(String::new(), |facets| format!("{facets:.0}")),
-            note(face),
+            note(face.source, face.fit, face.reachable, face.is_doubtful(), is_mixed),
         ]);
     }
     finish(&table, faces.len(), rows)
@@ -291,12 +311,31 @@ fn size(shape: &Shape) -> String {
     }
 }
 
-fn note(face: &CurvedFace) -> String {
+/// Whether the file states some of the faces, but not all.
+fn is_mixed(mut sources: impl Iterator<Item = FaceSource>) -> bool {
+    let first = sources.next();
+    sources.any(|source| Some(source) != first)
+}
+
+fn note(
+    source: FaceSource,
+    fit: Option<Residual>,
+    reachable: bool,
+    doubtful: bool,
+    mixed: bool,
+) -> String {
     let mut notes = Vec::new();
-    if face.is_doubtful() {
+    let residual = fit.map(|Residual { rms, greatest }| {
+        format!("fitted: rms {:.1} um, at most {:.1}", rms * 1e6, greatest * 1e6)
+    });
+    notes.extend(residual.as_deref());
+    if mixed && source == FaceSource::Mesh {
+        notes.push("from the mesh");
+    }
+    if doubtful {
         notes.push("faceted or round?");
     }
-    if !face.reachable {
+    if !reachable {
         notes.push("inside");
     }
     notes.join(", ")
@@ -324,7 +363,7 @@ fn to_json(part: &Part, pairs: &[FacePair], density: Option<f64>) -> serde_json:
         .map(|face| {
             json!({
                 "id": face.id, "area": face.area, "normal": face.normal, "offset": face.offset, "centroid": face.centroid,
-                "part_from_face": face.part_from_face, "polygons": face.polygons, "shell": face.shell, "reachable": face.reachable,
+                "part_from_face": face.part_from_face, "polygons": face.polygons, "shell": face.shell, "reachable": face.reachable, "source": face.source, "fit": face.fit,
             })
         })
         .collect();
@@ -335,7 +374,7 @@ fn to_json(part: &Part, pairs: &[FacePair], density: Option<f64>) -> serde_json:
             json!({
                 "id": face.id, "shape": face.shape, "outside": face.outside, "residual": face.residual,
                 "facets": face.facets, "doubtful": face.is_doubtful(), "area": face.area,
-                "centroid": face.centroid, "shell": face.shell, "reachable": face.reachable,
+                "centroid": face.centroid, "shell": face.shell, "reachable": face.reachable, "source": face.source, "fit": face.fit,
             })
         })
         .collect();

@@ -46,6 +46,7 @@ class Part:
         max_memory: str | None = None,
         outside_buffers: bool = False,
         faceted: bool = False,
+        fit: str | None = None,
         known_as: _Path | None = None,
     ) -> Part: ...
     @staticmethod
@@ -54,6 +55,8 @@ class Part:
         vertices: npt.NDArray[np.float64],
         triangles: npt.NDArray[np.int64],
         scale: float,
+        faceted: bool = False,
+        fit: str | None = None,
     ) -> Part: ...
     @property
     def name(self) -> str: ...

@@ -25,7 +25,9 @@ class Part:
 
     ``Part("bracket.stl")`` reads a file, ``Part(vertices, faces, unit="mm")`` takes arrays of shape
     (n, 3), and ``Part(mesh, unit="mm")`` anything with ``vertices`` and ``faces``, such as a mesh of
-    trimesh. Without a unit a file has its own, else millimetres; arrays are in metres.
+    trimesh. Without a unit a file has its own, else millimetres; arrays are in metres. ``fit="0.2mm"``
+    fits planes and round faces to a noisy or scanned part within that distance; ``faceted=True``
+    takes every facet for a plane.
     """
 
     _native: _gripfast.Part
@@ -40,10 +42,11 @@ class Part:
         max_memory: str | None = None,
         outside_buffers: bool = False,
         faceted: bool = False,
+        fit: str | None = None,
     ) -> None:
         if faces is None and isinstance(source, (str, os.PathLike)):
             self._native = _gripfast.Part.read(
-                os.fspath(source), unit, max_memory, outside_buffers, faceted
+                os.fspath(source), unit, max_memory, outside_buffers, faceted, fit
             )
             return
         if faces is None:
@@ -60,6 +63,8 @@ class Part:
             np.ascontiguousarray(source, dtype=np.float64),
             np.ascontiguousarray(faces, dtype=np.int64),
             _UNITS[unit or "m"],
+            faceted,
+            fit,
         )
 
     @classmethod

@@ -167,6 +167,7 @@ def _task(
                 request.get("max_memory"),
                 False,
                 request.get("faceted", False),
+                request.get("fit"),
                 request["part"],
             )
         except Exception:  # noqa: BLE001

@@ -26,7 +26,7 @@ pub(crate) struct Part {
 impl Part {
     /// Reads a file; `known_as` is the name of it that results carry, where that is another.
     #[staticmethod]
-    #[pyo3(signature = (path, unit=None, max_memory=None, outside_buffers=false, faceted=false, known_as=None))]
+    #[pyo3(signature = (path, unit=None, max_memory=None, outside_buffers=false, faceted=false, fit=None, known_as=None))]
     fn read(
         py: Python<'_>,
         path: PathBuf,
@@ -34,6 +34,7 @@ impl Part {
         max_memory: Option<&str>,
         outside_buffers: bool,
         faceted: bool,
+        fit: Option<&str>,
         known_as: Option<PathBuf>,
     ) -> PyResult<Self> {
         let unit = unit.map(|text| text.parse::<Unit>()).transpose().or_raise()?;
@@ -45,6 +46,7 @@ impl Part {
         let mut options = ReadOptions::default();
         (options.unit, options.max_memory) = (unit, max_memory);
         (options.outside_buffers, options.faceted) = (outside_buffers, faceted);
+        options.fit = fit.map(|text| Quantity::Length.parse("fit", text)).transpose().or_raise()?;
         let mut part = py.detach(|| part::Part::read(&path, &options)).or_raise()?;
         if let Some(name) = known_as {
             part.file = name;
@@ -54,12 +56,15 @@ impl Part {
 
     /// A part of triangles: vertices (n, 3) times `scale` in metres, corner numbers (m, 3).
     #[staticmethod]
+    #[pyo3(signature = (name, vertices, triangles, scale, faceted=false, fit=None))]
     fn from_arrays(
         py: Python<'_>,
         name: &str,
         vertices: PyReadonlyArray2<'_, f64>,
         triangles: PyReadonlyArray2<'_, i64>,
         scale: f64,
+        faceted: bool,
+        fit: Option<&str>,
     ) -> PyResult<Self> {
         let (vertices, triangles) = (vertices.as_array(), triangles.as_array());
         if vertices.ncols() != 3 || triangles.ncols() != 3 {
@@ -79,7 +84,11 @@ impl Part {
         let corners: Vec<[u32; 3]> =
             triangles.rows().into_iter().map(|row| [0, 1, 2].map(|k| corner(row[k]))).collect();
         let name = name.to_owned();
-        let part = py.detach(|| part::Part::from_triangles(&name, &points, &corners)).or_raise()?;
+        let fit = fit.map(|text| Quantity::Length.parse("fit", text)).transpose().or_raise()?;
+        let options = ReadOptions::default().with_faceted(faceted).with_fit(fit);
+        let part = py
+            .detach(|| part::Part::from_triangles_with(&name, &points, &corners, &options))
+            .or_raise()?;
         Ok(Self { inner: Arc::new(part) })
     }
 

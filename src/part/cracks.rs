@@ -7,6 +7,7 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 use rustc_hash::FxHashMap;
 
 use super::Mesh;
+use super::given::Given;
 use super::topology::{Edges, ends};
 
 /// End vertices of open edges, ascending.
@@ -25,7 +26,12 @@ fn open_vertices(mesh: &Mesh, open: &[u32]) -> Vec<u32> {
 
 /// Joins vertices of open edges that lie within `tolerance` \[m\] of each other. Returns how many
 /// vertices went; triangles that lose their area by it go too.
-pub(super) fn join_vertices(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usize {
+pub(super) fn join_vertices(
+    mesh: &mut Mesh,
+    given: &mut Given,
+    edges: &Edges,
+    tolerance: f64,
+) -> usize {
     let cell = |point: DVec3| (point / tolerance).floor().to_array().map(|x| x as i64);
     let mut cells: FxHashMap<[i64; 3], Vec<u32>> = FxHashMap::default();
     let mut joined: FxHashMap<u32, u32> = FxHashMap::default();
@@ -51,14 +57,19 @@ pub(super) fn join_vertices(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> u
                 *corner = other;
             }
         }
-        mesh.triangles.retain(|&[a, b, c]| a != b && b != c && c != a);
+        given.retain(mesh, |_, [a, b, c]| a != b && b != c && c != a);
     }
     joined.len()
 }
 
 /// Cuts open edges at the open vertices that lie on them within `tolerance` \[m\]. Returns how many
 /// edges were cut. A triangle with several such edges has one cut at a call.
-pub(super) fn split_edges(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usize {
+pub(super) fn split_edges(
+    mesh: &mut Mesh,
+    given: &mut Given,
+    edges: &Edges,
+    tolerance: f64,
+) -> usize {
     let spans: Vec<(DVec3, DVec3)> = edges
         .open
         .iter()
@@ -116,13 +127,19 @@ pub(super) fn split_edges(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usi
         stops.push(to);
         mesh.triangles[triangle as usize] = [from, stops[0], apex];
         mesh.triangles.extend(stops.windows(2).map(|pair| [pair[0], pair[1], apex]));
+        given.repeat(triangle, stops.len() - 1);
     }
     count
 }
 
 /// Removes triangles narrower than `tolerance` \[m\] that have an open or tangled edge: needles laid
 /// along an edge. Returns how many went.
-pub(super) fn remove_needles(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> usize {
+pub(super) fn remove_needles(
+    mesh: &mut Mesh,
+    given: &mut Given,
+    edges: &Edges,
+    tolerance: f64,
+) -> usize {
     let mut tangled = std::collections::BTreeSet::new();
     for &half in &edges.tangled {
         let (from, to) = ends(&mesh.triangles, half);
@@ -147,7 +164,6 @@ pub(super) fn remove_needles(mesh: &mut Mesh, edges: &Edges, tolerance: f64) -> 
         .map(|(&triangle, &open)| !((open || on_tangled(triangle)) && narrow(triangle)))
         .collect();
     let before = mesh.triangles.len();
-    let mut keep = keep.into_iter();
-    mesh.triangles.retain(|_| keep.next().unwrap_or(true));
+    given.retain(mesh, |index, _| keep[index]);
     before - mesh.triangles.len()
 }

@@ -4,11 +4,13 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::curves::{self, Curves};
 use super::facets::Facets;
+use super::fitted::{self, Tolerance};
+use super::given::{GivenFace, GivenFaces};
 use super::noise::{self, Noise};
 use super::orient::Role;
 use super::regions::{self, Flatness, Regions};
 use super::repair::Repaired;
-use super::{CurvedFace, PlanarFace, boundary};
+use super::{CurvedFace, FaceSource, PlanarFace, boundary};
 use crate::geometry::polygon::{Moments, patch_moments};
 use crate::model::Frame;
 
@@ -23,11 +25,18 @@ const FLOOR: f64 = 5e-7;
 /// the diagonal.
 const NARROWEST: f64 = 5e-4;
 
-/// All planar faces of the part by falling area, and the curved ones; facets of curved surfaces ([`Facets`]) and regions
-/// narrower than 5e-4 of the part's diagonal are left out. Says so in the part's warnings when
+/// All planar faces of the part by falling area, and the curved ones: those that the file states
+/// ([`GivenFaces`]), and among the other triangles those that are recognised. There facets of curved
+/// surfaces ([`Facets`]) and regions narrower than 5e-4 of the part's diagonal are left out. Says so in the part's warnings when
 /// faces had to be found with wider tolerances, and when noise has broken planes up. `faceted`: no
 /// facet is that of a curved surface.
-pub(super) fn faces(part: &mut Repaired, faceted: bool) -> (Vec<PlanarFace>, Vec<CurvedFace>) {
+/// `fit`: distance \[m\] within which faces are fitted to a noisy mesh; what is then on none of them
+/// is none.
+pub(super) fn faces(
+    part: &mut Repaired,
+    faceted: bool,
+    fit: Option<f64>,
+) -> (Vec<PlanarFace>, Vec<CurvedFace>) {
     let [fine, rough] = [0, 1].map(|level| {
         let factor = [1.0, 2.0][level];
         Flatness {
@@ -35,24 +44,41 @@ pub(super) fn faces(part: &mut Repaired, faceted: bool) -> (Vec<PlanarFace>, Vec
             uncertainty: (JITTER[level] * part.diagonal).max(factor * part.noise),
         }
     });
-    let mut regions = regions::grow(part, fine);
-    let mut facets = Facets::new(part, &regions);
+    let mut given = GivenFaces::new(part);
+    let mut regions = regions::grow(part, &given, fine);
+    let mut facets = Facets::new(part, &given, &regions);
     let is_rough = facets.are_rough(part, &regions, rough.distance);
+    let floor =
+        if is_rough { rough.distance } else { (FLOOR * part.diagonal).max(4.0 * part.noise) };
     if is_rough {
-        regions = regions::grow(part, rough);
-        facets = Facets::new(part, &regions);
+        regions = regions::grow(part, &given, rough);
+        facets = Facets::new(part, &given, &regions);
+    }
+    if let Some(tolerance) = fit {
+        let known = if faceted {
+            Vec::new()
+        } else {
+            curves::curved_faces(part, &regions, &facets.borders, &given, floor).faces
+        };
+        let found = known.into_iter().filter(|face| face.source == FaceSource::Mesh).collect();
+        fitted::fit(part, &mut given, found, Tolerance { distance: tolerance, faceted });
+        return fitted_faces(part, &given, fine);
+    }
+    if is_rough {
         part.health.warnings.push(format!(
             "flat faces are rough: corners up to {:.2} um off a plane were taken for flat (a clean mesh of this size needs {:.2})",
             rough.distance * 1e6,
             fine.distance * 1e6
         ));
     }
-    if let Some(Noise { share, distance }) = noise::measure(part, &regions) {
+    if let Some(noise) = noise::measure(part, &given, &regions) {
         let taken = if is_rough { rough } else { fine }.distance;
+        let Noise { share, distance } = noise;
+        let tolerance = noise.tolerance(1e-3) * 1e3;
         part.health.warnings.push(format!(
             "flat faces are noisy: on {:.0} % of the surface corners lie {:.1} um (root mean square) off the planes that fit them, {:.1} times the {:.2} um \
              up to which they count as flat, so planes have fallen into single triangles and grips on them are missing or tilted; export the part \
-             from its CAD model, or smooth a scan or fit planes to it first",
+             from its CAD model, or fit planes and round faces to corners within {tolerance} mm",
             share * 100.0,
             distance * 1e6,
             distance / taken,
@@ -61,19 +87,36 @@ pub(super) fn faces(part: &mut Repaired, faceted: bool) -> (Vec<PlanarFace>, Vec
     }
     if faceted {
         facets.is_facet.fill(false);
-        return (outline(part, &regions, &facets), Vec::new());
+        return (outline(part, &given, &regions, &facets), Vec::new());
     }
-    let floor =
-        if is_rough { rough.distance } else { (FLOOR * part.diagonal).max(4.0 * part.noise) };
     let Curves { faces: mut curved, is_curved, flats } =
-        curves::curved_faces(part, &regions, &facets.borders, floor);
+        curves::curved_faces(part, &regions, &facets.borders, &given, floor);
     for (is_facet, is_curved) in facets.is_facet.iter_mut().zip(is_curved) {
         *is_facet |= is_curved;
     }
     for flat in flats {
         facets.is_facet[flat as usize] = false;
     }
-    let planar = outline(part, &regions, &facets);
+    let planar = outline(part, &given, &regions, &facets);
+    for (face, id) in curved.iter_mut().zip(planar.len() as u32..) {
+        face.id = id;
+    }
+    (planar, curved)
+}
+
+/// The faces of a noisy mesh: those that were fitted, or that the file states.
+fn fitted_faces(
+    part: &Repaired,
+    given: &GivenFaces,
+    flatness: Flatness,
+) -> (Vec<PlanarFace>, Vec<CurvedFace>) {
+    let regions = regions::grow(part, given, flatness);
+    let mut facets = Facets::new(part, given, &regions);
+    for (index, is_facet) in facets.is_facet.iter_mut().enumerate() {
+        *is_facet |= given.face(regions.triangles(index)[0]).is_none();
+    }
+    let planar = outline(part, given, &regions, &facets);
+    let mut curved = curves::given_faces(part, given);
     for (face, id) in curved.iter_mut().zip(planar.len() as u32..) {
         face.id = id;
     }
@@ -81,16 +124,23 @@ pub(super) fn faces(part: &mut Repaired, faceted: bool) -> (Vec<PlanarFace>, Vec
 }
 
 /// The faces among the regions, with boundaries, sorted and numbered.
-fn outline(part: &Repaired, regions: &Regions, facets: &Facets) -> Vec<PlanarFace> {
+fn outline(
+    part: &Repaired,
+    given: &GivenFaces,
+    regions: &Regions,
+    facets: &Facets,
+) -> Vec<PlanarFace> {
     let tolerance = simplify_tolerance(part);
     let mut faces: Vec<PlanarFace> = Vec::new();
     for (index, region) in regions.all.iter().enumerate() {
-        if facets.is_facet[index]
-            || 4.0 * region.area < NARROWEST * part.diagonal * facets.borders.perimeter[index]
-        {
+        let triangles = regions.triangles(index);
+        let stated = given.face(triangles[0]).filter(|face| face.is_plane());
+        let is_given = stated.is_some();
+        let is_narrow =
+            4.0 * region.area < NARROWEST * part.diagonal * facets.borders.perimeter[index];
+        if facets.is_facet[index] || (is_narrow && !is_given) {
             continue;
         }
-        let triangles = regions.triangles(index);
         let mut frame = face_frame(region.plane.normal, region.centre);
         let rings = |frame: &Frame| {
             boundary::polygons(
@@ -125,6 +175,8 @@ fn outline(part: &Repaired, regions: &Regions, facets: &Facets) -> Vec<PlanarFac
             part_from_face: frame,
             polygons,
             triangles,
+            source: stated.map_or(FaceSource::Mesh, GivenFace::source),
+            fit: stated.and_then(|face| face.fit),
             shell,
             reachable: part.shells[shell as usize].role == Role::Body,
         });

@@ -1,6 +1,7 @@
 //! Which planar regions are faces of their own, and which are facets of curved surfaces.
 
 use super::borders::{Border, Borders};
+use super::given::GivenFaces;
 use super::regions::{Region, Regions};
 use super::repair::Repaired;
 
@@ -48,8 +49,8 @@ impl Facets {
     /// little: three of a kind in a row that goes no further, or so wide that the arc over one would
     /// rise by more than 1 % of the part's diagonal. Where a mesh leaves it open (the
     /// outermost strip of a gear's flank) the region stays: a flat too many costs a few candidates,
-    /// a flat too few loses grips.
-    pub(super) fn new(part: &Repaired, regions: &Regions) -> Self {
+    /// a flat too few loses grips. What the file states is not asked.
+    pub(super) fn new(part: &Repaired, given: &GivenFaces, regions: &Regions) -> Self {
         let count = regions.all.len();
         let borders = Borders::new(part, regions);
         let mut facets = Self { borders, is_facet: Vec::new() };
@@ -58,6 +59,9 @@ impl Facets {
         let small = (SMALL * part.diagonal).powi(2);
         facets.is_facet = (0..count)
             .map(|index| {
+                if let Some(face) = given.face(regions.triangles(index)[0]) {
+                    return !face.is_plane();
+                }
                 let long = 0.25 * facets.borders.perimeter[index];
                 let total: f64 = smooth[index].iter().map(|other| other.shared).sum();
                 let comparable: Vec<&Smooth> =

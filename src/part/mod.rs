@@ -21,6 +21,8 @@ mod curves;
 pub mod drawing;
 mod faces;
 mod facets;
+mod fitted;
+mod given;
 pub mod health;
 mod mass;
 mod noise;
@@ -81,6 +83,28 @@ pub struct MassProperties {
     pub inertia: DMat3,
 }
 
+/// Where it is known from what a face is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum FaceSource {
+    /// Recognised from the triangles of the mesh.
+    Mesh,
+    /// The file states it: STEP.
+    File,
+    /// Fitted within the tolerance asked for ([`ReadOptions::fit`]).
+    Fit,
+}
+
+/// How far the corners of a noisy mesh lay off a face that was fitted to them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Residual {
+    /// Root mean square \[m\].
+    pub rms: f64,
+    /// The greatest \[m\].
+    pub greatest: f64,
+}
+
 /// One planar face of the part with its boundary.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanarFace {
@@ -102,6 +126,10 @@ pub struct PlanarFace {
     pub polygons: Vec<Polygon>,
     /// Indices of its triangles in the mesh.
     pub triangles: Vec<u32>,
+    /// Where the plane comes from.
+    pub source: FaceSource,
+    /// Of a fitted face: how far the corners lay off it.
+    pub fit: Option<Residual>,
     /// Number of the shell (connected surface) that the face lies on.
     pub shell: u32,
     /// False for the walls of an internal void, or of a body wholly inside another: no finger gets
@@ -148,6 +176,9 @@ pub struct ReadOptions {
     pub outside_buffers: bool,
     /// Whether every facet is meant as a plane, so that none is taken for a curved face.
     pub faceted: bool,
+    /// Distance \[m\] within which corners of a noisy mesh are taken for points of one plane or
+    /// round face; they are moved onto the faces that fit them. `None`: nothing is fitted.
+    pub fit: Option<f64>,
 }
 
 setters!(ReadOptions {
@@ -155,6 +186,7 @@ setters!(ReadOptions {
     with_max_memory: max_memory: Option<u64>,
     with_outside_buffers: outside_buffers: bool,
     with_faceted: faceted: bool,
+    with_fit: fit: Option<f64>,
 });
 
 impl From<&Request> for ReadOptions {
@@ -164,6 +196,7 @@ impl From<&Request> for ReadOptions {
             max_memory: request.max_memory.map(|memory| memory.0 as u64),
             outside_buffers: request.outside_buffers,
             faceted: request.faceted,
+            fit: request.fit.map(|fit| fit.0),
         }
     }
 }
@@ -245,7 +278,7 @@ impl Part {
             (None, Some(stated)) => (stated, UnitSource::File),
             (None, None) => (Unit::Millimetre, UnitSource::Assumed),
         };
-        let mut part = Self::build(soup, unit, options.faceted, &path.display().to_string())?;
+        let mut part = Self::build(soup, unit, options, &path.display().to_string())?;
         part.name = read::stem(path);
         part.file = path.to_path_buf();
         part.unit_source = source;
@@ -267,6 +300,19 @@ impl Part {
     /// When a coordinate is not finite, an index points nowhere, or no triangle with an area is
     /// left.
     pub fn from_triangles(name: &str, vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<Self> {
+        Self::from_triangles_with(name, vertices, triangles, &ReadOptions::default())
+    }
+
+    /// As [`Part::from_triangles`], with [`ReadOptions::faceted`] and [`ReadOptions::fit`].
+    ///
+    /// # Errors
+    /// As there, and when the tolerance of the fit is not above zero or not small against the part.
+    pub fn from_triangles_with(
+        name: &str,
+        vertices: &[DVec3],
+        triangles: &[[u32; 3]],
+        options: &ReadOptions,
+    ) -> Result<Self> {
         let mut welder = weld::Welder::default();
         for (number, triangle) in triangles.iter().enumerate() {
             let mut corners = [DVec3::ZERO; 3];
@@ -290,15 +336,18 @@ impl Part {
             }
             welder.triangle(corners);
         }
-        let mut part = Self::build(welder.finish(None, Vec::new()), Unit::Metre, false, name)?;
+        let mut part = Self::build(welder.finish(None, Vec::new()), Unit::Metre, options, name)?;
         part.name = name.to_string();
         Ok(part)
     }
 
-    fn build(soup: weld::Soup, unit: Unit, faceted: bool, place: &str) -> Result<Self> {
+    fn build(soup: weld::Soup, unit: Unit, options: &ReadOptions, place: &str) -> Result<Self> {
         check_extent(&soup, unit, place)?;
         let mut repaired = repair::repair(soup, unit.metres(), place)?;
-        let (faces, curved) = faces::faces(&mut repaired, faceted);
+        if let Some(fit) = options.fit {
+            fitted::check(fit, repaired.diagonal)?;
+        }
+        let (faces, curved) = faces::faces(&mut repaired, options.faceted, options.fit);
         let unit_mass = repaired.mass();
         Ok(Self {
             name: String::new(),

@@ -104,6 +104,18 @@ pub(super) fn orient(
     (shell_of, shells)
 }
 
+/// Boxes and integrals of shells whose vertices have moved.
+pub(super) fn measure(mesh: &Mesh, shell_of: &[u32], shells: &mut [Shell], apex: DVec3) {
+    let members = Members::new(shell_of, shells.len());
+    for (index, shell) in shells.iter_mut().enumerate() {
+        shell.integrals = mass::integrate(mesh, members.of(index), apex);
+        (shell.low, shell.high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for corner in members.of(index).flat_map(|triangle| mesh.corners(triangle)) {
+            (shell.low, shell.high) = (shell.low.min(corner), shell.high.max(corner));
+        }
+    }
+}
+
 /// Walks over the neighbours: the shell of each triangle, whether its winding disagrees with that
 /// of its shell's first triangle (empty when none does), and the number of shells.
 fn label(mesh: &Mesh, edges: &Edges, health: &mut Health) -> (Vec<u32>, Vec<bool>, usize) {

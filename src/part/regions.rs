@@ -10,6 +10,7 @@ use glam::DVec3;
 use nalgebra::Matrix3;
 
 use super::Mesh;
+use super::given::{GivenFaces, Stated};
 use super::repair::Repaired;
 use super::topology::NONE;
 
@@ -142,8 +143,33 @@ fn twice_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-/// Partitions the triangles into planar regions.
-pub(super) fn grow(part: &Repaired, flatness: Flatness) -> Regions {
+/// Partitions the triangles into planar regions. A plane that the file states is a region as it is;
+/// others end where faces do that the file states.
+pub(super) fn grow(part: &Repaired, given: &GivenFaces, flatness: Flatness) -> Regions {
+    let seeds = seeds(&part.mesh);
+    grow_from(part, given, flatness, seeds.iter().map(std::slice::from_ref))
+}
+
+/// Grows regions once more, from the largest to the smallest: with its plane known, a large one takes
+/// in the small ones that noise left beside it.
+pub(super) fn grow_again(
+    part: &Repaired,
+    given: &GivenFaces,
+    flatness: Flatness,
+    first: &Regions,
+) -> Regions {
+    let mut order: Vec<usize> = (0..first.all.len()).collect();
+    order.sort_by(|&a, &b| first.all[b].area.total_cmp(&first.all[a].area).then(a.cmp(&b)));
+    grow_from(part, given, flatness, order.into_iter().map(|index| first.triangles(index)))
+}
+
+/// Grows regions from groups of triangles, as far as those belong to no region yet.
+fn grow_from<'a>(
+    part: &Repaired,
+    given: &GivenFaces,
+    flatness: Flatness,
+    starts: impl Iterator<Item = &'a [u32]>,
+) -> Regions {
     let mesh = &part.mesh;
     let count = mesh.triangles.len();
     let Flatness { distance, uncertainty } = flatness;
@@ -151,27 +177,47 @@ pub(super) fn grow(part: &Repaired, flatness: Flatness) -> Regions {
     let mut region_of = vec![NONE; count];
     let mut regions = Vec::new();
     let mut refused = Vec::new();
-    for seed in seeds(mesh) {
-        if region_of[seed as usize] != NONE {
-            continue;
+    for face in &given.all {
+        let Stated::Plane { origin, normal } = face.surface else { continue };
+        let mut sums = Sums::new(origin);
+        let begin = order.len();
+        for &triangle in &face.triangles {
+            let corners = mesh.corners(triangle);
+            let cross = twice_normal(corners);
+            sums.add(corners, cross, cross.length() / 2.0);
+            region_of[triangle as usize] = regions.len() as u32;
+            order.push(triangle);
         }
+        let plane = Plane { normal, offset: normal.dot(origin), tilt: 0.0 };
+        let centre = sums.centre();
+        let centre = centre - normal * (normal.dot(centre - origin));
+        regions.push(Region { begin, end: order.len(), plane, area: sums.area, centre });
+    }
+    for start in starts {
         let number = regions.len() as u32;
         let begin = order.len();
+        order.extend(start.iter().copied().filter(|&t| region_of[t as usize] == NONE));
+        let Some(&seed) = order.get(begin) else { continue };
+        let own = given.of(seed);
         let corners = mesh.corners(seed);
-        let cross = twice_normal(corners);
         let mut sums = Sums::new(corners[0]);
-        sums.add(corners, cross, cross.length() / 2.0);
-        region_of[seed as usize] = number;
-        order.push(seed);
+        for &triangle in &order[begin..] {
+            let corners = mesh.corners(triangle);
+            let cross = twice_normal(corners);
+            sums.add(corners, cross, cross.length() / 2.0);
+            region_of[triangle as usize] = number;
+        }
         let Some(mut plane) = sums.fit(uncertainty) else {
             // Not even a direction: alone, without area.
             let plane = Plane { normal: DVec3::Z, offset: corners[0].z, tilt: 0.0 };
             regions.push(Region { begin, end: order.len(), plane, area: 0.0, centre: corners[0] });
             continue;
         };
-        plane.normal = cross.normalize();
-        plane.offset = plane.normal.dot(corners[0]);
-        let mut refit_at = 2;
+        if order.len() == begin + 1 {
+            plane.normal = twice_normal(corners).normalize();
+            plane.offset = plane.normal.dot(corners[0]);
+        }
+        let mut refit_at = 2 * (order.len() - begin);
         let mut next = begin;
         refused.clear();
         loop {
@@ -184,6 +230,9 @@ pub(super) fn grow(part: &Repaired, flatness: Flatness) -> Regions {
                         continue;
                     }
                     let other = twin / 3;
+                    if given.of(other) != own {
+                        continue;
+                    }
                     if take(mesh, other, &plane, distance, uncertainty, &mut sums) {
                         region_of[other as usize] = number;
                         order.push(other);

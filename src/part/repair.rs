@@ -5,6 +5,7 @@ use glam::DVec3;
 
 use super::cracks;
 use super::crossing::{Crossing, crossing};
+use super::given::Given;
 use super::mass::Integrals;
 use super::orient::{self, Role, Shell};
 use super::topology::{self, Edges, NONE, ends};
@@ -34,10 +35,17 @@ pub(super) struct Repaired {
     pub noise: f64,
     /// Unit of the file's numbers \[m\].
     pub unit: f64,
+    /// The faces that the file states \[m\].
+    pub given: Given,
     apex: DVec3,
 }
 
 impl Repaired {
+    /// Measures the shells again, after vertices have moved.
+    pub(super) fn measure_again(&mut self) {
+        orient::measure(&self.mesh, &self.shell_of, &mut self.shells, self.apex);
+    }
+
     /// Mass properties at density 1 of all material.
     pub(super) fn mass(&self) -> MassProperties {
         let mut total = Integrals::default();
@@ -60,7 +68,9 @@ pub(super) fn repair(soup: Soup, scale: f64, place: &str) -> Result<Repaired> {
         ..Health::default()
     };
     let mut mesh = Mesh { vertices: soup.vertices, triangles: soup.triangles };
+    let mut given = soup.given;
     if scale != 1.0 {
+        given.scale(scale);
         for vertex in &mut mesh.vertices {
             *vertex *= scale;
         }
@@ -87,7 +97,7 @@ pub(super) fn repair(soup: Soup, scale: f64, place: &str) -> Result<Repaired> {
     }
     let tolerance = (JOIN * diagonal).max(4.0 * noise);
     let mut edges = topology::edges(&mesh);
-    mend(&mut mesh, &mut edges, tolerance, &mut health);
+    mend(&mut mesh, &mut given, &mut edges, tolerance, &mut health);
     if mesh.triangles.is_empty() {
         return Err(Error::new(
             ErrorKind::Geometry,
@@ -116,7 +126,18 @@ pub(super) fn repair(soup: Soup, scale: f64, place: &str) -> Result<Repaired> {
                 .to_string(),
         ),
     }
-    Ok(Repaired { mesh, health, edges, shell_of, shells, diagonal, noise, unit: scale, apex })
+    Ok(Repaired {
+        mesh,
+        health,
+        edges,
+        shell_of,
+        shells,
+        diagonal,
+        noise,
+        unit: scale,
+        given,
+        apex,
+    })
 }
 
 /// Parts neighbours whose windings still disagree, so that walks over the surface never change
@@ -133,7 +154,13 @@ fn separate_disagreeing(mesh: &Mesh, edges: &mut Edges) {
 
 /// Removes duplicates and needles, joins vertices and cuts edges until nothing open or tangled can
 /// be mended any more.
-fn mend(mesh: &mut Mesh, edges: &mut Edges, tolerance: f64, health: &mut Health) {
+fn mend(
+    mesh: &mut Mesh,
+    given: &mut Given,
+    edges: &mut Edges,
+    tolerance: f64,
+    health: &mut Health,
+) {
     // Each round may make the next one's work possible; real files need one or two.
     for _ in 0..ROUNDS {
         if edges.open.is_empty() && edges.tangled.is_empty() {
@@ -148,15 +175,15 @@ fn mend(mesh: &mut Mesh, edges: &mut Edges, tolerance: f64, health: &mut Health)
             }
         };
         if !edges.tangled.is_empty() {
-            let count = remove_duplicates(mesh);
+            let count = remove_duplicates(mesh, given);
             note(mesh, edges, count, &mut health.duplicates_removed);
         }
-        let count = cracks::remove_needles(mesh, edges, NEEDLE * tolerance);
+        let count = cracks::remove_needles(mesh, given, edges, NEEDLE * tolerance);
         note(mesh, edges, count, &mut health.degenerate_removed);
         if !edges.open.is_empty() {
-            let count = cracks::join_vertices(mesh, edges, tolerance);
+            let count = cracks::join_vertices(mesh, given, edges, tolerance);
             note(mesh, edges, count, &mut health.vertices_joined);
-            let count = cracks::split_edges(mesh, edges, tolerance);
+            let count = cracks::split_edges(mesh, given, edges, tolerance);
             note(mesh, edges, count, &mut health.edges_split);
         }
         if changed == 0 {
@@ -188,7 +215,7 @@ fn report_edges(mesh: &Mesh, edges: &Edges, health: &mut Health) {
 /// Removes repeated triangles, in whatever order and sense their corners are listed. Two of
 /// opposite senses in a mesh that is not two-sided throughout are the wall between two bodies glued
 /// together: both go, so that one body is left. Returns how many went.
-fn remove_duplicates(mesh: &mut Mesh) -> usize {
+fn remove_duplicates(mesh: &mut Mesh, given: &mut Given) -> usize {
     let even = |[a, b, c]: [u32; 3]| (a < b) ^ (b < c) ^ (a < c); // sense of the corners against ascending order
     let mut keys: Vec<([u32; 3], u32)> = mesh
         .triangles
@@ -220,7 +247,6 @@ fn remove_duplicates(mesh: &mut Mesh) -> usize {
         }
     }
     let before = mesh.triangles.len();
-    let mut flags = drop.into_iter();
-    mesh.triangles.retain(|_| !flags.next().unwrap_or(false));
+    given.retain(mesh, |index, _| !drop[index]);
     before - mesh.triangles.len()
 }

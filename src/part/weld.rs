@@ -2,6 +2,9 @@
 
 use glam::DVec3;
 
+use super::given::Given;
+#[cfg(feature = "step")]
+use super::given::Stated;
 use crate::units::Unit;
 
 /// Triangles of a file in the file's own unit, corners with equal coordinates shared.
@@ -15,6 +18,8 @@ pub(super) struct Soup {
     pub unit: Option<Unit>,
     /// What the reader noticed.
     pub warnings: Vec<String>,
+    /// The faces that the file states; empty for a format of triangles.
+    pub given: Given,
 }
 
 /// Most triangles that are taken: half-edge numbers (three a triangle) must fit 32 bits with room
@@ -35,6 +40,7 @@ pub(super) struct Welder {
     recent: [(DVec3, u32); 6],
     next_recent: usize,
     read: usize,
+    given: Given,
 }
 
 impl Default for Welder {
@@ -47,6 +53,7 @@ impl Default for Welder {
             recent: [(DVec3::ZERO, u32::MAX); 6],
             next_recent: 0,
             read: 0,
+            given: Given::default(),
         }
     }
 }
@@ -59,7 +66,14 @@ impl Welder {
         let [a, b, c] = corners.map(|corner| self.vertex(corner));
         if a != b && b != c && c != a {
             self.triangles.push([a, b, c]);
+            self.given.push();
         }
+    }
+
+    /// The triangles that follow belong to a face of this surface.
+    #[cfg(feature = "step")]
+    pub(super) fn face(&mut self, surface: Stated) {
+        self.given.begin(surface);
     }
 
     /// Triangles taken so far.
@@ -117,7 +131,14 @@ impl Welder {
 
     /// The joined triangles.
     pub(super) fn finish(self, unit: Option<Unit>, warnings: Vec<String>) -> Soup {
-        Soup { vertices: self.vertices, triangles: self.triangles, read: self.read, unit, warnings }
+        Soup {
+            vertices: self.vertices,
+            triangles: self.triangles,
+            read: self.read,
+            unit,
+            warnings,
+            given: self.given,
+        }
     }
 }
 

@@ -11,6 +11,7 @@ unit = "in"
 max_memory = "2GB"
 outside_buffers = true
 faceted = true
+fit = "0.2mm"
 gripper = "my.toml"
 density = "2.7 g/cm3"
 com = "1in,-2mm,0mm"

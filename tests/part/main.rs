@@ -4,11 +4,16 @@
 
 mod curved;
 mod faceted;
+mod fit;
 mod formats;
 mod hostile;
 mod solids;
 #[cfg(feature = "step")]
 mod step;
+#[cfg(feature = "step")]
+mod step_faces;
+#[cfg(feature = "step")]
+mod step_solids;
 #[path = "../support/mod.rs"]
 mod support;
 mod truth;

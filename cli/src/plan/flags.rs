@@ -91,6 +91,10 @@ pub(crate) struct JobArgs {
     /// Every facet of the part is meant as a plane: none is taken for a curved face.
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
     faceted: Option<bool>,
+    /// For noisy and scanned parts: fits planes and round faces to corners within this distance, some
+    /// three times the noise, e.g. 0.2mm.
+    #[arg(long, value_name = "LENGTH")]
+    fit: Option<Length>,
     /// Acceleration in any direction on top of gravity, e.g. 2g.
     #[arg(long)]
     accel: Option<Acceleration>,
@@ -414,7 +418,7 @@ impl JobArgs {
             request.mass = Some(mass);
         }
         give!(self => request;
-            density, com, inertia, unit, max_memory, outside_buffers, faceted, accel);
+            density, com, inertia, unit, max_memory, outside_buffers, faceted, fit, accel);
         if let [force] = self.force[..] {
             request.force = Some(force);
         }
@@ -494,7 +498,7 @@ mod tests {
 
     /// Every flag that is a field, with a value that is not its default.
     const LINE: &str = "gripfast plan part.stl --gripper my.toml --mass 350g --force 40N --unit in --max-memory 2GB --outside-buffers \
-        --faceted \
+        --faceted --fit 0.2mm \
         --accel 2g --loads gravity,ball:3 --spacing 2mm --angle-step 7deg --edge-angles false --curved \
         --min-contact 0.3 --min-pad-share 0.1 --max-offset 9mm --approach -z:45deg --ground +z:1mm \
         --keep-out 0mm,0mm,0mm:1mm,1mm,1mm --scene cell.toml --faces 0,2 --faces-in 0mm,0mm,0mm:1mm,1mm,1mm \

@@ -253,6 +253,7 @@ fn a_crash_of_the_cad_kernel_is_an_error_that_names_file_and_stage() {
     let answer = run(&["part", &good]);
     assert!(matches!(answer.code, Some(0 | 1)), "{}", answer.errors);
     assert!(answer.output.contains("planar faces"), "{}", answer.output);
+    assert!(answer.output.contains("as the file states them"), "{}", answer.output);
     refused(&["part", &good, "--max-memory", "1MB"], &["remedy"]);
     // Started under a limit of its own (a batch system, a container), lower than the one allowed.
     let program = assert_cmd::cargo::cargo_bin("gripfast").display().to_string();

@@ -540,6 +540,70 @@ fn small_noise_keeps_every_large_plane() {
     }
 }
 
+/// Planes and rounds fitted to a noisy mesh are gripped as those of the clean one.
+#[test]
+fn a_noisy_part_that_is_fitted_has_the_grips_of_the_clean_one() {
+    let scratch = tempfile::tempdir().unwrap();
+    let ring = |k: u32, z: f64| {
+        let angle = std::f64::consts::TAU * f64::from(k % 96) / 96.0;
+        DVec3::new(10.0 * angle.cos(), 10.0 * angle.sin(), z)
+    };
+    let mut cylinder: Vec<Triangle> = Vec::new();
+    for k in 0..96 {
+        for row in 0..6 {
+            let [low, high] = [row, row + 1].map(|row| 10.0 * f64::from(row));
+            let [a, b, c, d] = [ring(k, low), ring(k + 1, low), ring(k, high), ring(k + 1, high)];
+            cylinder.extend([[a, b, d], [a, d, c]]);
+        }
+        let top = DVec3::new(0.0, 0.0, 60.0);
+        cylinder.push([ring(k + 1, 0.0), ring(k, 0.0), DVec3::ZERO]);
+        cylinder.push([ring(k, 60.0), ring(k + 1, 60.0), top]);
+    }
+    let bracket = load(&crate::support::root().join("data/parts/l_bracket.stl"));
+    for (name, t) in [("bracket", bracket), ("cylinder", cylinder)] {
+        let best = |part: &Part| {
+            let ranked = ranking(part);
+            let mut needed: Vec<f64> = ranked.iter().filter_map(|grip| grip.worst.mu_s).collect();
+            needed.sort_by(f64::total_cmp);
+            assert!(needed.len() >= 3, "{name}: {}", needed.len());
+            needed[..3].iter().sum::<f64>() / 3.0
+        };
+        let clean = best(&read(scratch.path(), &plain(&t), None).unwrap());
+        for (seed, noise) in [(1, 0.02), (2, 0.05), (3, 0.1)] {
+            let mut random = Random::new(seed);
+            let mut moves = std::collections::HashMap::new();
+            let spoiled: Vec<Triangle> = t
+                .iter()
+                .map(|triangle| {
+                    triangle.map(|corner| {
+                        let key = (corner * 1e6).round().to_array().map(|x| x as i64);
+                        let mut one = || noise * (2.0 * random.unit() - 1.0);
+                        corner
+                            + *moves.entry(key).or_insert_with(|| DVec3::new(one(), one(), one()))
+                    })
+                })
+                .collect();
+            let path = scratch.path().join("fitted.stl");
+            std::fs::write(&path, plain(&spoiled)).unwrap();
+            let options = ReadOptions::default().with_fit(Some(3e-3 * noise));
+            let fitted = best(&Part::read(&path, &options).unwrap());
+            assert!(
+                (fitted - clean).abs() < 0.03 * clean,
+                "{name}, noise {noise} mm: mu_s {fitted} of {clean}"
+            );
+        }
+    }
+    let output = assert_cmd::Command::cargo_bin("gripfast")
+        .unwrap()
+        .current_dir(scratch.path())
+        .args(["part", "fitted.stl", "--fit", "0.3mm"])
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("fitted within 0.3 mm: 2 planes and 1 curved face"), "{text}");
+    assert!(text.contains("fitted: rms"), "{text}");
+}
+
 /// What a user reads about noise: from `part` and from `plan`, for a bracket and for a box of
 /// twelve triangles.
 #[test]
@@ -601,7 +665,8 @@ fn noise_is_told_with_its_size_and_a_remedy() {
             assert!(
                 text.contains("flat faces are noisy")
                     && text.contains("times the")
-                    && text.contains("CAD model"),
+                    && text.contains("CAD model")
+                    && text.contains("(--fit "),
                 "{name}: {text}"
             );
         }

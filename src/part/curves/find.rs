@@ -2,17 +2,18 @@
 
 use glam::DVec3;
 
-use super::fit::{Kind, Profile};
+use super::fit::Kind;
 use super::grow::{Exactness, FREE, Found, Growth};
 use super::judge::{COARSE, Cut, turn};
 use super::net::Net;
 use super::seed::comparable;
-use super::{Axis, CurvedFace, Shape};
+use super::{CurvedFace, describe};
 use crate::geometry::UnionFind;
 use crate::part::borders::Borders;
-use crate::part::orient::Role;
+use crate::part::given::GivenFaces;
 use crate::part::regions::Regions;
 use crate::part::repair::Repaired;
+use crate::part::topology::NONE;
 
 /// Side of a square, as a share of the part's diagonal, below whose area a curved face is none.
 const LEAST: f64 = 5e-4;
@@ -68,6 +69,7 @@ pub(in crate::part) fn curved_faces(
     part: &Repaired,
     regions: &Regions,
     borders: &Borders,
+    given: &GivenFaces,
     floor: f64,
 ) -> Curves {
     let mut is_curved = vec![false; regions.all.len()];
@@ -79,12 +81,16 @@ pub(in crate::part) fn curved_faces(
         });
         bends.count() >= 2
     };
-    let seeds: Vec<u32> = (0..regions.all.len() as u32).filter(|&facet| is_bent(facet)).collect();
+    let is_open =
+        |facet: &u32| given.is_empty() || given.of(regions.triangles(*facet as usize)[0]) == NONE;
+    let seeds: Vec<u32> =
+        (0..regions.all.len() as u32).filter(is_open).filter(|&facet| is_bent(facet)).collect();
+    let mut described = given_faces(part, given);
     if seeds.is_empty() {
-        return Curves { faces: Vec::new(), is_curved, flats: Vec::new() };
+        return Curves { faces: described, is_curved, flats: Vec::new() };
     }
     let floor = floor.max(quantum(part, regions, &seeds));
-    let net = Net::new(part, regions, borders, floor);
+    let net = Net::new(part, regions, borders, given, floor);
     let mut growth = Growth::new(&net);
     let mut faces: Vec<Face> = Vec::new();
     growth.exact(&seeds, &mut faces);
@@ -93,9 +99,10 @@ pub(in crate::part) fn curved_faces(
     growth.join_same(&mut faces);
     growth.join_cut(&mut faces);
     let least = (LEAST * part.diagonal).powi(2);
-    let mut described = Vec::new();
     for face in faces.iter().filter(|face| !face.found.members.is_empty()) {
-        if let Some(curved) = describe(part, regions, face).filter(|curved| curved.area > least) {
+        if let Some(curved) =
+            describe::found(part, regions, face).filter(|curved| curved.area > least)
+        {
             if takes_planes(face, part.diagonal) {
                 for &facet in &face.found.members {
                     is_curved[facet as usize] = true;
@@ -104,15 +111,28 @@ pub(in crate::part) fn curved_faces(
             described.push(curved);
         }
     }
-    // As planar faces: areas that agree to 1e-6 count as equal.
+    sort(&mut described, part.diagonal);
+    let flats = seeds.iter().copied().filter(|&seed| growth.is_flat(seed, &faces)).collect();
+    Curves { faces: described, is_curved, flats }
+}
+
+/// The curved ones of the faces that the file states or that were fitted, by falling area, not
+/// numbered yet.
+pub(in crate::part) fn given_faces(part: &Repaired, given: &GivenFaces) -> Vec<CurvedFace> {
+    let mut described: Vec<CurvedFace> =
+        given.all.iter().filter_map(|face| describe::given(part, face)).collect();
+    sort(&mut described, part.diagonal);
+    described
+}
+
+/// As planar faces: areas that agree to 1e-6 count as equal.
+fn sort(faces: &mut [CurvedFace], diagonal: f64) {
     let key = |face: &CurvedFace| (face.area.log2() * 1e5).round() as i64;
-    let step = (part.diagonal * 1e-6).max(f64::MIN_POSITIVE);
+    let step = (diagonal * 1e-6).max(f64::MIN_POSITIVE);
     let place = |face: &CurvedFace| {
         [face.centroid.x, face.centroid.y, face.centroid.z].map(|x| (x / step).round() as i64)
     };
-    described.sort_by_cached_key(|face| (std::cmp::Reverse(key(face)), place(face)));
-    let flats = seeds.iter().copied().filter(|&seed| growth.is_flat(seed, &faces)).collect();
-    Curves { faces: described, is_curved, flats }
+    faces.sort_by_cached_key(|face| (std::cmp::Reverse(key(face)), place(face)));
 }
 
 /// The step to which the file rounds coordinates of curved surfaces \[m\], decimal or binary, where
@@ -396,71 +416,4 @@ impl Growth<'_> {
         }
         is_found
     }
-}
-
-fn describe(part: &Repaired, regions: &Regions, face: &Face) -> Option<CurvedFace> {
-    let found = &face.found;
-    let mut triangles: Vec<u32> = found
-        .members
-        .iter()
-        .flat_map(|&facet| regions.triangles(facet as usize))
-        .copied()
-        .collect();
-    triangles.sort_unstable();
-    let (mut area, mut centroid) = (0.0, DVec3::ZERO);
-    for &triangle in &triangles {
-        let [a, b, c] = part.mesh.corners(triangle);
-        let own = (b - a).cross(c - a).length() / 2.0;
-        area += own;
-        centroid += (a + b + c) / 3.0 * own;
-    }
-    let axis = found.surface.axis;
-    // The greatest component of the direction is positive, so that the search does not decide.
-    let sense = axis.direction[axis.direction.abs().max_position()].signum();
-    let mut axis = Axis { direction: axis.direction * sense, ..axis };
-    let extent = |axis: Axis| {
-        let places = found.points.iter().chain(&face.rim).map(|&point| axis.along(point));
-        places.fold([f64::INFINITY, f64::NEG_INFINITY], |along, place| {
-            [along[0].min(place), along[1].max(place)]
-        })
-    };
-    let centred = |axis: &mut Axis| {
-        let [low, high] = extent(*axis);
-        axis.origin += axis.direction * (low + high) / 2.0;
-        extent(*axis)
-    };
-    let shape = match (found.kind, found.surface.profile) {
-        (Kind::Revolution, _) => {
-            let along = centred(&mut axis);
-            Shape::Revolution { axis, along }
-        }
-        (Kind::Cone, Profile::Line { radius, slope }) => {
-            let apex =
-                found.surface.axis.origin - found.surface.axis.direction * (radius / slope.tan());
-            let axis = found.surface.axis.direction * slope.signum();
-            let along = extent(Axis { origin: apex, direction: axis });
-            Shape::Cone { apex, axis, half_angle: slope.abs(), along }
-        }
-        (_, Profile::Line { radius, .. }) => {
-            let along = centred(&mut axis);
-            Shape::Cylinder { axis, radius, along, turn: face.cut.turn }
-        }
-        (Kind::Sphere, Profile::Circle { minor, .. }) => {
-            Shape::Sphere { centre: axis.origin, radius: minor }
-        }
-        (_, Profile::Circle { major, minor }) => Shape::Torus { axis, major, minor },
-    };
-    let shell = part.shell_of[*triangles.first()? as usize];
-    Some(CurvedFace {
-        id: 0,
-        shape,
-        outside: found.sign > 0.0,
-        residual: found.residual,
-        facets: Some(face.cut.facets),
-        area,
-        centroid: centroid / area,
-        triangles,
-        shell,
-        reachable: part.shells[shell as usize].role == Role::Body,
-    })
 }

@@ -8,7 +8,7 @@ use super::Axis;
 /// Profile of a surface of revolution in the plane of the place `s` along the axis (from its
 /// origin) and the distance `r` from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Profile {
+pub(in crate::part) enum Profile {
     /// `r = radius + s tan(slope)`: a cylinder where the slope is zero, else a cone.
     Line {
         /// Distance from the axis at its origin \[m\].
@@ -27,7 +27,7 @@ pub(super) enum Profile {
 
 /// Which parameters a fit may move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(in crate::part) enum Kind {
     Cylinder,
     Cone,
     Sphere,
@@ -51,13 +51,13 @@ impl Kind {
     }
 
     /// Number of parameters.
-    pub(super) fn freedoms(self) -> usize {
+    pub(in crate::part) fn freedoms(self) -> usize {
         self.is_free().iter().filter(|free| **free).count()
     }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Surface {
+pub(in crate::part) struct Surface {
     pub axis: Axis,
     pub profile: Profile,
 }
@@ -94,13 +94,13 @@ impl Surface {
     }
 
     /// Distance from the surface \[m\], positive on the side away from the axis or the tube.
-    pub(super) fn distance(&self, point: DVec3) -> f64 {
+    pub(in crate::part) fn distance(&self, point: DVec3) -> f64 {
         let (s, r, _) = self.place(point);
         self.level(s, r).0
     }
 
     /// Distance and unit normal of the surface of equal distance through `point`.
-    pub(super) fn distance_and_normal(&self, point: DVec3) -> (f64, DVec3) {
+    pub(in crate::part) fn distance_and_normal(&self, point: DVec3) -> (f64, DVec3) {
         let (s, r, away) = self.place(point);
         let (distance, by_r, by_s) = self.level(s, r);
         (distance, away * by_r + self.axis.direction * by_s)
@@ -108,7 +108,7 @@ impl Surface {
 
     /// The radius that residuals are compared with \[m\]: of a cylinder, of a cone at the axis'
     /// origin, of a sphere or of a tube.
-    pub(super) fn radius(&self) -> f64 {
+    pub(in crate::part) fn radius(&self) -> f64 {
         match self.profile {
             Profile::Line { radius, .. } => radius.abs(),
             Profile::Circle { minor, .. } => minor,
@@ -116,11 +116,21 @@ impl Surface {
     }
 
     /// The greatest radius about the axis: of a sphere, or of a torus outside \[m\].
-    pub(super) fn reach(&self) -> f64 {
+    pub(in crate::part) fn reach(&self) -> f64 {
         match self.profile {
             Profile::Line { radius, .. } => radius.abs(),
             Profile::Circle { major, minor } => major + minor,
         }
+    }
+
+    /// The same surface with all lengths times `scale`.
+    pub(in crate::part) fn scaled(mut self, scale: f64) -> Self {
+        self.axis.origin *= scale;
+        match &mut self.profile {
+            Profile::Line { radius, .. } => *radius *= scale,
+            Profile::Circle { major, minor } => (*major, *minor) = (*major * scale, *minor * scale),
+        }
+        self
     }
 
     /// Greatest distance of `points` \[m\].
@@ -130,7 +140,7 @@ impl Surface {
 
     /// The surface of this `kind` nearest to `points` (least squares), starting from `self`.
     /// `None` when it runs away.
-    pub(super) fn fitted(mut self, kind: Kind, points: &[DVec3]) -> Option<Surface> {
+    pub(in crate::part) fn fitted(mut self, kind: Kind, points: &[DVec3]) -> Option<Surface> {
         let stride = points.len().div_ceil(MOST_POINTS).max(1);
         // Not every second point, say: that may be one of two rings.
         let jitter = |k: usize| (k.wrapping_mul(0x9e37_79b9) >> 16) % stride;

@@ -7,6 +7,9 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use super::{FaceSource, Residual};
+
+mod describe;
 mod find;
 mod fit;
 mod grow;
@@ -16,7 +19,10 @@ mod profile;
 mod seed;
 mod trim;
 
-pub(super) use find::{Curves, curved_faces};
+pub(super) use describe::arcs;
+pub(super) use find::{Curves, curved_faces, given_faces};
+pub(super) use fit::{Kind, Profile, Surface};
+pub(super) use seed::{cone_by_circles, cylinder_along, outer, smallest_direction, sphere_through};
 
 /// A line in the part frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -135,9 +141,13 @@ pub struct CurvedFace {
     pub outside: bool,
     /// Greatest distance of its vertices in the mesh from the shape \[m\].
     pub residual: f64,
-    /// Facets that a whole turn would have at the width of this face's facets. `None` where the
-    /// shape comes from a CAD kernel.
+    /// Facets that a whole turn would have at the width of this face's facets. `None` where that is
+    /// not known.
     pub facets: Option<f64>,
+    /// Where the shape comes from.
+    pub source: FaceSource,
+    /// Of a fitted face: how far the corners lay off it.
+    pub fit: Option<Residual>,
     /// Area of its triangles [m^2].
     pub area: f64,
     /// Area centroid of its triangles \[m\], not a point of the surface.
@@ -161,7 +171,7 @@ impl CurvedFace {
     /// Whether so few facets (up to 16) make its turn that it may be meant as facets: an octagonal
     /// bar, or a coarse cylinder.
     pub fn is_doubtful(&self) -> bool {
-        self.facets.is_some_and(|facets| facets < DOUBTFUL)
+        self.source == FaceSource::Mesh && self.facets.is_some_and(|facets| facets < DOUBTFUL)
     }
 
     /// Whether both are surfaces of revolution about one axis, within their residuals and a
@@ -207,6 +217,28 @@ impl CurvedFace {
 }
 
 impl Shape {
+    /// Kind and surface; the profile of a revolution is not known.
+    pub(super) fn surface(&self) -> (Kind, Surface) {
+        let line = |axis, radius, slope| Surface { axis, profile: Profile::Line { radius, slope } };
+        let circle =
+            |axis, major, minor| Surface { axis, profile: Profile::Circle { major, minor } };
+        match *self {
+            Shape::Cylinder { axis, radius, .. } => (Kind::Cylinder, line(axis, radius, 0.0)),
+            Shape::Cone { apex, axis, half_angle, along } => {
+                let middle = (along[0] + along[1]) / 2.0;
+                let origin = apex + axis * middle;
+                let axis = Axis { origin, direction: axis };
+                (Kind::Cone, line(axis, middle * half_angle.tan(), half_angle))
+            }
+            Shape::Sphere { centre, radius } => {
+                let axis = Axis { origin: centre, direction: DVec3::Z };
+                (Kind::Sphere, circle(axis, 0.0, radius))
+            }
+            Shape::Torus { axis, major, minor } => (Kind::Torus, circle(axis, major, minor)),
+            Shape::Revolution { axis, .. } => (Kind::Revolution, line(axis, 0.0, 0.0)),
+        }
+    }
+
     /// The radius that lengths are compared with \[m\].
     fn radius(&self) -> f64 {
         match *self {

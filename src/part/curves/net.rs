@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::fit::Surface;
 use crate::part::borders::Borders;
+use crate::part::given::GivenFaces;
 use crate::part::regions::Regions;
 use crate::part::repair::Repaired;
 use crate::part::topology::NONE;
@@ -21,6 +22,7 @@ pub(super) struct Net<'a> {
     pub part: &'a Repaired,
     pub regions: &'a Regions,
     pub borders: &'a Borders,
+    pub given: &'a GivenFaces,
     is_corner: Vec<bool>,
     /// Uncertainty of a vertex \[m\].
     pub floor: f64,
@@ -31,6 +33,7 @@ impl<'a> Net<'a> {
         part: &'a Repaired,
         regions: &'a Regions,
         borders: &'a Borders,
+        given: &'a GivenFaces,
         floor: f64,
     ) -> Self {
         let vertices = part.mesh.vertices.len();
@@ -55,7 +58,7 @@ impl<'a> Net<'a> {
                 is_corner[vertex] |= open;
             }
         }
-        Self { part, regions, borders, is_corner, floor }
+        Self { part, regions, borders, given, is_corner, floor }
     }
 
     pub(super) fn normal(&self, facet: u32) -> DVec3 {
@@ -74,9 +77,15 @@ impl<'a> Net<'a> {
         self.regions.triangles(facet as usize)
     }
 
-    /// Whether two neighbours may be facets of one surface, by the angle between them.
+    /// Whether two neighbours may be facets of one surface, by the angle between them. What the file
+    /// states is not looked for.
     pub(super) fn is_smooth(&self, a: u32, b: u32) -> bool {
-        self.normal(a).dot(self.normal(b)) >= SMOOTH
+        self.normal(a).dot(self.normal(b)) >= SMOOTH && !self.is_given(a) && !self.is_given(b)
+    }
+
+    /// Whether the file states the face that a facet belongs to.
+    pub(super) fn is_given(&self, facet: u32) -> bool {
+        !self.given.is_empty() && self.given.of(self.triangles(facet)[0]) != NONE
     }
 
     /// Angle between two neighbours \[rad\], positive where the edge is convex.

@@ -48,7 +48,7 @@ fn neighbours(net: &Net<'_>, facet: u32, ratio: f64) -> Vec<u32> {
     found.into_iter().map(|(_, other)| other).collect()
 }
 
-fn smallest_direction(sum: &Matrix3<f64>) -> Option<(DVec3, [f64; 3])> {
+pub(in crate::part) fn smallest_direction(sum: &Matrix3<f64>) -> Option<(DVec3, [f64; 3])> {
     let eigen = sum.symmetric_eigen();
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
@@ -57,13 +57,13 @@ fn smallest_direction(sum: &Matrix3<f64>) -> Option<(DVec3, [f64; 3])> {
     Some((direction, order.map(|index| eigen.eigenvalues[index])))
 }
 
-fn outer(v: DVec3, weight: f64) -> Matrix3<f64> {
+pub(in crate::part) fn outer(v: DVec3, weight: f64) -> Matrix3<f64> {
     let v = Vector3::new(v.x, v.y, v.z);
     v * v.transpose() * weight
 }
 
 /// The cylinder along `direction` through points.
-fn cylinder_along(direction: DVec3, points: &[DVec3]) -> Option<Surface> {
+pub(in crate::part) fn cylinder_along(direction: DVec3, points: &[DVec3]) -> Option<Surface> {
     let (u, v) = direction.any_orthonormal_pair();
     let (x, y, radius) = circle(points.iter().map(|point| (point.dot(u), point.dot(v))))?;
     let along = points.iter().map(|point| point.dot(direction)).sum::<f64>() / points.len() as f64;
@@ -93,7 +93,7 @@ fn cone_along(net: &Net<'_>, direction: DVec3, row: [u32; 3], points: &[DVec3]) 
 }
 
 /// The sphere through points, by linear least squares.
-fn sphere_through(points: &[DVec3]) -> Option<Surface> {
+pub(in crate::part) fn sphere_through(points: &[DVec3]) -> Option<Surface> {
     let mean = points.iter().sum::<DVec3>() / points.len() as f64;
     let mut matrix = Matrix3::zeros();
     let mut right = DVec3::ZERO;
@@ -357,7 +357,7 @@ impl Growth<'_> {
 
 /// A cone about `direction` through points: its axis by the circle through them all, which the fit
 /// corrects, its slope by the distances' trend along it.
-fn cone_by_circles(direction: DVec3, points: &[DVec3]) -> Option<Surface> {
+pub(in crate::part) fn cone_by_circles(direction: DVec3, points: &[DVec3]) -> Option<Surface> {
     let mut surface = cylinder_along(direction, points)?;
     let (mut ss, mut sr) = (0.0, 0.0);
     let Profile::Line { radius, .. } = surface.profile else { return None };

@@ -5,12 +5,13 @@ use std::ffi::{CStr, c_char, c_double, c_int, c_void};
 use std::io::{BufReader, BufWriter, Read, Write};
 use std::path::PathBuf;
 use std::process::{Command, ExitStatus, Stdio};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use glam::DVec3;
 
 use super::Source;
 use crate::error::{Error, ErrorKind, Result};
+use crate::part::given::Stated;
 use crate::part::weld::{Soup, Welder};
 use crate::units::Unit;
 
@@ -81,9 +82,12 @@ pub fn serve_step(
             Record::Stage(name) => {
                 write_text(&mut output, b'S', name).and_then(|()| output.flush())
             }
-            Record::Triangle(corners) => output.write_all(b"T").and_then(|()| {
-                corners.as_flattened().iter().try_for_each(|x| output.write_all(&x.to_le_bytes()))
-            }),
+            Record::Face(kind, numbers) => {
+                output.write_all(&[b'P', kind]).and_then(|()| write_numbers(&mut output, &numbers))
+            }
+            Record::Triangle(corners) => output
+                .write_all(b"T")
+                .and_then(|()| write_numbers(&mut output, corners.as_flattened())),
         };
         if let Err(error) = written {
             failed.get_or_insert(error);
@@ -108,9 +112,15 @@ fn write_text(output: &mut impl Write, mark: u8, text: &str) -> std::io::Result<
     output.write_all(bytes)
 }
 
+fn write_numbers(output: &mut impl Write, numbers: &[f64]) -> std::io::Result<()> {
+    numbers.iter().try_for_each(|number| output.write_all(&number.to_le_bytes()))
+}
+
 /// What the kernel says on its way.
 enum Record<'a> {
     Stage(&'a str),
+    /// The triangles of a face follow; its surface as [`Stated::from_kernel`] takes it.
+    Face(u8, [f64; 8]),
     Triangle([[f64; 3]; 3]),
 }
 
@@ -126,6 +136,7 @@ unsafe extern "C" {
         angle: c_double,
         user: *mut c_void,
         stage: extern "C" fn(*mut c_void, *const c_char),
+        face: extern "C" fn(*mut c_void, c_int, *const c_double),
         triangle: extern "C" fn(*mut c_void, *const c_double),
         message: *mut c_char,
         room: usize,
@@ -142,6 +153,16 @@ extern "C" fn take(user: *mut c_void, nine: *const c_double) {
     sink(Record::Triangle(*nine));
 }
 
+#[allow(
+    unsafe_code,
+    reason = "called back with the sink and eight numbers that `tessellate` and step.cpp own"
+)]
+extern "C" fn begin(user: *mut c_void, kind: c_int, eight: *const c_double) {
+    // SAFETY: `user` is the sink that `tessellate` passed, `eight` an array of eight.
+    let (sink, eight) = unsafe { (&mut *user.cast::<Sink<'_>>(), &*eight.cast::<[f64; 8]>()) };
+    sink(Record::Face(kind as u8, *eight));
+}
+
 #[allow(unsafe_code, reason = "called back with the sink and a name that step.cpp owns")]
 extern "C" fn enter(user: *mut c_void, name: *const c_char) {
     // SAFETY: `user` is the sink that `tessellate` passed, `name` a text with its end.
@@ -152,6 +173,9 @@ extern "C" fn enter(user: *mut c_void, name: *const c_char) {
 /// Triangles of a STEP text in millimetres into `sink`; the number of faces left out, or why it
 /// cannot be read.
 fn tessellate(bytes: &[u8], mut sink: Sink<'_>) -> std::result::Result<i32, String> {
+    // The kernel keeps units and other settings of a file in variables of the whole process.
+    static KERNEL: Mutex<()> = Mutex::new(());
+    let _alone = KERNEL.lock().unwrap_or_else(PoisonError::into_inner);
     let mut message = [0_u8; 256];
     #[allow(
         unsafe_code,
@@ -168,6 +192,7 @@ fn tessellate(bytes: &[u8], mut sink: Sink<'_>) -> std::result::Result<i32, Stri
             DEFLECTION_ANGLE,
             (&raw mut sink).cast(),
             enter,
+            begin,
             take,
             message.as_mut_ptr().cast(),
             message.len(),
@@ -195,10 +220,14 @@ pub(super) fn read(source: &mut Source<'_>) -> Result<Soup> {
         Some(process) => apart(source, process, &bytes, &mut welder)?,
         None => {
             let mut fault = None;
-            let left_out = tessellate(&bytes, &mut |record| {
-                if let (Record::Triangle(corners), None) = (record, &fault) {
+            let left_out = tessellate(&bytes, &mut |record| match record {
+                Record::Face(kind, numbers) => {
+                    welder.face(Stated::from_kernel(kind, numbers));
+                }
+                Record::Triangle(corners) if fault.is_none() => {
                     fault = add(source, &mut welder, corners).err();
                 }
+                Record::Triangle(_) | Record::Stage(_) => {}
             });
             match fault {
                 Some(fault) => return Err(fault),
@@ -288,14 +317,18 @@ fn answer(
                 Ok(name) => *stage = name,
                 Err(_) => return Ok(None),
             },
+            [b'P'] => {
+                let (mut kind, mut numbers) = ([0], [0.0; 8]);
+                let read = output.read_exact(&mut kind);
+                if read.and_then(|()| read_numbers(&mut output, &mut numbers)).is_err() {
+                    return Ok(None);
+                }
+                welder.face(Stated::from_kernel(kind[0], numbers));
+            }
             [b'T'] => {
                 let mut numbers = [[0.0; 3]; 3];
-                for number in numbers.as_flattened_mut() {
-                    let mut bytes = [0; 8];
-                    if output.read_exact(&mut bytes).is_err() {
-                        return Ok(None);
-                    }
-                    *number = f64::from_le_bytes(bytes);
+                if read_numbers(&mut output, numbers.as_flattened_mut()).is_err() {
+                    return Ok(None);
                 }
                 add(source, welder, numbers)?;
             }
@@ -311,6 +344,15 @@ fn answer(
         }
     }
     Ok(None)
+}
+
+fn read_numbers(output: &mut impl Read, numbers: &mut [f64]) -> std::io::Result<()> {
+    let mut bytes = [0; 8];
+    for number in numbers {
+        output.read_exact(&mut bytes)?;
+        *number = f64::from_le_bytes(bytes);
+    }
+    Ok(())
 }
 
 /// The error of a child that ended before its last word, in this stage.
