@@ -257,6 +257,10 @@ fn filters_reject_with_their_reason() {
     let (by_both, _) =
         with(&|options| (options.faces, options.faces_in) = (Some(vec![top]), vec![lower]));
     assert_eq!(by_both, grips, "faces by number and faces by box add up");
+    // A pair needs both.
+    let (grips, tally_of_one) = with(&|options| options.faces = Some(vec![top]));
+    assert_eq!((grips.len(), tally_of_one.pairs), (0, 0));
+    assert_eq!(tally_of_one.rejections["face_pair_not_chosen"], 3);
     // Every candidate is accounted for.
     for tally in [tally, all_tally] {
         let rejected: u64 = tally

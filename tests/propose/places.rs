@@ -212,6 +212,36 @@ fn a_pad_over_two_lands_touches_both() {
 }
 
 #[test]
+fn a_pad_beside_a_land_that_may_not_be_touched_touches_the_other_only() {
+    let Some(part) = trial("faces/lands_groove.stl") else { return };
+    let gripper = gripper::find("robotiq-2f85").unwrap();
+    let middle = |id: u32| {
+        let outline = &part.faces[id as usize].polygons[0].outer;
+        let points =
+            outline.iter().map(|p| part.faces[id as usize].part_from_face.point(p.extend(0.0)));
+        points.sum::<DVec3>() / outline.len() as f64
+    };
+    let lands: Vec<u32> =
+        part.faces.iter().filter(|face| face.normal.y > 0.5).map(|face| face.id).collect();
+    let (one, other): (Vec<u32>, Vec<u32>) =
+        lands.iter().partition(|&&id| middle(id).y > 0.009 && middle(id).x < 0.01);
+    let under = part.faces.iter().filter(|face| face.normal.y < -0.5).map(|face| face.id);
+    assert!(one.len() == 1 && !other.is_empty());
+    let options = ProposeOptions::default()
+        .with_spacing(Some(0.005))
+        .with_angle_step(90_f64.to_radians())
+        .with_faces(Some(one.iter().copied().chain(under).collect()));
+    let (grips, _) = run(&part, &gripper, &options);
+    assert!(!grips.is_empty());
+    let area = part.faces[one[0] as usize].area;
+    for grip in &grips {
+        let on_land =
+            if grip.face_i == one[0] { &grip.contact.face_i } else { &grip.contact.face_ii };
+        assert!(on_land.len() == 1 && patch_area(on_land) < area * (1.0 + 1e-9), "{grip:?}");
+    }
+}
+
+#[test]
 fn the_flat_between_two_bends_is_gripped() {
     for (name, offset) in [("bent_20", 0.02), ("bent_26", 0.02)] {
         let Some(part) = trial(&format!("faces/{name}.stl")) else { return };
