@@ -285,6 +285,19 @@ fn a_part_beyond_the_stroke_says_so() {
 }
 
 #[test]
+fn a_part_too_near_the_end_of_the_stroke_says_so() {
+    let (gripper, options) = (generic(), ProposeOptions::default());
+    let remarks = |width: f64| {
+        let (grips, tally) = run(&cuboid(width, 0.3, 0.4), &gripper, &options);
+        (grips.len(), tally.remarks(&gripper, &options).concat())
+    };
+    let (grips, text) = remarks(gripper.stroke[1] - options.min_opening);
+    assert!(grips == 0 && text.contains("opens by less than the least opening"), "{text}");
+    let (grips, text) = remarks(gripper.stroke[1] - 3.0 * options.min_opening);
+    assert!(grips > 0 && !text.contains("least opening"), "{text}");
+}
+
+#[test]
 fn bad_options_are_refused() {
     let part = cuboid(0.06, 0.04, 0.03);
     let gripper = generic();

@@ -94,6 +94,37 @@ fn plates_on_a_table_are_gripped_from_above_at_any_spacing() {
 }
 
 #[test]
+fn a_leaning_plate_is_gripped_just_above_the_table() {
+    // Sides that lean by 20 degrees: pads go down along them until the lower fingertip meets the
+    // table, with the jaws open.
+    let lean = 20_f64.to_radians();
+    let upright = block(DVec3::new(0.04, 0.06, 0.05));
+    let vertices: Vec<DVec3> =
+        upright.mesh.vertices.iter().map(|v| *v + DVec3::X * (v.z * lean.tan())).collect();
+    let plate = Part::from_triangles("plate", &vertices, &upright.mesh.triangles).unwrap();
+    let gripper = gripper::find("generic").unwrap();
+    let options = ProposeOptions::default()
+        .with_approach_cone(Some(Cone { axis: DVec3::NEG_Z, half_angle: lean + 0.01 }))
+        .with_ground(Some(Ground { normal: DVec3::Z, offset: 0.0 }))
+        .with_spacing(Some(0.037));
+    let (grips, tally) = run(&plate, &gripper, &options);
+    let lowest = grips
+        .iter()
+        .filter(|grip| grip.part_from_grip.rotation.z_axis.x.abs() > 0.9)
+        .map(|grip| {
+            let open = grip.width + 2.0 * options.opening;
+            let bodies = [Jaw::I, Jaw::II].map(|jaw| gripper.finger(jaw, open)).concat();
+            let down = grip.part_from_grip.rotation.transpose() * DVec3::NEG_Z;
+            bodies
+                .iter()
+                .map(|body| grip.part_from_grip.point(body.support_point(down)).z)
+                .fold(f64::INFINITY, f64::min)
+        })
+        .fold(f64::INFINITY, f64::min);
+    assert!((-1e-5..1e-5).contains(&lowest), "{lowest} {tally:?}");
+}
+
+#[test]
 fn the_plates_of_the_trials_are_gripped() {
     let gripper = gripper::find("robotiq-2f85").unwrap();
     for name in ["slab5", "slab10", "slab20"] {

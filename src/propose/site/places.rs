@@ -318,6 +318,11 @@ mod tests {
             ProposeOptions { angle_step: std::f64::consts::FRAC_PI_2, ..ProposeOptions::default() };
         let found = angles(&straight_edges(&square), &options, 0.5);
         assert_eq!(found.len(), 8, "{found:?}");
+        // Edges along one direction count together, from half a pad.
+        let small = [shape(square[0].outer.iter().map(|point| 0.01 * point).collect())];
+        for (pad, count) in [(0.079, 8), (0.081, 4)] {
+            assert_eq!(angles(&straight_edges(&small), &options, pad).len(), count, "{pad}");
+        }
     }
 
     #[test]
