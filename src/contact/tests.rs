@@ -2,7 +2,9 @@
 
 use glam::DVec2;
 
+use super::surface::{Gap, Piece, pressed};
 use super::*;
+use crate::geometry::patch_area;
 use crate::model::Polygon;
 
 fn polygon(outer: &[(f64, f64)], holes: &[&[(f64, f64)]]) -> Loops {
@@ -313,5 +315,53 @@ fn clipping_keeps_what_the_pressure_presses() {
         assert!((all[i] - a[i] - b[i]).abs() < 1e-15);
     }
     area.clip_into([-9.0, 1.0, 0.0], &mut kept);
-    assert!(kept.is_empty() && moments(&kept)[0] == 0.0);
+    assert!(kept.is_empty() && moments(&kept)[0] == 0.0 && !area.is_empty());
+}
+
+#[test]
+fn what_is_pressed_is_where_the_layer_gives_more_than_the_gap() {
+    let (low, high) = ([-0.011, -0.008], [0.009, 0.012]);
+    let (at, axis) = (DVec2::new(0.001, -0.002), DVec2::new(0.6, 0.8));
+    let height = 1e-5;
+    let gaps = [
+        Gap::Plane { height, slope: DVec2::new(0.03, -0.04) },
+        Gap::Plane { height, slope: DVec2::new(-0.003, 0.001) },
+        Gap::Cylinder { radius: 0.04, axis, at, height },
+        Gap::Cylinder { radius: -0.04, axis, at, height: -1e-4 },
+        Gap::Sphere { radius: 0.05, at, height },
+        Gap::Barrel { radius: 0.03, meridian: 0.2, axis, at, height },
+        Gap::Cone { radius: 0.03, slope: 0.05, axis, at, height },
+        Gap::Cone { radius: 0.03, slope: -0.02, axis, at, height },
+    ];
+    let corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])];
+    let outer: Vec<DVec2> = corners.map(DVec2::from).to_vec();
+    for gap in gaps {
+        let piece = Piece { outer: outer.clone(), holes: Vec::new(), gap };
+        let over = |x: DVec2| {
+            let (s, t) = (axis.dot(x - at), axis.perp_dot(x - at));
+            match gap {
+                Gap::Plane { height, slope } => height + slope.dot(x),
+                Gap::Cylinder { radius, height, .. } => height + t * t / (2.0 * radius),
+                Gap::Sphere { radius, height, .. } => height + (s * s + t * t) / (2.0 * radius),
+                Gap::Barrel { radius, meridian, height, .. } => {
+                    height + s * s / (2.0 * meridian) + t * t / (2.0 * radius)
+                }
+                Gap::Cone { radius, slope, height, .. } => {
+                    height + slope * s + t * t / (2.0 * radius)
+                }
+            }
+        };
+        for delta in [5e-5, 2e-4, -2e-4] {
+            let (count, size) = (400, [high[0] - low[0], high[1] - low[1]]);
+            let place =
+                |i: i32, k: usize| low[k] + size[k] * (f64::from(i) + 0.5) / f64::from(count);
+            let inside = (0..count)
+                .flat_map(|i| (0..count).map(move |j| DVec2::new(place(i, 0), place(j, 1))))
+                .filter(|x| over(*x) < delta)
+                .count();
+            let wanted = inside as f64 / f64::from(count * count);
+            let got = patch_area(&pressed(&piece, delta)) / (size[0] * size[1]);
+            assert!((got - wanted).abs() < 3e-3, "{gap:?} {delta}: {got} {wanted}");
+        }
+    }
 }

@@ -5,7 +5,8 @@ use crate::brute::cases::Case;
 use crate::brute::{Problem, check};
 use glam::{DVec2, DVec3};
 use gripfast::contact::{Field, Loops, friction, moments};
-use gripfast::mechanics::{Options, limit_states, solve};
+use gripfast::mechanics::inverse::load_multiple;
+use gripfast::mechanics::{Options, Pads, limit_states, solve, solve_pads};
 use gripfast::model::{Contact, Patch, Polygon, Slip, Status, Wrench};
 
 fn ring(points: &[(f64, f64)]) -> Vec<DVec2> {
@@ -278,4 +279,33 @@ fn numbers_that_are_none_are_refused_by_name() {
             solve(&square, distance, force, &load, &Options::default()).unwrap_err().to_string();
         assert!(error.starts_with(name), "{error}");
     }
+    let (one, none) = (DVec3::X, DVec3::new(0.0, f64::NAN, 0.0));
+    for (force, moment) in [(none, one), (one, none), (DVec3::splat(f64::INFINITY), one)] {
+        let load = Wrench { force, moment };
+        let error = solve(&square, 1.0, 1.0, &load, &Options::default()).unwrap_err().to_string();
+        assert!(error.starts_with("F, M"), "{error}");
+    }
+}
+
+#[test]
+fn the_limit_is_found_where_the_branch_cannot_be_followed() {
+    // Faces far apart: the pads part before the load slips, the branch stops, and the load is held
+    // on. Every smaller load is held, and one just above is not.
+    let face_ii =
+        plain(&[(-0.01495, -0.0187), (0.00925, -0.0187), (0.00925, 0.0187), (-0.01495, 0.0187)]);
+    let pads = Pads::new(&Contact { face_i: rectangle(0.02, 0.012), face_ii }).unwrap();
+    let load = Wrench {
+        force: DVec3::new(-0.641, 0.416, 0.397),
+        moment: DVec3::new(-0.0453, -0.0191, 0.00367),
+    };
+    let (distance, friction, options) = (0.307, 0.922, Options::default());
+    let limit = load_multiple(&pads, distance, 1.0, &load, friction, &options);
+    let held = |multiple: f64| {
+        let score = solve_pads(&pads, distance, 1.0 / multiple, &load, &options);
+        score.status.holds() && score.mu_s.is_some_and(|mu| mu <= friction)
+    };
+    for part in 1..=40 {
+        assert!(held(limit * (1.0 - 1e-8) * f64::from(part) / 40.0), "{part}/40 of {limit}");
+    }
+    assert!(!held(limit * (1.0 + 2e-4)), "{limit}");
 }

@@ -153,6 +153,40 @@ fn ply_in_three_encodings_with_further_elements() {
 }
 
 #[test]
+fn ply_with_numbers_of_every_type() {
+    let scratch = Scratch(tempfile::tempdir().unwrap());
+    // Coordinates and corners are small enough for one byte.
+    type Bytes = fn(u8) -> Vec<u8>;
+    let types: [(&str, Bytes); 8] = [
+        ("char", |x| (x as i8).to_le_bytes().into()),
+        ("uchar", |x| x.to_le_bytes().into()),
+        ("short", |x| i16::from(x).to_le_bytes().into()),
+        ("ushort", |x| u16::from(x).to_le_bytes().into()),
+        ("int", |x| i32::from(x).to_le_bytes().into()),
+        ("uint", |x| u32::from(x).to_le_bytes().into()),
+        ("float", |x| f32::from(x).to_le_bytes().into()),
+        ("double", |x| f64::from(x).to_le_bytes().into()),
+    ];
+    for (coordinate, number) in types {
+        // Corners are never floats.
+        let whole = !matches!(coordinate, "float" | "double");
+        let (index, corner) = if whole { (coordinate, number) } else { types[5] };
+        let mut bytes = format!(
+            "ply\nformat binary_little_endian 1.0\nelement vertex 12\nproperty {coordinate} x\n\
+             property {coordinate} y\nproperty {coordinate} z\nelement face 8\n\
+             property list uchar {index} vertex_indices\nend_header\n"
+        )
+        .into_bytes();
+        bytes.extend(vertices().into_iter().flatten().flat_map(|x| number(x as u8)));
+        for polygon in polygons() {
+            bytes.push(polygon.len() as u8);
+            bytes.extend(polygon.iter().flat_map(|&k| corner(k as u8)));
+        }
+        check(&scratch.read("bar.ply", &bytes, None), Unit::Millimetre, 1);
+    }
+}
+
+#[test]
 fn off_with_comments_colours_and_counts_on_one_line() {
     let scratch = Scratch(tempfile::tempdir().unwrap());
     let body: String =
@@ -279,6 +313,60 @@ fn gltf_with_transforms_in_metres() {
     let mut far = buffer.clone();
     far[144..146].copy_from_slice(&[255, 255]);
     assert!(refused(glb(&json, &far)).contains("vertex 65535"));
+}
+
+#[test]
+fn gltf_with_strips_fans_and_interleaved_positions() {
+    // A tetrahedron: a fan of three triangles about its apex, and its base as a list, or as one
+    // strip about it.
+    let scratch = Scratch(tempfile::tempdir().unwrap());
+    // Each position is followed by a texture coordinate, as many programs write them.
+    let corners = [
+        [0.0, 0.0, 0.0, 0.5, 0.5],
+        [0.03, 0.0, 0.0, 0.0, 1.0],
+        [0.0, 0.03, 0.0, 1.0, 0.0],
+        [0.0, 0.0, 0.03_f32, 0.25, 0.75],
+    ];
+    let read = |name: &str, primitives: &[(u8, &[u8])]| {
+        let mut buffer: Vec<u8> = corners.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+        let mut views =
+            vec![serde_json::json!({ "buffer": 0, "byteLength": 80, "byteStride": 20 })];
+        let mut accessors = vec![serde_json::json!({
+            "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+            "min": [0.0, 0.0, 0.0], "max": [0.03, 0.03, 0.03]
+        })];
+        let mut listed = Vec::new();
+        for (mode, indices) in primitives {
+            let view = serde_json::json!({
+                "buffer": 0, "byteOffset": buffer.len(), "byteLength": indices.len()
+            });
+            listed.push(serde_json::json!({
+                "attributes": { "POSITION": 0 }, "indices": views.len(), "mode": mode
+            }));
+            accessors.push(serde_json::json!({
+                "bufferView": views.len(), "componentType": 5121, "count": indices.len(),
+                "type": "SCALAR"
+            }));
+            views.push(view);
+            buffer.extend(*indices);
+        }
+        let json = serde_json::json!({
+            "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
+            "nodes": [{ "mesh": 0 }], "meshes": [{ "primitives": listed }],
+            "accessors": accessors, "bufferViews": views,
+            "buffers": [{ "byteLength": buffer.len() }]
+        });
+        let part = scratch.read(name, &glb(&json.to_string(), &buffer), None);
+        assert!(part.health.watertight, "{name}: {:?}", part.health.lines());
+        assert_eq!((part.mesh.triangles.len(), part.faces.len()), (4, 4), "{name}");
+        let volume = part.mass_properties(1.0).volume;
+        assert!((volume - 4.5e-6).abs() < 1e-12, "{name}: {volume}");
+        // Turned to one another as they stand in the file: nothing had to be turned round.
+        assert!(part.health.warnings.is_empty(), "{name}: {:?}", part.health.warnings);
+    };
+    read("list.glb", &[(4, &[0, 2, 1, 3, 0, 1, 3, 1, 2, 3, 2, 0])]);
+    read("fan.glb", &[(4, &[0, 2, 1]), (6, &[3, 0, 1, 2, 0])]);
+    read("strip.glb", &[(5, &[0, 2, 1, 3, 0, 2])]);
 }
 
 #[test]

@@ -110,6 +110,10 @@ fn a_3mf_that_is_no_model_or_needs_what_is_not_read_is_refused() {
     assert!(bad("self.3mf", &package(&itself)).to_string().contains("nested without end"));
     let twice = TETRAHEDRON.replacen("</object>", r#"</object><object id="1"/>"#, 1);
     assert!(bad("twice.3mf", &package(&twice)).to_string().contains("is there twice"));
+    let mesh = TETRAHEDRON.find("<mesh>").unwrap()..TETRAHEDRON.find("</object>").unwrap();
+    let mut other = TETRAHEDRON.to_string();
+    other.replace_range(mesh, "<volumedata/>");
+    assert!(bad("other.3mf", &package(&other)).to_string().contains("volumedata"));
 }
 
 #[test]
@@ -126,6 +130,36 @@ fn copies_are_counted_before_they_are_placed() {
     let error = bad("copies.3mf", &package(&model));
     assert_eq!((error.kind(), error.options()), (ErrorKind::Limit, ["max_memory"].as_slice()));
     assert!(start.elapsed().as_secs_f64() < 1.0);
+}
+
+#[test]
+fn copies_of_nothing_are_counted_too() {
+    // Ten levels of ten components each, of a mesh without a triangle.
+    let empty = TETRAHEDRON.find("<triangle ").unwrap()..TETRAHEDRON.find("</triangles>").unwrap();
+    let mut model = TETRAHEDRON.to_string();
+    model.replace_range(empty, "");
+    let mut objects = String::new();
+    for level in 2..12 {
+        let copies = format!(r#"<component objectid="{}"/>"#, level - 1).repeat(10);
+        objects += &format!(r#"<object id="{level}"><components>{copies}</components></object>"#);
+    }
+    let model = model.replacen("</object>", &format!("</object>{objects}"), 1);
+    let model = model.replace(r#"item objectid="1""#, r#"item objectid="11""#);
+    let error = bad("nothing.3mf", &package(&model));
+    assert_eq!(error.kind(), ErrorKind::Limit, "{error}");
+    assert!(error.to_string().contains("nested without end"), "{error}");
+}
+
+#[test]
+fn a_buffer_written_as_text_counts_as_memory() {
+    // The file alone fits, the file and the bytes that it stands for do not.
+    let text = gltf(&format!("data:application/octet-stream;base64,{}", "AAAA".repeat(150_000)))
+        .replace(r#""byteLength":36,"uri""#, r#""byteLength":450000,"uri""#);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    std::fs::write(&path, &text).unwrap();
+    let error = refused(&path, &ReadOptions::default().with_max_memory(Some(1_000_000)));
+    assert_eq!((error.kind(), error.options()), (ErrorKind::Limit, ["max_memory"].as_slice()));
 }
 
 #[test]
@@ -151,6 +185,55 @@ fn a_small_file_that_unpacks_to_a_huge_one_is_refused() {
     }
     let bomb = format!("<model>{}", " ".repeat(100 << 20));
     assert_eq!(bad("bomb.3mf", &package(&bomb)).kind(), ErrorKind::Limit);
+}
+
+#[test]
+fn damaged_archives_are_bad_input() {
+    let zipped = |bytes: &[u8]| {
+        let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        encoder.write_all(bytes).unwrap();
+        encoder.finish().unwrap()
+    };
+    let whole = zipped(&b"OFF\n4 4 0\n0 0 0\n9 0 0\n0 9 0\n0 0 9\n3 0 2 1\n"[..]);
+    let mut wrong = whole.clone();
+    // The check sum.
+    let sum = wrong.len() - 8;
+    wrong[sum] ^= 1;
+    for bytes in [&whole[..whole.len() - 4], &wrong, b"no archive at all, whatever its name says"] {
+        let error = bad("a.off.gz", bytes);
+        assert_eq!(error.kind(), ErrorKind::Format, "{error}");
+        assert!(error.to_string().contains("damaged"), "{error}");
+    }
+    // A whole archive with a cut file in it: its length is not known before.
+    let mut stl = vec![0; 80];
+    stl.extend(3_u32.to_le_bytes());
+    stl.extend([0; 120]);
+    let error = bad("a.stl.gz", &zipped(&stl)).to_string();
+    assert!(error.contains("states 3 triangles but ends within triangle 3"), "{error}");
+}
+
+#[test]
+fn a_corner_that_is_not_finite_is_told_with_its_byte() {
+    let mut stl = vec![0; 80];
+    stl.extend(3_u32.to_le_bytes());
+    for triangle in 0..3 {
+        let mut numbers = [0.0_f32; 12];
+        (numbers[6], numbers[10]) = (1.0, if triangle == 2 { f32::NAN } else { 1.0 });
+        stl.extend(numbers.iter().flat_map(|x| x.to_le_bytes()));
+        stl.extend([0; 2]);
+    }
+    let error = bad("a.stl", &stl).to_string();
+    assert!(error.contains("triangle 3 (byte 184)") && error.contains("not finite"), "{error}");
+}
+
+#[test]
+fn a_name_that_tells_no_format_is_refused() {
+    for (name, says) in [("part", "has no suffix"), ("part.doc", "'.doc'"), ("a.stl", "is empty")] {
+        let error = bad(name, if name == "a.stl" { b"" } else { b"solid a" });
+        let kind = if name == "a.stl" { ErrorKind::Format } else { ErrorKind::Unsupported };
+        assert_eq!(error.kind(), kind, "{error}");
+        assert!(error.to_string().contains(says), "{error}");
+    }
 }
 
 #[test]
@@ -282,6 +365,8 @@ fn gltf_of_another_version_or_with_a_bent_transform_is_refused() {
         (r#""version":"2.0""#, r#""version":"3.0""#),
         (r#""version":"2.0""#, r#""version":"2.1","minVersion":"2.1""#),
         (r#""version":"2.0""#, r#""version":"x""#),
+        (r#""version":"2.0""#, r#""version":"2.""#),
+        (r#""version":"2.0""#, r#""version":"2.x""#),
     ] {
         let error = bad("version.gltf", good.replace(from, to).as_bytes());
         assert_eq!(error.kind(), ErrorKind::Unsupported, "{error}");

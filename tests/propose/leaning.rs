@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use glam::{DVec2, DVec3};
 use gripfast::geometry::patch_area;
-use gripfast::gripper;
+use gripfast::gripper::{self, Jaw};
 use gripfast::load::wrench_in_grip;
 use gripfast::mechanics::curved::Pads;
 use gripfast::mechanics::squeeze_pressure;
@@ -312,6 +312,52 @@ fn a_tapered_bore_is_gripped_from_inside_and_slides_towards_its_wide_end() {
             }));
         }
     }
+}
+
+#[test]
+fn fingers_in_a_bore_stay_above_its_shoulder() {
+    // A bore that is narrower below z = 0.
+    let (wide, narrow, facets) = (0.03, 0.02, 68);
+    let ray = |k: u32| DVec2::from_angle(TAU * (f64::from(k) + 0.5) / f64::from(facets));
+    let mut soup: Vec<DVec3> = Vec::new();
+    for k in 0..facets {
+        let (k, n) = (ray(k), ray((k + 1) % facets));
+        let outer = |e: DVec2| e * (0.04 / e.abs().max_element());
+        let outline = |e: DVec2| {
+            let at = [(e * wide, 0.03), (e * wide, 0.0), (e * narrow, 0.0), (e * narrow, -0.03)];
+            at.into_iter().chain([(outer(e), -0.03), (outer(e), 0.03)]).map(|(x, z)| x.extend(z))
+        };
+        let (one, two): (Vec<DVec3>, Vec<DVec3>) = (outline(k).collect(), outline(n).collect());
+        for i in 0..6 {
+            let j = (i + 1) % 6;
+            soup.extend([one[i], two[i], two[j], one[i], two[j], one[j]]);
+        }
+    }
+    let triangles: Vec<[u32; 3]> =
+        (0..soup.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+    let part = Part::from_triangles("stepped", &soup, &triangles).unwrap();
+    assert!(part.health.watertight && part.mass_properties(1.0).volume > 0.0);
+    let gripper = gripper::find("generic").unwrap();
+    let options = ProposeOptions::default()
+        .with_outside(false)
+        .with_inside(true)
+        .with_curved(Some(true))
+        .with_spacing(Some(0.004));
+    let mut proposer = Proposer::new(&part, &gripper, &options).unwrap();
+    let grips: Vec<_> = proposer.by_ref().flat_map(|chunk| chunk.grips).collect();
+    let mut from_above = 0;
+    for grip in grips.iter().filter(|grip| (grip.width - 2.0 * wide).abs() < 1e-3) {
+        let frame = grip.part_from_grip;
+        let bodies = [Jaw::I, Jaw::II].map(|jaw| gripper.finger(jaw, grip.width)).concat();
+        let down = frame.rotation.transpose() * DVec3::NEG_Z;
+        let lowest = bodies
+            .iter()
+            .map(|body| frame.point(body.support_point(down)).z)
+            .fold(f64::INFINITY, f64::min);
+        assert!(lowest > -1e-5, "{lowest} {grip:?}");
+        from_above += usize::from(lowest < 0.01);
+    }
+    assert!(from_above > 0, "{} {:?}", grips.len(), proposer.tally());
 }
 
 #[test]

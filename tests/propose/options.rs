@@ -257,6 +257,10 @@ fn filters_reject_with_their_reason() {
     let (by_both, _) =
         with(&|options| (options.faces, options.faces_in) = (Some(vec![top]), vec![lower]));
     assert_eq!(by_both, grips, "faces by number and faces by box add up");
+    // A pair needs both.
+    let (grips, tally_of_one) = with(&|options| options.faces = Some(vec![top]));
+    assert_eq!((grips.len(), tally_of_one.pairs), (0, 0));
+    assert_eq!(tally_of_one.rejections["face_pair_not_chosen"], 3);
     // Every candidate is accounted for.
     for tally in [tally, all_tally] {
         let rejected: u64 = tally
@@ -278,6 +282,19 @@ fn a_part_beyond_the_stroke_says_so() {
         (tally.pairs, tally.candidates, tally.rejections["face_pair_outside_stroke"]),
         (0, 0, 3)
     );
+}
+
+#[test]
+fn a_part_too_near_the_end_of_the_stroke_says_so() {
+    let (gripper, options) = (generic(), ProposeOptions::default());
+    let remarks = |width: f64| {
+        let (grips, tally) = run(&cuboid(width, 0.3, 0.4), &gripper, &options);
+        (grips.len(), tally.remarks(&gripper, &options).concat())
+    };
+    let (grips, text) = remarks(gripper.stroke[1] - options.min_opening);
+    assert!(grips == 0 && text.contains("opens by less than the least opening"), "{text}");
+    let (grips, text) = remarks(gripper.stroke[1] - 3.0 * options.min_opening);
+    assert!(grips > 0 && !text.contains("least opening"), "{text}");
 }
 
 #[test]

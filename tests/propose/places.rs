@@ -94,6 +94,37 @@ fn plates_on_a_table_are_gripped_from_above_at_any_spacing() {
 }
 
 #[test]
+fn a_leaning_plate_is_gripped_just_above_the_table() {
+    // Sides that lean by 20 degrees: pads go down along them until the lower fingertip meets the
+    // table, with the jaws open.
+    let lean = 20_f64.to_radians();
+    let upright = block(DVec3::new(0.04, 0.06, 0.05));
+    let vertices: Vec<DVec3> =
+        upright.mesh.vertices.iter().map(|v| *v + DVec3::X * (v.z * lean.tan())).collect();
+    let plate = Part::from_triangles("plate", &vertices, &upright.mesh.triangles).unwrap();
+    let gripper = gripper::find("generic").unwrap();
+    let options = ProposeOptions::default()
+        .with_approach_cone(Some(Cone { axis: DVec3::NEG_Z, half_angle: lean + 0.01 }))
+        .with_ground(Some(Ground { normal: DVec3::Z, offset: 0.0 }))
+        .with_spacing(Some(0.037));
+    let (grips, tally) = run(&plate, &gripper, &options);
+    let lowest = grips
+        .iter()
+        .filter(|grip| grip.part_from_grip.rotation.z_axis.x.abs() > 0.9)
+        .map(|grip| {
+            let open = grip.width + 2.0 * options.opening;
+            let bodies = [Jaw::I, Jaw::II].map(|jaw| gripper.finger(jaw, open)).concat();
+            let down = grip.part_from_grip.rotation.transpose() * DVec3::NEG_Z;
+            bodies
+                .iter()
+                .map(|body| grip.part_from_grip.point(body.support_point(down)).z)
+                .fold(f64::INFINITY, f64::min)
+        })
+        .fold(f64::INFINITY, f64::min);
+    assert!((-1e-5..1e-5).contains(&lowest), "{lowest} {tally:?}");
+}
+
+#[test]
 fn the_plates_of_the_trials_are_gripped() {
     let gripper = gripper::find("robotiq-2f85").unwrap();
     for name in ["slab5", "slab10", "slab20"] {
@@ -208,6 +239,36 @@ fn a_pad_over_two_lands_touches_both() {
         let covered = tall * (span(x0, x1, 0.0, 0.01) + span(x0, x1, 0.012, 0.022));
         assert!((patch_area(lands) - covered).abs() < 1e-9, "{} {covered}", patch_area(lands));
         assert!(lands.len() == 2);
+    }
+}
+
+#[test]
+fn a_pad_beside_a_land_that_may_not_be_touched_touches_the_other_only() {
+    let Some(part) = trial("faces/lands_groove.stl") else { return };
+    let gripper = gripper::find("robotiq-2f85").unwrap();
+    let middle = |id: u32| {
+        let outline = &part.faces[id as usize].polygons[0].outer;
+        let points =
+            outline.iter().map(|p| part.faces[id as usize].part_from_face.point(p.extend(0.0)));
+        points.sum::<DVec3>() / outline.len() as f64
+    };
+    let lands: Vec<u32> =
+        part.faces.iter().filter(|face| face.normal.y > 0.5).map(|face| face.id).collect();
+    let (one, other): (Vec<u32>, Vec<u32>) =
+        lands.iter().partition(|&&id| middle(id).y > 0.009 && middle(id).x < 0.01);
+    let under = part.faces.iter().filter(|face| face.normal.y < -0.5).map(|face| face.id);
+    assert!(one.len() == 1 && !other.is_empty());
+    let options = ProposeOptions::default()
+        .with_spacing(Some(0.005))
+        .with_angle_step(90_f64.to_radians())
+        .with_faces(Some(one.iter().copied().chain(under).collect()));
+    let (grips, _) = run(&part, &gripper, &options);
+    assert!(!grips.is_empty());
+    let area = part.faces[one[0] as usize].area;
+    for grip in &grips {
+        let on_land =
+            if grip.face_i == one[0] { &grip.contact.face_i } else { &grip.contact.face_ii };
+        assert!(on_land.len() == 1 && patch_area(on_land) < area * (1.0 + 1e-9), "{grip:?}");
     }
 }
 

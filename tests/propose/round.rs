@@ -92,6 +92,34 @@ fn parts_of_the_reference_are_round_or_not() {
     }
 }
 
+#[test]
+fn a_ball_is_gripped_from_every_side() {
+    let Some(ball) = crate::support::reference("trials/curved/sphere.stl") else { return };
+    let ball = Part::read(&ball, &ReadOptions::default()).unwrap();
+    let gripper = gripper::find("robotiq-2f85").unwrap();
+    let step = 30_f64.to_radians();
+    let options = ProposeOptions::default().with_curved(Some(true)).with_angle_step(step);
+    let mut proposer = Proposer::new(&ball, &gripper, &options).unwrap();
+    let mut closings: Vec<DVec3> = Vec::new();
+    for grip in proposer.by_ref().flat_map(|chunk| chunk.grips) {
+        let closing = grip.part_from_grip.rotation.z_axis;
+        if !closings.iter().any(|known| known.cross(closing).length() < 1e-6) {
+            closings.push(closing);
+        }
+    }
+    // Directions evenly over a sphere, along a spiral.
+    let furthest = (0..2000)
+        .map(|k| {
+            let z = 1.0 - (2.0 * f64::from(k) + 1.0) / 2000.0;
+            let turn = DVec2::from_angle(2.399_963_229_728_653 * f64::from(k));
+            let direction = (turn * (1.0 - z * z).sqrt()).extend(z);
+            let near = closings.iter().map(|closing| closing.dot(direction).abs());
+            near.fold(0.0, f64::max).min(1.0).acos()
+        })
+        .fold(0.0, f64::max);
+    assert!(furthest < 0.75 * step, "{} {furthest}", closings.len());
+}
+
 fn plan(every_turn: bool, loads: Vec<LoadCase>) -> Plan {
     let mut request = Request::new("", "robotiq-2f85");
     request.mass = Some(Mass(0.2));

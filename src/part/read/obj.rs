@@ -60,8 +60,8 @@ struct CountLines<'a, R> {
 
 impl<R: BufRead> Read for CountLines<'_, R> {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        let count = self.inner.read(buffer)?;
-        self.lines += buffer[..count].iter().filter(|&&byte| byte == b'\n').count();
+        let count = self.fill_buf()?.read(buffer)?;
+        self.consume(count);
         Ok(count)
     }
 }

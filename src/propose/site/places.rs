@@ -318,6 +318,11 @@ mod tests {
             ProposeOptions { angle_step: std::f64::consts::FRAC_PI_2, ..ProposeOptions::default() };
         let found = angles(&straight_edges(&square), &options, 0.5);
         assert_eq!(found.len(), 8, "{found:?}");
+        // Edges along one direction count together, from half a pad.
+        let small = [shape(square[0].outer.iter().map(|point| 0.01 * point).collect())];
+        for (pad, count) in [(0.079, 8), (0.081, 4)] {
+            assert_eq!(angles(&straight_edges(&small), &options, pad).len(), count, "{pad}");
+        }
     }
 
     #[test]
@@ -349,6 +354,11 @@ mod tests {
         };
         assert!(straight_edges(&ring(12)).is_empty() && straight_edges(&ring(90)).is_empty());
         assert_eq!(straight_edges(&ring(6)).len(), 6);
+        // Half a disc: the chords beside its corners are chords too.
+        let half: Vec<DVec2> =
+            (0..=12).map(|k| DVec2::from_angle(f64::from(k) * 15_f64.to_radians())).collect();
+        let edges = straight_edges(&[shape(half)]);
+        assert!(edges.len() == 1 && (edges[0].length - 2.0).abs() < 1e-12, "{edges:?}");
         let mut divided = rectangle(DVec2::new(4.0, 2.0));
         divided.insert(1, DVec2::new(1.3, -1.0));
         assert_eq!(straight_edges(&[shape(divided)]).len(), 4);
