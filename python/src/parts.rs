@@ -27,6 +27,7 @@ impl Part {
     /// Reads a file; `known_as` is the name of it that results carry, where that is another.
     #[staticmethod]
     #[pyo3(signature = (path, unit=None, max_memory=None, outside_buffers=false, faceted=false, fit=None, known_as=None))]
+    #[expect(clippy::too_many_arguments, reason = "each is an argument in Python")]
     fn read(
         py: Python<'_>,
         path: PathBuf,

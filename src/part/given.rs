@@ -7,7 +7,9 @@
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
-use super::curves::{Axis, Kind, Profile, Surface};
+#[cfg(feature = "step")]
+use super::curves::Axis;
+use super::curves::{Kind, Profile, Surface};
 use super::repair::Repaired;
 use super::topology::NONE;
 use super::{FaceSource, Mesh, Residual};
