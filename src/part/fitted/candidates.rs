@@ -301,7 +301,7 @@ impl Fitting<'_> {
             Profile::Circle { .. } => self.cap(&found.triangles, surface.axis.origin),
         };
         let height = radius * (1.0 - (turn.min(PI) / 2.0).cos());
-        if !(height >= HEIGHT * self.tolerance) {
+        if height.is_nan() || height < HEIGHT * self.tolerance {
             return false;
         }
         let sure = match kind {
