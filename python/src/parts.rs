@@ -27,6 +27,7 @@ impl Part {
     /// Reads a file; `known_as` is the name of it that results carry, where that is another.
     #[staticmethod]
     #[pyo3(signature = (path, unit=None, max_memory=None, outside_buffers=false, faceted=false, fit=None, known_as=None))]
+    #[allow(clippy::too_many_arguments, reason = "one for each argument of the Python call")]
     fn read(
         py: Python<'_>,
         path: PathBuf,
