@@ -54,6 +54,7 @@ pub struct Request {
     /// Whether every facet of the part is meant as a plane: none is taken for a curved face.
     pub faceted: bool,
     /// Distance within which planes and round faces are fitted to a noisy part.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub fit: Option<Length>,
     /// Gripper of the catalogue, or a gripper file.
     pub gripper: String,

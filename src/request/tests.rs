@@ -111,6 +111,13 @@ fn no_field_of_the_full_request_has_its_default() {
     }
 }
 
+/// TOML has no null, and other readers stumble over it.
+#[test]
+fn what_is_not_given_is_not_written() {
+    let json = serde_json::to_string(&Request::default()).unwrap();
+    assert!(!json.contains("null"), "{json}");
+}
+
 #[test]
 fn what_is_no_request_is_refused_with_line_and_reason() {
     for (text, needles) in [
