@@ -27,11 +27,10 @@ const NARROWEST: f64 = 5e-4;
 
 /// All planar faces of the part by falling area, and the curved ones: those that the file states
 /// ([`GivenFaces`]), and among the other triangles those that are recognised. There facets of curved
-/// surfaces ([`Facets`]) and regions narrower than 5e-4 of the part's diagonal are left out. Says so in the part's warnings when
-/// faces had to be found with wider tolerances, and when noise has broken planes up. `faceted`: no
-/// facet is that of a curved surface.
-/// `fit`: distance \[m\] within which faces are fitted to a noisy mesh; what is then on none of them
-/// is none.
+/// surfaces ([`Facets`]) and regions narrower than 5e-4 of the part's diagonal are left out. Says so
+/// in the part's warnings when faces had to be found with wider tolerances, and when noise has broken
+/// planes up. `faceted`: no facet is that of a curved surface. `fit`: distance \[m\] within which
+/// faces are fitted to a noisy mesh; what is then on none of them is none.
 pub(super) fn faces(
     part: &mut Repaired,
     faceted: bool,
@@ -89,7 +88,7 @@ pub(super) fn faces(
         facets.is_facet.fill(false);
         return (outline(part, &given, &regions, &facets), Vec::new());
     }
-    let Curves { faces: mut curved, is_curved, flats } =
+    let Curves { faces: curved, is_curved, flats } =
         curves::curved_faces(part, &regions, &facets.borders, &given, floor);
     for (is_facet, is_curved) in facets.is_facet.iter_mut().zip(is_curved) {
         *is_facet |= is_curved;
@@ -97,7 +96,14 @@ pub(super) fn faces(
     for flat in flats {
         facets.is_facet[flat as usize] = false;
     }
-    let planar = outline(part, &given, &regions, &facets);
+    numbered(outline(part, &given, &regions, &facets), curved)
+}
+
+/// Curved faces have the numbers after those of the planar ones.
+fn numbered(
+    planar: Vec<PlanarFace>,
+    mut curved: Vec<CurvedFace>,
+) -> (Vec<PlanarFace>, Vec<CurvedFace>) {
     for (face, id) in curved.iter_mut().zip(planar.len() as u32..) {
         face.id = id;
     }
@@ -115,12 +121,7 @@ fn fitted_faces(
     for (index, is_facet) in facets.is_facet.iter_mut().enumerate() {
         *is_facet |= given.face(regions.triangles(index)[0]).is_none();
     }
-    let planar = outline(part, given, &regions, &facets);
-    let mut curved = curves::given_faces(part, given);
-    for (face, id) in curved.iter_mut().zip(planar.len() as u32..) {
-        face.id = id;
-    }
-    (planar, curved)
+    numbered(outline(part, given, &regions, &facets), curves::given_faces(part, given))
 }
 
 /// The faces among the regions, with boundaries, sorted and numbered.

@@ -14,6 +14,7 @@ use super::repair::Repaired;
 use super::topology::NONE;
 use super::{FaceSource, Mesh, Residual};
 use crate::geometry::UnionFind;
+use crate::text::counted;
 
 /// Distance of a corner from the surface of its face, as a share of the part's diagonal, up to which
 /// the triangles agree with what the file states: what tessellation may leave.
@@ -198,6 +199,15 @@ impl Given {
     }
 }
 
+/// Corners of triangles, each once.
+pub(super) fn corners(mesh: &Mesh, triangles: &[u32]) -> Vec<DVec3> {
+    let mut vertices: Vec<u32> =
+        triangles.iter().flat_map(|&t| mesh.triangles[t as usize]).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    vertices.into_iter().map(|vertex| mesh.vertices[vertex as usize]).collect()
+}
+
 /// A face that the file states, and its triangles agree.
 pub(super) struct GivenFace {
     pub surface: Stated,
@@ -255,7 +265,7 @@ impl GivenFaces {
             })
             .collect();
         if refused > 0 {
-            let faces = if refused == 1 { "1 face" } else { &format!("{refused} faces") };
+            let faces = counted(refused, "face");
             let place = place * 1e3;
             part.health.warnings.push(format!(
                 "the surfaces that the file states for {faces} are not where their triangles lie (up to {:.2} um off, near {:.3}, {:.3}, {:.3} mm): \
@@ -342,12 +352,7 @@ impl GivenFaces {
 
 impl GivenFace {
     fn new(mesh: &Mesh, surface: Stated, triangles: Vec<u32>) -> Self {
-        let mut vertices: Vec<u32> =
-            triangles.iter().flat_map(|&t| mesh.triangles[t as usize]).collect();
-        vertices.sort_unstable();
-        vertices.dedup();
-        let corners: Vec<DVec3> =
-            vertices.into_iter().map(|vertex| mesh.vertices[vertex as usize]).collect();
+        let corners = corners(mesh, &triangles);
         let surface = surface.turned_to(&corners);
         let mut face = Self { surface, sign: 1.0, triangles, corners, residual: 0.0, fit: None };
         face.residual = face.off(&face.corners);

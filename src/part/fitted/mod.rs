@@ -9,12 +9,13 @@ use glam::DVec3;
 
 use super::curves::Kind;
 use super::facets::Facets;
-use super::given::{GivenFaces, Stated};
+use super::given::{self, GivenFaces, Stated};
 use super::regions::{self, Flatness};
 use super::repair::Repaired;
 use super::topology::NONE;
 use super::{CurvedFace, Residual};
 use crate::error::{Error, Result};
+use crate::text::counted;
 
 mod candidates;
 mod settle;
@@ -110,43 +111,36 @@ pub(super) fn fit(
     tolerance: Tolerance,
 ) {
     let Tolerance { distance, faceted } = tolerance;
-    let (faces, owner, planes) = {
+    let (faces, owner, areas, planes) = {
         let mut fitting = Fitting::new(part, given, distance);
         fitting.find(given, known, faceted);
         fitting.settle();
         let is_plane = |face: &&Fitted| matches!(face.surface, Stated::Plane { .. });
         let planes = fitting.faces.iter().filter(is_plane).count();
-        (fitting.faces, fitting.owner, planes)
+        (fitting.faces, fitting.owner, fitting.areas, planes)
     };
     let residuals: Vec<Residual> = faces.iter().map(|face| residual(part, face)).collect();
     let loose = |triangle: &usize| owner[*triangle] == FREE;
-    let area = |triangle: usize| {
-        let [a, b, c] = part.mesh.corners(triangle as u32);
-        (b - a).cross(c - a).length() / 2.0
-    };
-    let total: f64 = (0..owner.len()).map(area).sum();
+    let total: f64 = areas.iter().sum();
     let left: Vec<usize> = (0..owner.len()).filter(loose).collect();
-    let share = left.iter().map(|&triangle| area(triangle)).sum::<f64>() / total;
+    let share = left.iter().map(|&triangle| areas[triangle]).sum::<f64>() / total;
     let weights: Vec<f64> = faces.iter().map(|face| face.triangles.len() as f64).collect();
     let square: f64 =
         residuals.iter().zip(&weights).map(|(r, weight)| weight * r.rms * r.rms).sum();
     let rms = (square / weights.iter().sum::<f64>().max(1.0)).sqrt();
     let most = residuals.iter().map(|residual| residual.greatest).fold(0.0, f64::max);
-    let count = |count: usize, one: &str, many: &str| {
-        format!("{count} {}", if count == 1 { one } else { many })
-    };
     let mut text = format!(
         "fitted within {} mm: {} and {}; corners lay {:.1} um (root mean square) and at most {:.1} um off and were moved onto them",
         (distance * 1e9).round() / 1e6,
-        count(planes, "plane", "planes"),
-        count(faces.len() - planes, "curved face", "curved faces"),
+        counted(planes as u64, "plane"),
+        counted((faces.len() - planes) as u64, "curved face"),
         rms * 1e6,
         most * 1e6
     );
     if !left.is_empty() {
         text += &format!(
             "; {} ({:.1} % of the surface) {} no face: facets",
-            count(left.len(), "triangle", "triangles"),
+            counted(left.len() as u64, "triangle"),
             share * 100.0,
             if left.len() == 1 { "fits" } else { "fit" }
         );
@@ -161,17 +155,14 @@ pub(super) fn fit(
 
 /// How far corners lie off a face.
 fn residual(part: &Repaired, face: &Fitted) -> Residual {
-    let mut vertices: Vec<u32> =
-        face.triangles.iter().flat_map(|&t| part.mesh.triangles[t as usize]).collect();
-    vertices.sort_unstable();
-    vertices.dedup();
+    let corners = given::corners(&part.mesh, &face.triangles);
     let (mut squares, mut greatest) = (0.0, 0.0_f64);
-    for &vertex in &vertices {
-        let distance = face.surface.distance(part.mesh.vertices[vertex as usize]);
+    for &corner in &corners {
+        let distance = face.surface.distance(corner);
         squares += distance * distance;
         greatest = greatest.max(distance);
     }
-    Residual { rms: (squares / vertices.len().max(1) as f64).sqrt(), greatest }
+    Residual { rms: (squares / corners.len().max(1) as f64).sqrt(), greatest }
 }
 
 impl<'a> Fitting<'a> {
