@@ -58,10 +58,13 @@ pub(super) fn hardly_touching(state: &State, pads: &Pads) -> bool {
     (0..2).any(|k| state.moments[k][0] < HARDLY * pads.moments[k][0])
 }
 
-/// Steps down a valley at most, the share of the value by which a step counts as slow, and the value
-/// that is left to Newton's method.
+/// Steps down a valley at most, the share of the value by which a step counts as slow, the fall, as a
+/// share of the steepest that there can be, up to which there is none, the ways along folds at most, and
+/// the value that is left to Newton's method.
 const VALLEY_MOST: usize = 60;
 const VALLEY_SLOW: f64 = 1e-3;
+const VALLEY_FLAT: f64 = 1e-3;
+const VALLEY_FOLDS: usize = 3;
 const VALLEY_FLOOR: f64 = 1e-7;
 /// Longest step of [`Solver::deflated`], of force times the pads' length.
 const DEFLATED_STEP: f64 = 0.1;
@@ -285,6 +288,7 @@ impl Solver<'_> {
     /// that ends at a fold the way goes on along it to both sides, if that leads down.
     pub(super) fn floor(&mut self, mut at: Node) -> Node {
         let mut damping = 1e-3;
+        let mut folds = 0;
         for _ in 0..VALLEY_MOST {
             let value = at.g.length();
             if value < VALLEY_FLOOR {
@@ -292,24 +296,36 @@ impl Solver<'_> {
             }
             let transposed = at.slope.transpose();
             let (normal, downhill) = (transposed * at.slope, transposed * at.g);
-            let level = damping * (normal.x_axis.x + normal.y_axis.y);
-            let step = -(normal + DMat2::from_diagonal(DVec2::splat(level))).inverse() * downhill;
-            let next = self.beside(&at, at.x + step);
-            match next.filter(|next| next.g.length() < value) {
-                Some(next) if next.g.length() > (1.0 - VALLEY_SLOW) * value => {
-                    at = self.along_fold(&next).unwrap_or(next);
-                    damping *= 0.2;
-                }
+            let trace = normal.x_axis.x + normal.y_axis.y;
+            // No way leads down: at the floor, or at a fold.
+            let flat =
+                downhill.length_squared() < VALLEY_FLAT * VALLEY_FLAT * trace * value * value;
+            let next = (!flat && damping < 1e6).then(|| {
+                let level = DMat2::from_diagonal(DVec2::splat(damping * trace));
+                self.beside(&at, at.x - (normal + level).inverse() * downhill)
+            });
+            let (next, much) = match next.flatten().filter(|next| next.g.length() < value) {
                 Some(next) => {
-                    at = next;
                     damping *= 0.2;
+                    (Some(next), next.g.length() < (1.0 - VALLEY_SLOW) * value)
                 }
-                None if damping > 1e6 => match self.along_fold(&at) {
-                    Some(next) => (at, damping) = (next, 1e-3),
-                    None => break,
-                },
-                None => damping *= 8.0,
+                None if flat || damping >= 1e6 => (None, false),
+                None => {
+                    damping *= 8.0;
+                    continue;
+                }
+            };
+            let here = next.unwrap_or(at);
+            if much {
+                at = here;
+                continue;
             }
+            folds += 1;
+            let Some(along) = (folds <= VALLEY_FOLDS).then(|| self.along_fold(&here)).flatten()
+            else {
+                return here;
+            };
+            (at, damping) = (along, 1e-3);
         }
         at
     }

@@ -183,7 +183,7 @@ impl<'s, 'a> Map<'s, 'a> {
         else {
             return false;
         };
-        if states.is_empty() || self.signs(states, ring) != turns {
+        if self.signs(states, ring) != turns {
             self.cells(BEND_AGAIN, 2 * MOST_NODES, states);
         }
         if states.is_empty() {
