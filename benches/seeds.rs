@@ -114,6 +114,7 @@ fn loads(criterion: &mut Criterion) {
                     distance: 0.03,
                     force: 40.0,
                     wrenches: &all[..count],
+                    pose: None,
                 }],
             };
             group.throughput(Throughput::Elements(count as u64));
@@ -138,6 +139,7 @@ fn grips(criterion: &mut Criterion) {
                 distance: 0.03,
                 force: 40.0,
                 wrenches: &loads,
+                pose: None,
             });
             let batch = Batch { problems: problems.collect() };
             group.throughput(Throughput::Elements(count as u64));
@@ -167,6 +169,7 @@ fn set_sizes(criterion: &mut Criterion) {
         distance: 0.03,
         force: 40.0,
         wrenches: &loads,
+        pose: None,
     });
     let batch = Batch { problems: problems.collect() };
     for frequency in [2, 3, 4, 6, 8, 12] {

@@ -92,8 +92,13 @@ mod tests {
                 face_i: rectangle(0.01, 0.008, 0.0),
                 face_ii: rectangle(0.01 - shift, 0.008, -shift),
             });
-            let problem =
-                Problem { contact: &contact, distance: 0.02, force: 40.0, wrenches: &wrenches };
+            let problem = Problem {
+                contact: &contact,
+                distance: 0.02,
+                force: 40.0,
+                wrenches: &wrenches,
+                pose: None,
+            };
             let prepared = Prepared::new(&contact).records.unwrap();
             let loads: Vec<LoadRecord> =
                 wrenches.iter().map(|wrench| prepared.load(&problem, wrench).unwrap().0).collect();

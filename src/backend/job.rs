@@ -214,7 +214,7 @@ impl<'a> Job<'a> {
                 for (wrench, answer) in
                     problem.wrenches[piece.first..].iter().zip(piece.answers.iter_mut())
                 {
-                    match contact.load(problem, wrench) {
+                    match contact.load(problem, &problem.seen(wrench)) {
                         Ok((record, scale)) => {
                             records.push(record);
                             piece.scales.push(scale);

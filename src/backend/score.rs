@@ -169,8 +169,8 @@ pub(super) struct Case<'a> {
 }
 
 impl Case<'_> {
-    pub(super) fn wrench(&self, load: usize) -> &Wrench {
-        &self.problem.wrenches[self.loads[load] as usize]
+    pub(super) fn wrench(&self, load: usize) -> Wrench {
+        self.problem.wrench(self.loads[load] as usize)
     }
 
     /// The answer with the load's number among all.
@@ -190,7 +190,7 @@ impl Case<'_> {
         let (SeedStatus::Unbounded, Some(pads)) = (seed.status, self.pads) else {
             return seed.lower;
         };
-        let load = pads.load(self.problem.distance, self.problem.force, self.wrench(load));
+        let load = pads.load(self.problem.distance, self.problem.force, &self.wrench(load));
         let bound = |v: Twist| {
             let speed = |x: &DVec2| v.velocity(*x).length_squared();
             let fastest = |k: usize| pads.hulls[k].iter().map(speed).fold(0.0, f64::max).sqrt();
@@ -262,7 +262,7 @@ impl Case<'_> {
             return Vec::new();
         }
         let lever = TwistOut::new(self.problem.contact);
-        loads.iter().map(|&load| lever.margin(self.problem.force, self.wrench(load))).collect()
+        loads.iter().map(|&load| lever.margin(self.problem.force, &self.wrench(load))).collect()
     }
 
     pub(super) fn options(&self, load: usize, search: Search) -> Options {
@@ -286,7 +286,7 @@ impl Case<'_> {
                 pads,
                 self.problem.distance,
                 self.problem.force,
-                self.wrench(load),
+                &self.wrench(load),
                 &options,
             ),
             None => refused(Status::NoContact, 0),

@@ -244,10 +244,11 @@ impl<'a> Screen<'a> {
         let mut found = Found::new();
         let mut searched: Vec<(usize, f64)> = Vec::new();
         let mut records: Vec<LoadRecord> = Vec::new();
-        for (load, wrench) in problem.wrenches.iter().enumerate() {
+        for load in 0..problem.wrenches.len() {
             if !reaches(bounds[load], floor) {
                 continue;
             }
+            let wrench = &problem.wrench(load);
             // A number that is not finite leaves a load without a bound.
             check_load((load, wrench), index)?;
             let seed = match self.records.load(problem, wrench) {
@@ -333,6 +334,7 @@ fn side_by_side(
     let zero = [0.0_f64; LANES];
     let (mut force, mut moment) = ([zero; 3], [zero; 3]);
     for (lane, wrench) in wrenches.iter().enumerate().take(LANES) {
+        let wrench = problem.seen(wrench);
         for m in 0..3 {
             force[m][lane] = wrench.force[m];
             moment[m][lane] = wrench.moment[m];

@@ -212,7 +212,8 @@ fn bounds_enclose_the_answer(backend: &Backend) {
             let strength = 10_f64.powf(random.range(-2.0, 0.0));
             let wrenches: Vec<Wrench> =
                 (0..20).map(|_| random.wrench(force * strength, size)).collect();
-            let problem = Problem { contact: &contact, distance, force, wrenches: &wrenches };
+            let problem =
+                Problem { contact: &contact, distance, force, wrenches: &wrenches, pose: None };
             let seeds = seed(backend, vec![problem], &set);
             for (sum, count) in counts.iter_mut().zip(assert_bounds(&seeds, &problem)) {
                 *sum += count;
@@ -248,7 +249,8 @@ fn survivors_are_the_loads_that_can_be_the_worst(backend: &Backend) {
         wrenches.push(Wrench::default());
         wrenches.push(Wrench { force: DVec3::Z * 3.0 * force, ..Wrench::default() });
         let distance = size * random.range(-2.0, 5.0);
-        let problem = Problem { contact: &contact, distance, force, wrenches: &wrenches };
+        let problem =
+            Problem { contact: &contact, distance, force, wrenches: &wrenches, pose: None };
         let seeds = seed(backend, vec![problem], &set);
         let batch = Batch { problems: vec![problem] };
         let found = backend.survivors(&batch, &set).unwrap().remove(0);
@@ -281,8 +283,13 @@ fn seeds_start_the_solver_close(backend: &Backend) {
     for _ in 0..12 {
         let contact = random.congruent(0.02);
         let wrenches: Vec<Wrench> = (0..40).map(|_| random.wrench(20.0, 0.02)).collect();
-        let problem =
-            Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches };
+        let problem = Problem {
+            contact: &contact,
+            distance: 0.03,
+            force: 20.0,
+            wrenches: &wrenches,
+            pose: None,
+        };
         let [few, many] = [&set, &dense].map(|set| seed(backend, vec![problem], set));
         let area = Loops::new(&contact.face_i);
         let p = [1.0 / gripfast::contact::moments(&area)[0], 0.0, 0.0];
@@ -327,8 +334,13 @@ fn few_loads_of_a_ball_are_solved(backend: &Backend) {
     .enumerate()
     {
         let wrenches = ball(500, point);
-        let problem =
-            Problem { contact: &contact, distance: 0.03, force: 40.0, wrenches: &wrenches };
+        let problem = Problem {
+            contact: &contact,
+            distance: 0.03,
+            force: 40.0,
+            wrenches: &wrenches,
+            pose: None,
+        };
         let batch = Batch { problems: vec![problem] };
         let answer = backend.score(&batch, &SeedSet::default(), &ScoreOptions::default()).unwrap();
         let all = backend
@@ -384,6 +396,7 @@ fn few_loads_of_a_ball_are_solved_on_different_faces(backend: &Backend) {
                 distance: 0.03,
                 force: 40.0,
                 wrenches: &wrenches,
+                pose: None,
             }],
         };
         let answer =
@@ -420,7 +433,13 @@ fn the_best_grips_are_those_of_the_whole_list(backend: &Backend) {
         .collect();
     let problems: Vec<Problem<'_>> = grips
         .iter()
-        .map(|(contact, wrenches, _)| Problem { contact, distance: 0.02, force: 15.0, wrenches })
+        .map(|(contact, wrenches, _)| Problem {
+            contact,
+            distance: 0.02,
+            force: 15.0,
+            wrenches,
+            pose: None,
+        })
         .collect();
     let merit = |index: usize, mu: f64| 1.0 / mu + grips[index].2;
     let held = |scored: &Scored| {
@@ -498,7 +517,8 @@ fn degenerate_contacts_and_loads(backend: &Backend) {
         wrench([1e200, 1e200, 0.0], [0.0; 3]),
         wrench([1.0, 1.0, 1.0], [10.0, 0.0, 0.0]),
     ];
-    let problem = Problem { contact: &square, distance: 0.03, force: 40.0, wrenches: &wrenches };
+    let problem =
+        Problem { contact: &square, distance: 0.03, force: 40.0, wrenches: &wrenches, pose: None };
     let seeds = seed(backend, vec![problem], &set);
     let status: Vec<SeedStatus> = seeds.iter().map(|seed| seed.status).collect();
     use SeedStatus::{Bounded, NoLoad, NoNormalForce, Unbounded};
@@ -588,6 +608,7 @@ fn batch_sizes(backend: &Backend) {
         distance: 0.03,
         force: 20.0,
         wrenches: &wrenches[..count],
+        pose: None,
     };
     let whole = seed(backend, vec![problem(100_000)], &set);
     for count in [0, 1, 63, 64, 65] {
@@ -633,6 +654,7 @@ fn same_bytes_twice_and_permuted_answers_for_a_permuted_batch(backend: &Backend)
         distance: 0.01 * i as f64,
         force: 20.0,
         wrenches: &grips[i].1,
+        pose: None,
     };
     let order: Vec<usize> = (0..grips.len()).map(|i| (i * 77) % grips.len()).collect();
     let first = seed(backend, (0..grips.len()).map(problem).collect(), &set);
@@ -677,7 +699,13 @@ fn final_answers_are_those_of_the_processor(backend: &Backend) {
     let problems = || Batch {
         problems: grips
             .iter()
-            .map(|(contact, wrenches)| Problem { contact, distance: 0.02, force: 15.0, wrenches })
+            .map(|(contact, wrenches)| Problem {
+                contact,
+                distance: 0.02,
+                force: 15.0,
+                wrenches,
+                pose: None,
+            })
             .collect(),
     };
     let found = backend.score(&problems(), &set, &ScoreOptions::default()).unwrap();
@@ -711,6 +739,7 @@ fn reference_cases(backend: &Backend) {
             distance: case.distance,
             force: case.force,
             wrenches: &wrenches,
+            pose: None,
         };
         let id = case.id.as_deref().unwrap_or("?");
         let found = seed(backend, vec![problem], &SeedSet::default())[0];
@@ -754,7 +783,8 @@ fn gpu_that_is_lost_in_mid_batch() {
     let mut random = Random::new(47);
     let contact = random.congruent(0.02);
     let wrenches: Vec<Wrench> = (0..2300).map(|_| random.wrench(20.0, 0.02)).collect();
-    let problem = Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches };
+    let problem =
+        Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches, pose: None };
     let batch = Batch { problems: vec![problem] };
     let set = SeedSet::default();
     let expected = Backend::Cpu.seed(&batch, &set).unwrap();

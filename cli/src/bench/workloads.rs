@@ -100,6 +100,7 @@ impl Workload {
                     distance: 0.03,
                     force: 40.0,
                     wrenches,
+                    pose: None,
                 })
                 .collect(),
         }

@@ -343,7 +343,13 @@ impl Gpu {
         let grips = random_grips(contacts);
         let problems: Vec<Problem<'_>> = grips
             .iter()
-            .map(|(contact, wrenches)| Problem { contact, distance: 0.0, force: 40.0, wrenches })
+            .map(|(contact, wrenches)| Problem {
+                contact,
+                distance: 0.0,
+                force: 40.0,
+                wrenches,
+                pose: None,
+            })
             .collect();
         let batch = Batch { problems };
         let made = Contacts::new(&batch.problems)?;

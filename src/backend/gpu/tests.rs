@@ -139,6 +139,7 @@ fn shaders_give_the_records_of_the_processor() {
                 distance: *distance,
                 force: 40.0,
                 wrenches,
+                pose: None,
             })
             .collect();
         let (found, expected) = records(&gpu, problems, &seeds);
@@ -193,6 +194,7 @@ fn with_doomed_device<R>(mut gpu: Gpu, then: impl FnOnce(&Backend, &Batch<'_>) -
             distance: 0.03,
             force: 20.0,
             wrenches: &wrenches,
+            pose: None,
         }],
     };
     then(&Backend::Gpu(Box::new(gpu)), &batch)
@@ -266,6 +268,7 @@ fn a_record_that_was_not_written_is_an_error() {
             distance: 0.03,
             force: 20.0,
             wrenches: &wrenches,
+            pose: None,
         }],
     };
     let contacts = Contacts::new(&batch.problems).unwrap();
@@ -326,7 +329,8 @@ fn the_clock_shows_every_chunk_and_changes_nothing() {
     let wrenches: Vec<Wrench> = (0..9000)
         .map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 })
         .collect();
-    let problem = Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches };
+    let problem =
+        Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches, pose: None };
     let batch = Batch { problems: vec![problem] };
     let without = backend.seed(&batch, &set).unwrap();
     assert_eq!(gpu.stop_clock(), None);
@@ -376,7 +380,8 @@ fn exact_answers_overlap_the_kernels_of_the_next_block() {
     let wrenches: Vec<Wrench> = (0..3000)
         .map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 })
         .collect();
-    let problem = Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches };
+    let problem =
+        Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches, pose: None };
     let batch = Batch { problems: vec![problem; 4] };
     let expected = backend.seed(&Batch { problems: vec![problem] }, &set).unwrap();
     let mut order = Vec::new();
