@@ -14,6 +14,10 @@ use crate::model::{Contact, Frame, LARGEST_SCALE, Wrench};
 /// contacts, software Vulkan; the processor's are alike). Vulkan allows a logarithm 5e-7 off.
 pub const F32_TOLERANCE: f64 = 2e-5;
 
+/// Largest share by which bounds are widened besides on a graphics processor, which makes its loads in
+/// single precision from the list and the pose.
+pub const LOAD_TOLERANCE: f64 = 5e-4;
+
 /// One grip: its contact and the loads on it.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem<'a> {

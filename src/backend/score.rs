@@ -6,10 +6,10 @@ use std::ops::Range;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::job::Backend;
+use super::job::{Backend, Survivors};
 use super::prepare::Contacts;
 use super::problem::{Batch, F32_TOLERANCE, Problem, Seed, SeedStatus};
-use super::screen::Survivors;
+use super::screen::Wanted;
 use super::seeds::SeedSet;
 use super::worst::{Ended, Work};
 use crate::contact::{PlaneWrench, Twist};
@@ -69,8 +69,8 @@ impl Backend {
         seeds: &SeedSet,
         options: &ScoreOptions,
     ) -> Result<Vec<Scored>> {
-        let all = options.polish == Polish::All;
-        self.by_blocks((BLOCK, all), batch, seeds, |Block { range, contacts, survivors }| {
+        let wanted = if options.polish == Polish::All { Wanted::All } else { Wanted::Worst };
+        self.by_blocks((BLOCK, wanted), batch, seeds, |Block { range, contacts, survivors }| {
             cases(&contacts, &batch.problems[range], &survivors, options)
                 .into_par_iter()
                 .map(|case| case.score(None))
@@ -78,11 +78,11 @@ impl Backend {
         })
     }
 
-    /// Seeds one block of the batch, of `most` loads or one problem, after another; `all` loads, or
-    /// those that can be the worst. While a block is seeded, the one before is solved.
+    /// Seeds one block of the batch, of `most` loads or one problem, after another. While a block is
+    /// seeded, the one before is solved.
     pub(super) fn by_blocks(
         &self,
-        (most, all): (usize, bool),
+        (most, wanted): (usize, Wanted),
         batch: &Batch<'_>,
         seeds: &SeedSet,
         mut solve: impl FnMut(Block) -> Vec<Scored> + Send,
@@ -99,7 +99,7 @@ impl Backend {
             let part = Batch { problems: batch.problems[range.clone()].to_vec() };
             let seed = || -> Result<Block> {
                 let contacts = Contacts::new(&part.problems)?;
-                let survivors = self.survivors_on(&contacts, &part, seeds, all)?;
+                let survivors = self.survivors_on(&contacts, &part, seeds, wanted)?;
                 Ok(Block { range, contacts, survivors })
             };
             let (block, before) = rayon::join(seed, || waiting.take().map(&mut solve));

@@ -58,6 +58,10 @@ struct Steps {
     /// Whole call.
     whole: f64,
     chunks: usize,
+    /// Bytes to the device and back, and entries that came, per grip.
+    bytes_up: f64,
+    bytes_down: f64,
+    entries: f64,
     make: f64,
     send: f64,
     upload: Option<f64>,
@@ -84,7 +88,7 @@ struct Scoring {
     polish: Option<f64>,
 }
 
-/// How far the search kernel is from the adapter's limits.
+/// How far the screen is from the adapter's limits.
 #[derive(Debug, Clone, Serialize)]
 struct Share {
     /// Of the whole call, in kernels.
@@ -143,6 +147,13 @@ impl Place {
     fn seed(&self, batch: &Batch<'_>, set: &SeedSet) -> anyhow::Result<Vec<Seed>> {
         let run = || self.backend.seed(batch, set);
         Ok(self.pool.as_ref().map_or_else(run, |pool| pool.install(run))?)
+    }
+
+    /// What scoring takes of the seeds.
+    fn survivors(&self, batch: &Batch<'_>, set: &SeedSet) -> anyhow::Result<()> {
+        let run = || self.backend.survivors(batch, set);
+        std::hint::black_box(self.pool.as_ref().map_or_else(run, |pool| pool.install(run))?);
+        Ok(())
     }
 
     fn score(&self, batch: &Batch<'_>, set: &SeedSet) -> anyhow::Result<Vec<Scored>> {
@@ -310,7 +321,7 @@ impl Cell<'_> {
         Ok(row)
     }
 
-    /// Rates of the seeds. Gives the seeds of one grip and the seconds that they took.
+    /// Rates of the seeds, of those loads that can be the worst. Gives the seeds of one grip and the seconds that they took.
     fn seeds(&self, row: &mut Row, seconds: f64) -> anyhow::Result<(Vec<Seed>, f64)> {
         let start = Instant::now();
         let over = || start.elapsed().as_secs_f64();
@@ -321,13 +332,14 @@ impl Cell<'_> {
             let batch = workload.batch();
             // Twice for a single grip: the first call compiles or allocates.
             if grips == 1 {
-                self.place.seed(&batch, self.set)?;
+                one_grip = self.place.seed(&batch, self.set)?;
+                self.place.survivors(&batch, self.set)?;
             }
             let begin = Instant::now();
-            let seeds = self.place.seed(&batch, self.set)?;
+            self.place.survivors(&batch, self.set)?;
             let once = begin.elapsed().as_secs_f64();
             if grips == 1 {
-                (one_grip, one_time) = (seeds, once);
+                one_time = once;
             }
             let more = (grips * 8).min(MOST_LOADS / self.loads);
             if once < 0.1 * seconds && over() < 0.4 * seconds && more > grips {
@@ -337,7 +349,7 @@ impl Cell<'_> {
             let begin = Instant::now();
             let mut runs = 0;
             while runs == 0 || over() < 0.8 * seconds {
-                std::hint::black_box(self.place.seed(&batch, self.set)?);
+                self.place.survivors(&batch, self.set)?;
                 runs += 1;
             }
             let each = begin.elapsed().as_secs_f64() / runs as f64;
@@ -352,7 +364,8 @@ impl Cell<'_> {
 
     #[cfg(not(feature = "gpu"))]
     fn steps(&self, _: &mut Row, _: &Workload) -> anyhow::Result<()> {
-        let _ = (self.limits, known::EVALUATION, known::RING, known::BASIS_EDGE);
+        let _ = (self.limits, known::EVALUATION, known::LOAD, known::BASIS_EDGE);
+        let _ = (known::GRIP_BYTES, known::ENTRY_BYTES);
         let _ =
             (known::BASIS_BYTES, known::LOAD_BYTES, self.contacts.edges(), self.contacts.faces());
         Ok(())
@@ -364,7 +377,7 @@ impl Cell<'_> {
         let Backend::Gpu(gpu) = &self.place.backend else { return Ok(()) };
         gpu.start_clock()?;
         let begin = Instant::now();
-        self.place.seed(&workload.batch(), self.set)?;
+        self.place.survivors(&workload.batch(), self.set)?;
         let whole = begin.elapsed().as_secs_f64();
         let chunks = gpu.stop_clock().unwrap_or_default().chunks;
         let device = |span: &dyn Fn(
@@ -377,9 +390,15 @@ impl Cell<'_> {
             |span: &dyn Fn(&gripfast::backend::ChunkSpans) -> gripfast::backend::Span| -> f64 {
                 chunks.iter().map(|chunk| span(chunk).seconds()).sum()
             };
+        let per_grip = |number: &dyn Fn(&gripfast::backend::ChunkSpans) -> f64| -> f64 {
+            chunks.iter().map(number).sum::<f64>() / row.grips.max(1) as f64
+        };
         let steps = Steps {
             whole,
             chunks: chunks.len(),
+            bytes_up: per_grip(&|chunk| chunk.bytes_up as f64),
+            bytes_down: per_grip(&|chunk| chunk.bytes_down as f64),
+            entries: per_grip(&|chunk| chunk.entries as f64),
             make: sum(&|chunk| chunk.make),
             send: sum(&|chunk| chunk.send),
             upload: device(&|device| device.upload),
@@ -394,9 +413,11 @@ impl Cell<'_> {
             let faces = self.contacts.faces();
             let (loads, twists) = (workload.loads() as f64, self.set.len() as f64);
             let distinct = if self.contacts == Contacts::Shared { 1 } else { row.grips };
-            let evaluation = known::EVALUATION[faces - 1] * twists + known::RING[faces - 1];
-            let bytes =
-                known::LOAD_BYTES * loads + known::BASIS_BYTES * twists * (distinct * faces) as f64;
+            let evaluation = known::EVALUATION[faces - 1] * twists + known::LOAD[faces - 1];
+            let grips = row.grips as f64;
+            let bytes = known::LOAD_BYTES * loads
+                + (known::GRIP_BYTES + known::ENTRY_BYTES * steps.entries) * grips
+                + known::BASIS_BYTES * twists * (distinct * faces) as f64;
             let edges = (distinct * faces * self.contacts.edges()) as f64;
             let work = evaluation * loads + known::BASIS_EDGE * edges * twists;
             row.share = Some(Share {
@@ -434,7 +455,7 @@ impl Cell<'_> {
         let workload = self.workload(grips);
         let batch = workload.batch();
         let begin = Instant::now();
-        self.place.seed(&batch, self.set)?;
+        self.place.survivors(&batch, self.set)?;
         let seeds_only = begin.elapsed().as_secs_f64();
         self.start_clock()?;
         let (mut runs, mut spent) = (0, 0.0);
@@ -562,9 +583,9 @@ over all cores | bounds, answers apart |\n|---|---|---|---|---|---|---|---|---|-
             "\nSteps of a batch on the adapter, nanoseconds a load. {clock}; make, send, wait, \
 fetch and spread by the processor's clock; polish: exact answers, nanoseconds a load of the grips \
 scored. Arithmetic and memory: share of the adapter's limit while the kernels run{}.\n\n\
-| twists | loads | contacts | loads a run | chunks | make | send | upload | basis | search | \
+| twists | loads | contacts | loads a run | chunks | bytes a grip up | down | entries a grip | make | send | upload | basis | search | \
 readback | wait | fetch | spread | whole | polish | kernels of whole | arithmetic | memory |\n\
-|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
             if self.limits.is_some() { "" } else { " (unknown for this one)" }
         );
         for row in &self.rows {
@@ -580,12 +601,15 @@ readback | wait | fetch | spread | whole | polish | kernels of whole | arithmeti
             });
             let _ = writeln!(
                 text,
-                "| {} | {} | {} | {loads} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | \
-{} | {} | {} | {} |",
+                "| {} | {} | {} | {loads} | {} | {:.0} | {:.0} | {:.1} | {} | {} | {} | {} | {} | {} | \
+{} | {} | {} | {} | {} | {} | {} | {} |",
                 row.twists,
                 row.loads,
                 row.contacts,
                 steps.chunks,
+                steps.bytes_up,
+                steps.bytes_down,
+                steps.entries,
                 each(steps.make),
                 each(steps.send),
                 maybe(steps.upload),
