@@ -133,6 +133,8 @@ struct Traffic {
     bytes_down: f64,
     /// Loads that can be the worst, and windows of loads left to the processor.
     entries: f64,
+    /// Seconds of the processor: records made, answers fetched and spread.
+    host: f64,
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
@@ -234,6 +236,7 @@ fn figures(
         "compared_per_grip": per_grip(compared),
         "bytes_up_per_grip": measured.traffic.as_ref().map(|traffic| traffic.bytes_up),
         "bytes_down_per_grip": measured.traffic.as_ref().map(|traffic| traffic.bytes_down),
+        "host_seconds_per_grip": measured.traffic.as_ref().map(|traffic| traffic.host),
         "entries_per_grip": measured.traffic.as_ref().map(|traffic| traffic.entries),
         "agrees_with_cpu": check.map(|check| check.is_ok()),
         "difference": check.map(|check| match check { Ok(most) => json!(most), Err(why) => json!(why) }),
@@ -341,7 +344,10 @@ fn traffic(backend: &Backend, row: &Row, set: &SeedSet) -> anyhow::Result<Option
     backend.survivors(&row.workload.batch(), set)?;
     let chunks = gpu.stop_clock().unwrap_or_default().chunks;
     let grips = row.workload.contacts.len().max(1) as f64;
+    // Not what sending takes: a software adapter holds it up.
+    let steps = chunks.iter().flat_map(|chunk| [chunk.make, chunk.fetch, chunk.spread]);
     Ok(Some(Traffic {
+        host: steps.map(|span| span.seconds()).sum::<f64>() / grips,
         bytes_up: chunks.iter().map(|chunk| chunk.bytes_up).sum::<u64>() as f64 / grips,
         bytes_down: chunks.iter().map(|chunk| chunk.bytes_down).sum::<u64>() as f64 / grips,
         entries: chunks.iter().map(|chunk| chunk.entries).sum::<usize>() as f64 / grips,

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::super::cpu::Found;
 use super::super::layout::{FoundRecord, KINDS, OPEN, OutcomeRecord, SeedRecord, UNWRITTEN};
-use super::super::prepare::Contacts;
+use super::super::prepare::{Contacts, not_searched};
 use super::super::problem::{Batch, Problem, check_grip, check_load};
 use super::super::screen::{Screen, Wanted, can_be_worst, without_contact};
 use super::super::seeds::SeedSet;
@@ -17,6 +17,9 @@ use super::chunk::{Maker, Piece, Plan, Spread, is_ordinary, largest, plans};
 use super::{Answer, Gpu};
 use crate::error::{Error, Result};
 use crate::model::Wrench;
+
+/// Grips that one task looks at, at least: a few entries each.
+const TASK: usize = 16;
 
 /// Loads of a piece with their seeds; some load's `mu_s` is at least the number.
 pub(super) type Kept = (Found, f64);
@@ -182,6 +185,7 @@ impl<'a> Job<'a> {
         }
         (0..pieces.len() as u32)
             .into_par_iter()
+            .with_min_len(TASK)
             .map(|grip| {
                 let (place, piece) = pieces[grip as usize];
                 let (outcome, entries) = (outcomes[grip as usize], of_grip(grip));
@@ -213,7 +217,7 @@ impl<'a> Job<'a> {
     where
         'a: 's,
     {
-        let (mut found, mut open) = (Found::with_capacity(entries.len()), Vec::new());
+        let (mut found, mut open) = (Found::with_capacity(entries.len()), Vec::<usize>::new());
         let Some(records) = &self.contacts.ready[self.contacts.slots[piece.problem]].records else {
             return Ok((found, 0.0));
         };
@@ -228,6 +232,15 @@ impl<'a> Job<'a> {
                 found.push((spread.load(first) as u32, records.answer(&seed(entry), 1.0)?));
             }
         }
+        // Most often there is nothing to search for (no load in the pads' plane), and the contact need
+        // not be made ready here too.
+        open.retain(|&load| match records.load(problem, &problem.wrench(load)) {
+            Ok(_) => true,
+            Err(status) => {
+                found.push((load as u32, not_searched(status)));
+                false
+            }
+        });
         if !open.is_empty() {
             let open = open.into_iter();
             found.extend(screen()?.searched.found(problem, piece.problem, open)?);
