@@ -9,9 +9,9 @@ use crate::error::{Error, Result};
 use crate::load::wrench_in_grip;
 use crate::model::{Contact, Frame, LARGEST_SCALE, Wrench};
 
-/// Relative widening of both bounds. The largest error of the 32-bit kernels seen so far is 1.6e-6
-/// with 81 twists and 9.5e-6 with 321, both of an upper bound (`gripfast bench check` on 450 random
-/// contacts, software Vulkan; the processor's are alike). Vulkan allows a logarithm 5e-7 off.
+/// Relative widening of both bounds. The largest error of the 32-bit kernels seen so far is 2.1e-6
+/// with 81 twists and 9.5e-6 with 321, both of an upper bound (`gripfast bench check` on up to 2,000
+/// random contacts, software Vulkan; the processor's are alike). Vulkan allows a logarithm 5e-7 off.
 pub const F32_TOLERANCE: f64 = 2e-5;
 
 /// Largest share by which bounds are widened besides on a graphics processor, which makes its loads in
