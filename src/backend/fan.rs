@@ -94,8 +94,10 @@ pub(crate) fn basis_near<const LANES: usize>(
     let sums = fan(edges, &c);
     let mut out = [[0.0; LANES]; 9];
     for lane in 0..LANES {
-        let [e1, e2, r, ye11, ye12, ye22, yr1, yr2] =
-            [0, 1, 2, 3, 4, 5, 6, 7].map(|m| sums[m][lane]);
+        let [e1, e2, r, ye11, ye12, ye22, yr1, yr2] = {
+            let s = |m: usize| sums[m][lane];
+            [s(0), s(1), s(2), s(3), s(4), s(5), s(6), s(7)]
+        };
         let (c1, c2) = (c[0][lane], c[1][lane]);
         let sense = 1.0_f32.copysign(v[2][lane]);
         let torque = c1 * e1 + c2 * e2 + r;

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use super::problem::{F32_TOLERANCE, SeedStatus};
 use super::score::{Case, Scored, TIE, usable};
-use crate::contact::{Field, PlaneWrench, Twist};
+use crate::contact::{ABREAST, Field, PlaneWrench, Twist, widest};
 use crate::mechanics::{
     Comparer, Comparison, Load, Neighbour, Pads, Question, Search, abreast, slip, solve_next,
 };
@@ -47,6 +47,36 @@ const SHARP: f64 = 2e-4;
 /// Loads with bounds from which on closer ones are made of several at a time.
 const MANY: usize = 3;
 
+/// Loads that wait until several can be compared at once.
+#[derive(Default)]
+struct Waiting {
+    scaled: Vec<Load>,
+    more: Vec<One>,
+}
+
+impl Waiting {
+    fn len(&self) -> usize {
+        self.more.len()
+    }
+}
+
+/// One of them.
+struct One {
+    load: usize,
+    here: [f32; 6],
+    /// How far the state of the nearest load is, and which it is.
+    apart: f32,
+    near: usize,
+}
+
+/// Loads whose turn has come, but that are not settled.
+#[derive(Default)]
+struct Queue {
+    waiting: Waiting,
+    /// Those of which nothing was found out at first.
+    again: Vec<usize>,
+}
+
 /// What one more load came to.
 enum Compared {
     /// Its `mu_s` is less than the value asked about.
@@ -72,10 +102,8 @@ pub(super) enum Ended {
 #[derive(Default)]
 struct Neighbours {
     /// Per coordinate of a load's place, the loads'.
-    places: [Vec<f32>; 6],
+    places: Places,
     states: Vec<Neighbour>,
-    /// Squares of distances, while the nearest is looked for.
-    apart: Vec<f32>,
 }
 
 /// States kept of one grip.
@@ -86,29 +114,69 @@ const UNLIKE: f32 = 0.05 * 0.05;
 const LIKE: f32 = 0.5 * 0.5;
 
 impl Neighbours {
-    /// The index of the nearest state, with the square of its distance.
-    fn nearest(&mut self, place: &[f32; 6]) -> Option<(f32, usize)> {
-        self.apart.clear();
-        self.apart.resize(self.states.len(), 0.0);
-        for (all, x) in self.places.iter().zip(place) {
-            for (apart, other) in self.apart.iter_mut().zip(all) {
-                *apart += (x - other) * (x - other);
-            }
-        }
-        let least = self.apart.iter().fold(f32::INFINITY, |least, &apart| least.min(apart));
-        // Eight at a time, without a way out between them.
-        let has = |some: &[f32]| some.iter().fold(false, |has, &apart| has | (apart == least));
-        let first = 8 * self.apart.chunks(8).position(has)?;
-        let within = self.apart[first..].iter().position(|&apart| apart == least)?;
-        Some((least, first + within))
+    /// The square of the distance of the nearest state, and which it is.
+    fn nearest(&self, place: &[f32; 6]) -> Option<(f32, usize)> {
+        let (apart, index) = nearest(&self.places, self.states.len(), place);
+        (index < self.states.len()).then_some((apart, index))
     }
 
     fn add(&mut self, place: [f32; 6], state: Neighbour) {
-        for (all, x) in self.places.iter_mut().zip(place) {
-            all.push(x);
+        let index = self.states.len();
+        for (all, x) in self.places.0[index / SIDE].iter_mut().zip(place) {
+            all[index % SIDE] = x;
         }
         self.states.push(state);
     }
+}
+
+/// Places looked at side by side.
+const SIDE: usize = 16;
+
+/// Places of up to [`MOST`] loads: some side by side, coordinate by coordinate.
+struct Places([[[f32; SIDE]; 6]; MOST / SIDE]);
+
+impl Default for Places {
+    fn default() -> Self {
+        Self([[[f32::INFINITY; SIDE]; 6]; MOST / SIDE])
+    }
+}
+
+widest! {
+    /// The square of the distance of the nearest of `count` places, and its index; beyond them where
+    /// there are none.
+    fn nearest(places: &Places, count: usize, place: &[f32; 6]) -> (f32, usize) = nearest_of
+}
+
+#[inline(always)]
+fn nearest_of(Places(places): &Places, count: usize, place: &[f32; 6]) -> (f32, usize) {
+    let mut least = [f32::INFINITY; SIDE];
+    let mut at = [u32::MAX; SIDE];
+    for (chunk, some) in places.iter().enumerate().take(count.div_ceil(SIDE)) {
+        let mut apart = [0.0_f32; SIDE];
+        for m in 0..6 {
+            for i in 0..SIDE {
+                let way = place[m] - some[m][i];
+                apart[i] += way * way;
+            }
+        }
+        for i in 0..SIDE {
+            let nearer = apart[i] < least[i];
+            least[i] = if nearer { apart[i] } else { least[i] };
+            at[i] = if nearer { (chunk * SIDE + i) as u32 } else { at[i] };
+        }
+    }
+    // By halves, of equal ones the first.
+    let mut half = SIDE / 2;
+    while half > 0 {
+        for i in 0..half {
+            let (other, to) = (least[half + i], at[half + i]);
+            let nearer = (other < least[i]) | ((other == least[i]) & (to < at[i]));
+            least[i] = if nearer { other } else { least[i] };
+            at[i] = if nearer { to } else { at[i] };
+        }
+        half /= 2;
+    }
+    (least[0], at[0] as usize)
 }
 
 /// Where a load is among others.
@@ -156,16 +224,137 @@ impl Work<'_> {
             self.solved.clear();
             false
         });
+        let mut queue = Queue::default();
+        let ended = self.through(loads, leader, out, &mut queue);
+        if let Err(Ended::Refused) = ended {
+            self.refused_before(loads, &queue);
+        }
+        ended?;
+        self.solve_open()?;
+        if out(self.open.largest) { Err(Ended::Outranked) } else { Ok(()) }
+    }
+
+    /// Looks at loads in their turn, several at a time where the states of loads like them are known.
+    fn through(
+        &mut self,
+        loads: &[usize],
+        leader: Option<usize>,
+        out: &dyn Fn(f64) -> bool,
+        queue: &mut Queue,
+    ) -> std::result::Result<(), Ended> {
         for &load in loads {
             if out(self.open.value()) {
                 return Err(Ended::Outranked);
             }
-            if leader != Some(load) {
+            if leader == Some(load) {
+                continue;
+            }
+            let known = self.beside(load, &mut queue.waiting);
+            if !known || queue.waiting.len() == ABREAST {
+                self.look_at(queue, false)?;
+            }
+            if !known {
                 self.look(load)?;
             }
+            if queue.again.len() >= ABREAST {
+                self.look_again(queue)?;
+            }
         }
-        self.solve_open()?;
-        if out(self.open.largest) { Err(Ended::Outranked) } else { Ok(()) }
+        self.look_at(queue, false)?;
+        self.look_again(queue)
+    }
+
+    /// A load and the state of one like it to those that wait; whether there is such a state.
+    fn beside(&self, load: usize, waiting: &mut Waiting) -> bool {
+        let (case, Some(pads)) = (self.case, self.case.pads) else { return false };
+        let scaled = pads.load(case.problem.distance, case.problem.force, &case.wrench(load));
+        let here = place(&scaled);
+        let near = self.neighbours.nearest(&here).filter(|&(apart, _)| apart < LIKE);
+        if let Some((apart, near)) = near {
+            waiting.scaled.push(scaled);
+            waiting.more.push(One { load, here, apart, near });
+        }
+        near.is_some()
+    }
+
+    /// Loads that did not succeed at first, beside the states found in the meantime.
+    fn look_again(&mut self, queue: &mut Queue) -> std::result::Result<(), Ended> {
+        let again = std::mem::take(&mut queue.again);
+        for (count, &load) in again.iter().enumerate() {
+            self.beside(load, &mut queue.waiting);
+            if queue.waiting.len() == ABREAST || count + 1 == again.len() {
+                let ended = self.look_at(queue, true);
+                if ended.is_err() {
+                    queue.again.extend(&again[count + 1..]);
+                    return ended;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Compares the loads that wait with what is known of the worst one.
+    fn look_at(&mut self, queue: &mut Queue, patient: bool) -> std::result::Result<(), Ended> {
+        let Waiting { scaled, more } = &mut queue.waiting;
+        let question = Question { value: self.open.value(), sharp: SHARP };
+        let mut found = [None; ABREAST];
+        // One or two go faster one by one.
+        if let (Some(comparer), [first, _, _, ..]) = (&mut self.comparer, &more[..]) {
+            let near = |i: usize| &self.neighbours.states[more[i].near];
+            let options = self.case.options(first.load, Search::Off);
+            found = comparer.several(scaled, near, &options, (question, patient));
+        }
+        let mut alone = Vec::new();
+        for (i, One { load, here, apart, .. }) in more.drain(..).enumerate() {
+            let Some([least, most]) = found[i] else {
+                alone.push(load);
+                continue;
+            };
+            self.compared += 1;
+            if most >= question.value {
+                self.open.floor = self.open.floor.max(least);
+                self.open.loads.push((load, most));
+            }
+            // The states of those before it may be like it.
+            let unlike = |all: &Neighbours| {
+                all.states.len() < MOST
+                    && all.nearest(&here).is_none_or(|(apart, _)| apart > UNLIKE)
+            };
+            if apart > UNLIKE
+                && unlike(&self.neighbours)
+                && let Some(comparer) = &mut self.comparer
+                && let Some(state) = comparer.reached_by(i)
+            {
+                self.neighbours.add(here, state);
+            }
+        }
+        scaled.clear();
+        if !patient {
+            queue.again.append(&mut alone);
+            return Ok(());
+        }
+        for (count, &load) in alone.iter().enumerate() {
+            if let Err(ended) = self.look(load) {
+                queue.again.extend(&alone[count + 1..]);
+                return Err(ended);
+            }
+        }
+        Ok(())
+    }
+
+    /// Of the loads without a limit state the one whose turn comes first is the answer: those of the
+    /// queue that were passed over come before the one found.
+    fn refused_before(&mut self, loads: &[usize], queue: &Queue) {
+        let Some(found) = self.solved.pop() else { return };
+        let waits = |load: usize| {
+            queue.again.contains(&load) || queue.waiting.more.iter().any(|one| one.load == load)
+        };
+        for &load in loads.iter().take_while(|&&load| load != found.0) {
+            if waits(load) && self.look(load).is_err() {
+                return;
+            }
+        }
+        self.solved.push(found);
     }
 
     /// Compares a load with what is known of the worst one.

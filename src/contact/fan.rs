@@ -69,7 +69,7 @@ fn sums_of(edges: &[Block], Centre { c, p }: Centre) -> Sums {
 /// What an edge with unit tangent `t` and length `l` from `a` to `b`, seen from the slip centre, adds
 /// to [`Sums`], in their order; the pressure is that of [`Centre`].
 #[inline(always)]
-fn of_edge(
+pub(super) fn of_edge(
     [t1, t2, l]: [f64; 3],
     [ax, ay]: [f64; 2],
     [bx, by]: [f64; 2],
@@ -131,73 +131,6 @@ fn of_edge(
         tt12 * (tt - nn) + nt * (tt22 - tt11),
         nn * tt11 - both + tt * tt22,
     ]
-}
-
-/// Twists side by side.
-pub(crate) const ABREAST: usize = 8;
-
-/// A number of each.
-pub(crate) type Abreast = [f64; ABREAST];
-
-/// [`Friction`] of one area under several twists: `g` by weight and component, the Hessian's 11, 12,
-/// 13, 22, 23, 33.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Frictions {
-    pub(crate) g: [[Abreast; 3]; 3],
-    pub(crate) hessian: [Abreast; 6],
-}
-
-/// The integrals of an area under some twists `v`, each with its own pressure `p`, by the closed
-/// forms: none may be a translation, and what cancels between the edges grows with the square of the
-/// slip centre's distance.
-#[inline(always)]
-pub(crate) fn frictions(area: &Loops, v: &[Abreast; 3], p: &[Abreast; 3]) -> Frictions {
-    let zero = [0.0; ABREAST];
-    let (mut c, mut at) = ([zero; 2], zero);
-    for i in 0..ABREAST {
-        (c[0][i], c[1][i]) = (-v[1][i] / v[2][i], v[0][i] / v[2][i]);
-        at[i] = p[0][i] + p[1][i] * c[0][i] + p[2][i] * c[1][i];
-    }
-    let mut sums = [zero; 11];
-    for block in area.blocks() {
-        for e in 0..LANES {
-            if block.length[e] == 0.0 {
-                continue;
-            }
-            let along = [block.t1[e], block.t2[e], block.length[e]];
-            for i in 0..ABREAST {
-                let a = [block.ax[e] - c[0][i], block.ay[e] - c[1][i]];
-                let b = [block.bx[e] - c[0][i], block.by[e] - c[1][i]];
-                let terms = of_edge(along, a, b, [at[i], p[1][i], p[2][i]]);
-                for (sum, term) in sums.iter_mut().zip(terms) {
-                    sum[i] += term;
-                }
-            }
-        }
-    }
-    let mut out = Frictions { g: [[zero; 3]; 3], hessian: [zero; 6] };
-    for i in 0..ABREAST {
-        let (c1, c2, omega) = (c[0][i], c[1][i], v[2][i]);
-        let sign = 1.0_f64.copysign(omega);
-        let s = |m: usize| sums[m][i];
-        let row =
-            |e1: f64, e2: f64, r: f64| [-sign * e2, sign * e1, sign * (c1 * e1 + c2 * e2 + r)];
-        let g0 = row(s(0), s(1), s(5));
-        let (g1, g2) = (row(s(2), s(3), s(6)), row(s(3), s(4), s(7)));
-        for m in 0..3 {
-            out.g[0][m][i] = g0[m];
-            out.g[1][m][i] = c1 * g0[m] + g1[m];
-            out.g[2][m][i] = c2 * g0[m] + g2[m];
-        }
-        let scale = 1.0 / omega.abs();
-        let (h11, h12, h22) = (scale * s(8), scale * s(9), scale * s(10));
-        let (h13, h23) = (-c2 * h11 + c1 * h12, -c2 * h12 + c1 * h22);
-        let h33 = -c2 * h13 + c1 * h23;
-        for (m, h) in [h11, h12, h13, h22, h23, h33].into_iter().enumerate() {
-            out.hessian[m][i] = h;
-        }
-    }
-    out
 }
 
 /// Coefficients of `(atanh(s)/s - 1)/s^2` in powers of `s^2` up to `s = 1/3`: interpolated at the
@@ -263,7 +196,7 @@ fn assemble(sums: &Sums, c: DVec2, omega: f64) -> Friction {
         std::array::from_fn(|i| c.y * g0[i] + gy2[i]),
     ];
     let scale = 1.0 / omega.abs();
-    let [h11, h12, h22] = sums.q.map(|q| scale * q);
+    let [h11, h12, h22] = [scale * sums.q[0], scale * sums.q[1], scale * sums.q[2]];
     // B H B^T with B = [[1, 0], [0, 1], [-c2, c1]]
     let h13 = -c.y * h11 + c.x * h12;
     let h23 = -c.y * h12 + c.x * h22;

@@ -232,7 +232,7 @@ fn sums_of(edges: &mut [Block], o: DVec2) -> [f64; 6] {
 
 /// Moments about the origin from those about `o`.
 #[inline(always)]
-fn moved(m: [f64; 6], o: DVec2) -> [f64; 6] {
+pub(super) fn moved(m: [f64; 6], o: DVec2) -> [f64; 6] {
     [
         m[0],
         m[1] + o.x * m[0],

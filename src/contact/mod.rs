@@ -12,6 +12,7 @@
 //!
 //! from which equations (3)-(7) follow: the friction wrench on the body is `-mu sum p_m g[m]`.
 
+mod abreast;
 mod fan;
 mod far;
 mod field;
@@ -22,7 +23,7 @@ pub mod quadric;
 pub mod surface;
 mod thin;
 
-pub(crate) use fan::{ABREAST, Abreast, Frictions, frictions};
+pub(crate) use abreast::{ABREAST, Abreast, Cuts, cut_frictions, frictions};
 pub use far::FAR;
 pub use field::{Field, Friction, PlaneWrench, Twist};
 pub use friction::friction;

@@ -229,6 +229,43 @@ pub(crate) fn numbers(gap: &Gap) -> [f64; 8] {
     [kind, a, b, axis.x, axis.y, at.x, at.y, height]
 }
 
+/// Compression at the pad plane \[m\] under a force \[N\] on a layer of this stiffness [Pa/m] where a
+/// piece presses with a whole ellipse about its crest: `N = pi k sqrt(R_1 R_2) (delta - h)^2`. `None`
+/// where it is another shape or its outline cuts the ellipse.
+pub(crate) fn spot(piece: &Piece, stiffness: f64, force: f64) -> Option<f64> {
+    let (radii, axis, at, height) = match piece.gap {
+        Gap::Sphere { radius, at, height } => ([radius; 2], DVec2::X, at, height),
+        Gap::Barrel { radius, meridian, axis, at, height } => {
+            ([meridian, radius], axis.normalize(), at, height)
+        }
+        _ => return None,
+    };
+    if !piece.holes.is_empty() || radii.iter().any(|radius| *radius <= 0.0) {
+        return None;
+    }
+    let deep = (force / (std::f64::consts::PI * stiffness * (radii[0] * radii[1]).sqrt())).sqrt();
+    let half = radii.map(|radius| (2.0 * radius * deep).sqrt());
+    // In units of the half axes the ellipse is the circle of radius one.
+    let place = |x: DVec2| {
+        let way = x - at;
+        DVec2::new(axis.dot(way) / half[0], axis.perp_dot(way) / half[1])
+    };
+    let mut turned = 0.0;
+    let mut from = place(*piece.outer.last()?);
+    for corner in &piece.outer {
+        let to = place(*corner);
+        let edge = to - from;
+        let along =
+            (-from.dot(edge) / edge.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        if (from + along * edge).length_squared() < 1.0 {
+            return None;
+        }
+        turned += from.angle_to(to);
+        from = to;
+    }
+    (turned.abs() > std::f64::consts::PI).then_some(height + deep)
+}
+
 /// Sides of the polygon in place of an ellipse, of equal area.
 const SIDES: usize = 48;
 
@@ -325,4 +362,48 @@ pub(crate) fn cut(piece: &Piece, window: &[DVec2]) -> Patch {
         return if solid { vec![Polygon { outer, holes: Vec::new() }] } else { Patch::new() };
     }
     intersect_convex(window, &[piece.polygon()])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mechanics::curved::Pads;
+
+    /// What the solver finds for whole spots; a spot that its outline cuts is none.
+    #[test]
+    fn a_whole_spot_is_compressed_as_the_equations_say() {
+        let (stiffness, force) = (8e10, 150.0);
+        let square = |half: f64| -> Ring {
+            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+                .map(|(x, y)| DVec2::new(0.002 + half * x, -0.001 + half * y))
+                .to_vec()
+        };
+        let at = DVec2::new(0.0025, -0.0005);
+        let gaps = [
+            Gap::Sphere { radius: 0.02, at, height: 3e-5 },
+            Gap::Barrel {
+                radius: 0.03,
+                meridian: 0.012,
+                axis: DVec2::new(0.6, 0.8),
+                at,
+                height: -2e-5,
+            },
+        ];
+        let piece = |gap: Gap, half: f64| Piece { outer: square(half), holes: Vec::new(), gap };
+        for gap in gaps {
+            let whole = piece(gap, 0.006);
+            let surfaces = Surfaces {
+                face_i: vec![whole.clone()],
+                face_ii: vec![whole.clone()],
+                stiffness: [stiffness; 2],
+                layer: None,
+            };
+            let found = Pads::new(&surfaces).unwrap().squeezed(force).unwrap()[0].delta;
+            let spot = spot(&whole, stiffness, force).unwrap();
+            assert!((spot / found - 1.0).abs() < 1e-9, "{spot:e} {found:e}");
+            assert_eq!(super::spot(&piece(gap, 0.0011), stiffness, force), None);
+            let beside = Piece { outer: square(0.0002), ..whole };
+            assert_eq!(super::spot(&beside, stiffness, force), None);
+        }
+    }
 }

@@ -1,80 +1,130 @@
-//! Bounds on the `mu_s` of several loads side by side, where both pads stay wholly pressed: Newton's
-//! steps on the seven equations by the closed forms, with the error bound of [`super::compare`].
+//! Bounds on the `mu_s` of several loads on one contact side by side: Newton's steps on the seven
+//! equations by the closed forms, with the error bound of [`super::compare`].
 //!
-//! Without cutting, the integrals of all loads run over the same edges, and the equations fall into
-//! blocks: the slip's three rows are definite in the twist, the normal forces' rows give the offsets,
-//! and two unknowns are left. Nothing is answered from here: what may be the worst is solved.
+//! The equations fall into blocks: the slip's three rows are definite in the twist, the normal
+//! forces' rows give the offsets, and two unknowns are left. Where a pressure falls below zero the
+//! areas are cut for each load by itself, and what is left is integrated side by side again. Nothing
+//! is answered from here: what may be the worst is solved.
 
-use crate::contact::{ABREAST, Abreast, Frictions, Twist, frictions, widest};
+use crate::contact::{ABREAST, Abreast, Cuts, Twist, cut_frictions, frictions, widest};
 
 use super::branch::COUPLING_SEARCH;
-use super::compare::{CONTRACTION, WITHIN};
+use super::compare::{CONTRACTION, Question, WITHIN};
+use super::equilibrium::{Integrals, Vector7};
 use super::pads::{Load, Pads};
 use super::pressure::stiffness_rows;
 
-/// Share apart at which bounds are close enough to leave out most loads.
-const CLOSE: f64 = 1e-3;
+/// What is asked about loads of which only the seeds know something: bounds close enough to leave
+/// out most of them.
+const CLOSE: Question = Question { value: 0.0, sharp: 1e-3 };
 /// Corrections after the first.
 const CORRECTIONS: usize = 2;
+/// The same beside a state of a load like it.
+const CORRECTIONS_BESIDE: usize = 3;
+/// The same with steps that are cut, and what is left of one then.
+const CORRECTIONS_PATIENT: usize = 7;
+const SHORTER: f64 = 0.3;
 /// Farthest slip centre, in radii of the scaled pads, at which the closed forms are good enough here.
 const FARTHEST: f64 = 30.0;
+/// Change of the pressure over the pads' radius, in its mean on what is left of an area, from which on
+/// they are not; and the least share of an area that must be left.
+const STEEPEST: f64 = 20.0;
+const LEAST_LEFT: f64 = 0.01;
 /// Share by which bounds are widened for their rounding: that of the closed forms out there.
 const ROUNDING: f64 = 1e-9;
 
 const ZERO: Abreast = [0.0; ABREAST];
 
 /// Bounds on the `mu_s` of each load, from a twist near its slip (scaled); `None` where they are not
-/// found, or a pad may lift.
+/// found.
 pub(crate) fn bounds(pads: &Pads, loads: &[(Load, Twist)]) -> Vec<Option<[f64; 2]>> {
-    let known = |[least, most]: [f64; 2]| (least <= most).then_some([least, most]);
-    let of = |loads: &[(Load, Twist)]| {
-        let found = some_bounds(pads, &Loads::new(loads));
-        (0..loads.len()).map(move |i| known([found[0][i], found[1][i]])).collect::<Vec<_>>()
-    };
-    loads.chunks(ABREAST).flat_map(of).collect()
+    let mut found = Vec::with_capacity(loads.len());
+    let mut work = Abreasts::default();
+    for some in loads.chunks(ABREAST) {
+        let (mut all, mut v) = (Loads::default(), [ZERO; 3]);
+        for i in 0..ABREAST {
+            let (load, twist) = &some[i.min(some.len() - 1)];
+            all.put(i, load);
+            (v[0][i], v[1][i], v[2][i]) = (twist.u1, twist.u2, twist.omega);
+        }
+        from_twists(pads, &all, &v, &mut work);
+        found.extend((0..some.len()).map(|i| work.bounds(i)));
+    }
+    found
 }
 
-/// [`Load`]s side by side with their first twists; unused places hold the first load.
+/// Where a load begins: beside the state of another one.
+pub(super) struct Beside<'a> {
+    pub(super) load: &'a Load,
+    pub(super) z: &'a Vector7,
+    /// What the equations leave over there, and Newton's first step.
+    pub(super) residual: Vector7,
+    pub(super) step: Vector7,
+}
+
+/// Bounds on the `mu_s` of `count` loads, up to [`ABREAST`], that answer the question, into `work`.
+/// `patient`: steps that lead up are cut, and there are more of them.
+pub(super) fn beside<'a>(
+    pads: &Pads,
+    count: usize,
+    beside: impl Fn(usize) -> Beside<'a>,
+    question: Question,
+    patient: bool,
+    work: &mut Abreasts,
+) {
+    let mut loads = Loads::default();
+    let mut begin = Begin { v: [ZERO; 3], q: [ZERO; 4], error: ZERO, step: [ZERO; 7] };
+    for i in 0..count {
+        let one = beside(i);
+        loads.put(i, one.load);
+        begin.put(i, &one);
+    }
+    for i in count..ABREAST {
+        loads.copy(i);
+        begin.copy(i);
+    }
+    from_states(pads, &loads, &begin, question, patient, work);
+}
+
+/// [`Load`]s side by side.
+#[derive(Default)]
 struct Loads {
     w: [Abreast; 3],
     size: Abreast,
     normal: [Abreast; 2],
     moment: [Abreast; 2],
     half_distance: Abreast,
-    start: [Abreast; 3],
 }
 
 impl Loads {
-    fn new(loads: &[(Load, Twist)]) -> Self {
-        let mut all = Self {
-            w: [ZERO; 3],
-            size: ZERO,
-            normal: [ZERO; 2],
-            moment: [ZERO; 2],
-            half_distance: ZERO,
-            start: [ZERO; 3],
-        };
-        for i in 0..ABREAST {
-            let Some((load, twist)) = loads.get(i).or_else(|| loads.first()) else { break };
-            let w = [load.direction.f1, load.direction.f2, load.direction.m3];
-            let v = twist.to_array();
-            for m in 0..3 {
-                (all.w[m][i], all.start[m][i]) = (w[m], v[m]);
-            }
-            for k in 0..2 {
-                (all.normal[k][i], all.moment[k][i]) = (load.normal[k], load.moment[k]);
-            }
-            (all.size[i], all.half_distance[i]) = (load.size, load.half_distance);
+    fn put(&mut self, i: usize, load: &Load) {
+        self.w[0][i] = load.direction.f1;
+        self.w[1][i] = load.direction.f2;
+        self.w[2][i] = load.direction.m3;
+        for k in 0..2 {
+            (self.normal[k][i], self.moment[k][i]) = (load.normal[k], load.moment[k]);
         }
-        all
+        (self.size[i], self.half_distance[i]) = (load.size, load.half_distance);
+    }
+
+    /// The first one in another place.
+    fn copy(&mut self, i: usize) {
+        let [w1, w2, w3] = &mut self.w;
+        let ([n1, n2], [m1, m2]) = (&mut self.normal, &mut self.moment);
+        for numbers in [w1, w2, w3, n1, n2, m1, m2, &mut self.size, &mut self.half_distance] {
+            numbers[i] = numbers[0];
+        }
     }
 }
 
 /// The seven equations at a state of each load.
+#[derive(Default)]
 struct Equations {
     /// Twist and pressure.
     v: [Abreast; 3],
     q: [Abreast; 4],
+    /// Moments of what is left of the areas.
+    moments: [[Abreast; 6]; 2],
     residual: [Abreast; 7],
     /// Sum of the gradients, and face I's less face II's.
     g: [Abreast; 3],
@@ -84,71 +134,154 @@ struct Equations {
     /// Hessians likewise.
     sum: [Abreast; 6],
     less: [Abreast; 6],
-    /// What the gradients change for a unit of each of the pressure's numbers: sum and difference.
-    by_pressure: [[[Abreast; 3]; 4]; 2],
+    /// What each face's gradient changes for a unit of the pressure's weights.
+    by_weight: [[[Abreast; 3]; 3]; 2],
+    /// Whether the closed forms are good enough.
+    good: [bool; ABREAST],
 }
 
 /// Where the entry `(i, j)` of a symmetric matrix lies.
 const AT: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
+/// What Newton's method begins with.
+struct Begin {
+    v: [Abreast; 3],
+    q: [Abreast; 4],
+    /// Length of the residuals.
+    error: Abreast,
+    step: [Abreast; 7],
+}
+
+impl Begin {
+    fn put(&mut self, i: usize, beside: &Beside<'_>) {
+        for m in 0..3 {
+            self.v[m][i] = beside.z[m];
+        }
+        for m in 0..4 {
+            self.q[m][i] = beside.z[3 + m];
+        }
+        for m in 0..7 {
+            self.step[m][i] = beside.step[m];
+        }
+        self.error[i] = beside.residual.norm();
+    }
+
+    fn copy(&mut self, i: usize) {
+        for numbers in self.v.iter_mut().chain(&mut self.q).chain(&mut self.step) {
+            numbers[i] = numbers[0];
+        }
+        self.error[i] = self.error[0];
+    }
+}
+
+/// Bounds side by side, with the states at which they were found.
+#[derive(Default)]
+pub(super) struct Abreasts {
+    /// Larger than `high` where there are none.
+    low: Abreast,
+    high: Abreast,
+    at: Equations,
+    cuts: [Cuts; 2],
+}
+
+impl Abreasts {
+    /// What the `mu_s` of a load lies between.
+    pub(super) fn bounds(&self, i: usize) -> Option<[f64; 2]> {
+        (self.low[i] <= self.high[i]).then_some([self.low[i], self.high[i]])
+    }
+
+    /// The integrals where that was found.
+    pub(super) fn integrals(&self, i: usize) -> Integrals {
+        self.at.integrals(i)
+    }
+}
+
 impl Equations {
+    /// Puts twists `v` and pressures `q` in.
     #[inline(always)]
-    fn at(pads: &Pads, loads: &Loads, v: [Abreast; 3], q: [Abreast; 4]) -> Self {
-        let mut minus = [ZERO; 2];
-        for i in 0..ABREAST {
-            (minus[0][i], minus[1][i]) = (-q[2][i], -q[3][i]);
+    fn put(&mut self, pads: &Pads, loads: &Loads, cuts: &mut [Cuts; 2]) {
+        (self.g, self.difference) = ([ZERO; 3], [ZERO; 3]);
+        (self.sum, self.less) = ([ZERO; 6], [ZERO; 6]);
+        self.good = [true; ABREAST];
+        for face in 0..2 {
+            self.add_face(pads, face, &mut cuts[face]);
         }
-        let pressures = [[q[0], q[2], q[3]], [q[1], minus[0], minus[1]]];
-        let one = frictions(&pads.areas[0], &v, &pressures[0]);
-        let other = frictions(&pads.areas[1], &v, &pressures[1]);
-        let mut at = Self {
-            v,
-            q,
-            residual: [ZERO; 7],
-            g: [ZERO; 3],
-            difference: [ZERO; 3],
-            d: ZERO,
-            sum: [ZERO; 6],
-            less: [ZERO; 6],
-            by_pressure: [[[ZERO; 3]; 4]; 2],
-        };
-        at.gradients([&one, &other], &pressures);
-        at.residuals(pads, loads);
-        at
+        self.residuals(loads);
+    }
+
+    /// The pressure's numbers of a face.
+    #[inline(always)]
+    fn pressure(&self, face: usize) -> [Abreast; 3] {
+        let mut p = [self.q[face], self.q[2], self.q[3]];
+        if face == 1 {
+            for i in 0..ABREAST {
+                (p[1][i], p[2][i]) = (-p[1][i], -p[2][i]);
+            }
+        }
+        p
     }
 
     #[inline(always)]
-    fn gradients(&mut self, faces: [&Frictions; 2], pressures: &[[Abreast; 3]; 2]) {
-        let [one, other] = faces;
-        for i in 0..ABREAST {
-            for m in 0..3 {
-                let (mut a, mut b) = (0.0, 0.0);
-                for k in 0..3 {
-                    a += pressures[0][k][i] * one.g[k][m][i];
-                    b += pressures[1][k][i] * other.g[k][m][i];
-                }
-                self.g[m][i] = a + b;
-                self.difference[m][i] = a - b;
-                let [sum, less] = &mut self.by_pressure;
-                (sum[0][m][i], less[0][m][i]) = (one.g[0][m][i], one.g[0][m][i]);
-                (sum[1][m][i], less[1][m][i]) = (other.g[0][m][i], -other.g[0][m][i]);
-                for k in 1..3 {
-                    // Face II's slopes have the other sign.
-                    sum[1 + k][m][i] = one.g[k][m][i] - other.g[k][m][i];
-                    less[1 + k][m][i] = one.g[k][m][i] + other.g[k][m][i];
-                }
+    fn add_face(&mut self, pads: &Pads, face: usize, cuts: &mut Cuts) {
+        let (area, p) = (&pads.areas[face], self.pressure(face));
+        let mut lowest = [f64::INFINITY; ABREAST];
+        for x in &pads.hulls[face] {
+            for i in 0..ABREAST {
+                let here = p[0][i] + p[1][i] * x.x + p[2][i] * x.y;
+                lowest[i] = if here < lowest[i] { here } else { lowest[i] };
             }
+        }
+        let mut whole = true;
+        for lowest in lowest {
+            whole &= lowest >= 0.0;
+        }
+        let found = if whole {
             for m in 0..6 {
-                self.sum[m][i] = one.hessian[m][i] + other.hessian[m][i];
-                self.less[m][i] = one.hessian[m][i] - other.hessian[m][i];
+                self.moments[face][m] = [pads.moments[face][m]; ABREAST];
             }
+            frictions(area, &self.v, &p)
+        } else {
+            cuts.cut(area, &p);
+            cut_frictions(cuts, &self.v, &p, &mut self.moments[face])
+        };
+        let sign = if face == 0 { 1.0 } else { -1.0 };
+        let m = &self.moments[face];
+        for i in 0..ABREAST {
+            for n in 0..3 {
+                let (g, p) = (&found.g, &p);
+                let gradient = p[0][i] * g[0][n][i] + p[1][i] * g[1][n][i] + p[2][i] * g[2][n][i];
+                self.g[n][i] += gradient;
+                self.difference[n][i] += sign * gradient;
+            }
+            for n in 0..6 {
+                self.sum[n][i] += found.hessian[n][i];
+                self.less[n][i] += sign * found.hessian[n][i];
+            }
+            // A cut that is thin beside the pressure's slope loses too much.
+            let carried = p[0][i] * m[0][i] + p[1][i] * m[1][i] + p[2][i] * m[2][i];
+            let slope = (p[1][i] * p[1][i] + p[2][i] * p[2][i]).sqrt() * area.radius();
+            let left = m[0][i] >= LEAST_LEFT * pads.moments[face][0];
+            let flat = slope * m[0][i] <= STEEPEST * carried;
+            self.good[i] &= (lowest[i] >= 0.0) | (left & flat);
         }
+        self.by_weight[face] = found.g;
     }
 
     #[inline(always)]
-    fn residuals(&mut self, pads: &Pads, loads: &Loads) {
-        let k = stiffness_rows(&pads.moments);
+    fn stiffness(&self, i: usize) -> [[f64; 4]; 4] {
+        let mut moments = [[0.0; 6]; 2];
+        for face in 0..2 {
+            for m in 0..6 {
+                moments[face][m] = self.moments[face][m][i];
+            }
+        }
+        stiffness_rows(&moments)
+    }
+
+    #[inline(always)]
+    fn residuals(&mut self, loads: &Loads) {
         for i in 0..ABREAST {
+            let k = self.stiffness(i);
             let g = [self.g[0][i], self.g[1][i], self.g[2][i]];
             let d = g[0] * self.v[0][i] + g[1] * self.v[1][i] + g[2] * self.v[2][i];
             let q = [self.q[0][i], self.q[1][i], self.q[2][i], self.q[3][i]];
@@ -171,7 +304,7 @@ impl Equations {
 
     /// The start scaled to the minimum along its ray.
     #[inline(always)]
-    fn scaled(&mut self, pads: &Pads, loads: &Loads) {
+    fn scaled(&mut self, loads: &Loads) {
         for i in 0..ABREAST {
             let power = loads.w[0][i] * self.v[0][i]
                 + loads.w[1][i] * self.v[1][i]
@@ -185,15 +318,15 @@ impl Equations {
                 self.less[m][i] /= scale;
             }
         }
-        self.residuals(pads, loads);
+        self.residuals(loads);
     }
 
     /// Newton's step.
     #[inline(always)]
-    fn step(&self, pads: &Pads, loads: &Loads) -> [Abreast; 7] {
-        let k = stiffness_rows(&pads.moments);
+    fn step(&self, loads: &Loads) -> [Abreast; 7] {
         let mut step = [ZERO; 7];
         for i in 0..ABREAST {
+            let k = self.stiffness(i);
             let r = |row: usize| self.residual[row][i];
             let (g, d) = ([self.g[0][i], self.g[1][i], self.g[2][i]], self.d[i]);
             // The slip's rows: `a dv = right`, for each unit of what is on the right.
@@ -207,15 +340,27 @@ impl Equations {
                 row_v[0][m] = lever * (g[m] * y + d * self.less[AT[1][m]][i]);
                 row_v[1][m] = -lever * (g[m] * x + d * self.less[AT[0][m]][i]);
             }
+            let [one, other] = &self.by_weight;
             for j in 0..4 {
-                let [sum, less] = &self.by_pressure;
-                let by = [sum[j][0][i], sum[j][1][i], sum[j][2][i]];
+                // Face I's less face II's has the other sign for face II alone; face II's slopes have
+                // the other sign themselves.
+                let (mut by, mut less) = ([0.0; 3], [0.0; 3]);
+                for m in 0..3 {
+                    (by[m], less[m]) = match j {
+                        0 => (one[0][m][i], one[0][m][i]),
+                        1 => (other[0][m][i], -other[0][m][i]),
+                        _ => {
+                            let (a, b) = (one[j - 1][m][i], other[j - 1][m][i]);
+                            (a - b, a + b)
+                        }
+                    };
+                }
                 let dd = by[0] * self.v[0][i] + by[1] * self.v[1][i] + by[2] * self.v[2][i];
                 for m in 0..3 {
                     c[j][m] = -(dd * g[m] + d * by[m]);
                 }
-                row_q[0][j] = lever * (dd * y + d * less[j][1][i]) - k[3][j];
-                row_q[1][j] = -lever * (dd * x + d * less[j][0][i]) + k[2][j];
+                row_q[0][j] = lever * (dd * y + d * less[1]) - k[3][j];
+                row_q[1][j] = -lever * (dd * x + d * less[0]) + k[2][j];
             }
             // Offsets by what the normal forces lack and by the slopes.
             let base = [r(3) / k[0][0], r(4) / k[1][1]];
@@ -263,7 +408,7 @@ impl Equations {
     /// As [`super::compare`] measures what a step can change of the dissipation.
     #[inline(always)]
     fn change(&self, pads: &Pads, step: &[Abreast; 7], radius: f64) -> Abreast {
-        let k = stiffness_rows(&pads.moments);
+        let areas = [pads.moments[0][0], pads.moments[1][0]];
         let mut change = ZERO;
         for i in 0..ABREAST {
             let fastest = |x: f64, y: f64, z: f64| (x * x + y * y).sqrt() + z.abs() * radius;
@@ -271,38 +416,53 @@ impl Equations {
             let here = fastest(self.v[0][i], self.v[1][i], self.v[2][i]);
             let tilt = (step[5][i] * step[5][i] + step[6][i] * step[6][i]).sqrt() * radius;
             let pressure =
-                k[0][0] * (step[3][i].abs() + tilt) + k[1][1] * (step[4][i].abs() + tilt);
+                areas[0] * (step[3][i].abs() + tilt) + areas[1] * (step[4][i].abs() + tilt);
             let q = [self.q[0][i], self.q[1][i], self.q[2][i], self.q[3][i]];
-            let normal = k[0][0] * q[0]
-                + k[1][1] * q[1]
-                + (k[0][2] + k[1][2]) * q[2]
-                + (k[0][3] + k[1][3]) * q[3];
+            let [one, other] = &self.moments;
+            let normal = one[0][i] * q[0]
+                + other[0][i] * q[1]
+                + (one[1][i] - other[1][i]) * q[2]
+                + (one[2][i] - other[2][i]) * q[3];
             change[i] = normal * speed + pressure * (here + speed);
         }
         change
     }
 
-    /// Whether no pressure falls below zero within [`WITHIN`] times the step, and the slip centre is
-    /// near enough.
+    /// Whether both pads are pressed and slip, with the slip centre near enough.
     #[inline(always)]
-    fn pressed(&self, pads: &Pads, step: &[Abreast; 7], radius: f64) -> [bool; ABREAST] {
-        let mut pressed = [true; ABREAST];
-        for (face, sign) in [(0, 1.0), (1, -1.0)] {
-            for x in &pads.hulls[face] {
-                let (x, y) = (sign * x.x, sign * x.y);
-                for i in 0..ABREAST {
-                    let here = self.q[face][i] + self.q[2][i] * x + self.q[3][i] * y;
-                    let less = step[3 + face][i] + step[5][i] * x + step[6][i] * y;
-                    pressed[i] &= here >= WITHIN * less.abs();
-                }
-            }
-        }
+    fn pressed(&self, radius: f64) -> [bool; ABREAST] {
+        let mut pressed = self.good;
         for i in 0..ABREAST {
             let across = self.v[0][i] * self.v[0][i] + self.v[1][i] * self.v[1][i];
             let reach = FARTHEST * radius * self.v[2][i];
-            pressed[i] &= (across <= reach * reach) & (self.d[i] > 0.0);
+            let areas = (self.moments[0][0][i] > 0.0) & (self.moments[1][0][i] > 0.0);
+            pressed[i] &= areas & (across <= reach * reach) & (self.d[i] > 0.0);
         }
         pressed
+    }
+
+    /// The integrals at one of the states.
+    fn integrals(&self, i: usize) -> Integrals {
+        let mut at = Integrals::default();
+        for m in 0..7 {
+            at.z[m] = if m < 3 { self.v[m][i] } else { self.q[m - 3][i] };
+        }
+        for (face, sign) in [(0, 1.0), (1, -1.0)] {
+            for m in 0..3 {
+                at.gradients[face][m] = 0.5 * (self.g[m][i] + sign * self.difference[m][i]);
+                for n in 0..3 {
+                    let (sum, less) = (self.sum[AT[m][n]][i], self.less[AT[m][n]][i]);
+                    at.hessians[face][(m, n)] = 0.5 * (sum + sign * less);
+                    // Face II's slopes have the other sign.
+                    let sign = if m == 0 { 1.0 } else { sign };
+                    at.by_pressure[face][m][n] = sign * self.by_weight[face][m][n][i];
+                }
+            }
+            for m in 0..6 {
+                at.moments[face][m] = self.moments[face][m][i];
+            }
+        }
+        at
     }
 }
 
@@ -364,64 +524,130 @@ fn without_coupling(pads: &Pads, loads: &Loads) -> [Abreast; 4] {
 }
 
 widest! {
-    /// Bounds of loads side by side; the lower one is larger where there are none.
-    fn some_bounds(pads: &Pads, loads: &Loads) -> [Abreast; 2] = some_bounds_of
+    /// Bounds from twists near the loads' slips.
+    fn from_twists(pads: &Pads, loads: &Loads, v: &[Abreast; 3], work: &mut Abreasts) -> () = from_twists_of
 }
 
 #[inline(always)]
-fn some_bounds_of(pads: &Pads, loads: &Loads) -> [Abreast; 2] {
+fn from_twists_of(pads: &Pads, loads: &Loads, v: &[Abreast; 3], work: &mut Abreasts) {
+    let at = &mut work.at;
+    (at.v, at.q) = (*v, without_coupling(pads, loads));
+    at.put(pads, loads, &mut work.cuts);
+    at.scaled(loads);
+    let (step, error) = (at.step(loads), lengths(&at.residual));
+    let begin = Begin { v: at.v, q: at.q, error, step };
+    newton(pads, loads, &begin, CLOSE, (CORRECTIONS, false), work);
+}
+
+widest! {
+    /// Bounds from states of loads like them.
+    fn from_states(pads: &Pads, loads: &Loads, begin: &Begin, question: Question, patient: bool, work: &mut Abreasts) -> () = from_states_of
+}
+
+#[inline(always)]
+fn from_states_of(
+    pads: &Pads,
+    loads: &Loads,
+    begin: &Begin,
+    question: Question,
+    patient: bool,
+    work: &mut Abreasts,
+) {
+    let corrections = if patient { CORRECTIONS_PATIENT } else { CORRECTIONS_BESIDE };
+    newton(pads, loads, begin, question, (corrections, patient), work);
+}
+
+/// Newton's steps until each load's bounds answer the question, or no more are worth it; `cut`: those
+/// that lead up are cut.
+#[inline(always)]
+fn newton(
+    pads: &Pads,
+    loads: &Loads,
+    begin: &Begin,
+    Question { value, sharp }: Question,
+    (corrections, cut): (usize, bool),
+    work: &mut Abreasts,
+) {
     let reach = |k: usize| pads.areas[k].middle().length() + pads.areas[k].radius();
     let radius = reach(0).max(reach(1));
-    let mut at = Equations::at(pads, loads, loads.start, without_coupling(pads, loads));
-    at.scaled(pads, loads);
-    let mut step = at.step(pads, loads);
-    let mut known = [true; ABREAST];
-    let (mut low, mut high) = ([f64::INFINITY; ABREAST], [0.0; ABREAST]);
-    for _ in 0..CORRECTIONS {
-        let (mut v, mut q) = (at.v, at.q);
+    let (mut v, mut q, mut step, mut error) = (begin.v, begin.q, begin.step, begin.error);
+    let (mut known, mut done) = ([true; ABREAST], [false; ABREAST]);
+    (work.low, work.high) = ([f64::INFINITY; ABREAST], ZERO);
+    let at = &mut work.at;
+    for _ in 0..corrections {
         for i in 0..ABREAST {
             for m in 0..3 {
-                v[m][i] += step[m][i];
+                at.v[m][i] = v[m][i] + step[m][i];
             }
             for m in 0..4 {
-                q[m][i] += step[3 + m][i];
+                at.q[m][i] = q[m][i] + step[3 + m][i];
             }
         }
-        let next = Equations::at(pads, loads, v, q);
-        let correction = next.step(pads, loads);
-        let before = next.change(pads, &step, radius);
-        let after = next.change(pads, &correction, radius);
-        let pressed = next.pressed(pads, &correction, radius);
+        at.put(pads, loads, &mut work.cuts);
+        let correction = at.step(loads);
+        let before = at.change(pads, &step, radius);
+        let after = at.change(pads, &correction, radius);
+        let pressed = at.pressed(radius);
+        let left = lengths(&at.residual);
+        let mut open = false;
         for i in 0..ABREAST {
-            let falls = norm(&next.residual, i) <= 0.9 * norm(&at.residual, i);
-            known[i] &= pressed[i] & falls;
-            let contracts = after[i] <= CONTRACTION * before[i];
-            let least = (next.d[i] - WITHIN * after[i]) * loads.size[i] * (1.0 - ROUNDING);
-            let most = (next.d[i] + WITHIN * after[i]) * loads.size[i] * (1.0 + ROUNDING);
+            let falls = pressed[i] & (left[i] <= 0.9 * error[i]);
+            known[i] &= done[i] | falls | cut;
+            let contracts = falls & (after[i] <= CONTRACTION * before[i]);
+            let least = (at.d[i] - WITHIN * after[i]) * loads.size[i] * (1.0 - ROUNDING);
+            let most = (at.d[i] + WITHIN * after[i]) * loads.size[i] * (1.0 + ROUNDING);
             let weak = most * 2.0 * loads.half_distance[i].abs() <= COUPLING_SEARCH;
             let good = known[i] & contracts & weak;
-            low[i] = if good { least } else { f64::INFINITY };
-            high[i] = if good { most } else { 0.0 };
+            if !done[i] {
+                work.low[i] = if good { least } else { f64::INFINITY };
+                work.high[i] = if good { most } else { 0.0 };
+                done[i] = good & ((most < value) | (most - least <= sharp * most));
+                open |= known[i] & !done[i];
+            }
+            // What is done stays where it is.
+            let (here, share) = if done[i] {
+                (1.0, 0.0)
+            } else if falls {
+                (1.0, 1.0)
+            } else {
+                (0.0, 0.0)
+            };
+            for m in 0..3 {
+                v[m][i] += here * step[m][i];
+            }
+            for m in 0..4 {
+                q[m][i] += here * step[3 + m][i];
+            }
+            for m in 0..7 {
+                step[m][i] = share * correction[m][i] + (1.0 - here) * SHORTER * step[m][i];
+            }
+            error[i] = if falls { left[i] } else { error[i] };
         }
-        let close = |i: usize| low[i] <= high[i] && high[i] - low[i] <= CLOSE * high[i];
-        if (0..ABREAST).all(|i| close(i) || !known[i]) {
+        if !open {
             break;
         }
-        (at, step) = (next, correction);
     }
-    [low, high]
 }
 
 #[inline(always)]
-fn norm(residual: &[Abreast; 7], i: usize) -> f64 {
-    residual.iter().map(|r| r[i] * r[i]).sum::<f64>().sqrt()
+fn lengths(residual: &[Abreast; 7]) -> Abreast {
+    let mut squares = ZERO;
+    for r in residual {
+        for i in 0..ABREAST {
+            squares[i] += r[i] * r[i];
+        }
+    }
+    for square in &mut squares {
+        *square = square.sqrt();
+    }
+    squares
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mechanics::{Options, solve_pads};
-    use crate::model::{Contact, Polygon, Slip, Status, Wrench};
+    use crate::mechanics::{Comparer, Neighbour, Options, solve_next, solve_pads};
+    use crate::model::{Contact, Polygon, Status, Wrench};
     use glam::{DVec2, DVec3};
 
     fn octagon(turn: f64, size: impl Fn(usize) -> f64) -> Vec<Polygon> {
@@ -466,41 +692,73 @@ mod tests {
         // Newton's method contracts at once from a third of these far starts.
         assert!(close > 20, "{close} of 61 loads have close bounds");
     }
-    /// Loads that lift a pad somewhere have no bounds here, however near the start; those that press
-    /// both wholly have.
+    /// The solutions of loads that lift a pad somewhere lie within their bounds, from the states of loads
+    /// like them and of others; with patience more of them have some.
     #[test]
-    fn a_load_that_lifts_a_pad_has_no_bounds() {
-        let contact = Contact {
-            face_i: octagon(0.1, |i| 0.01 + 0.001 * (i % 3) as f64),
-            face_ii: octagon(0.4, |i| 0.011 - 0.0013 * (i % 2) as f64),
-        };
-        let (pads, force, distance) = (Pads::new(&contact).unwrap(), 40.0, 0.02);
+    fn solutions_of_loads_that_lift_a_pad_lie_within_the_bounds() {
+        // As far as the areas lie over each other, and beside each other by half their size, where the
+        // squeeze alone lifts both.
+        let mut found = [[0; 3]; 2];
+        for (aside, counts) in [0.0, 0.01].into_iter().zip(&mut found) {
+            let mut contact = Contact {
+                face_i: octagon(0.1, |i| 0.01 + 0.001 * (i % 3) as f64),
+                face_ii: octagon(0.4, |i| 0.011 - 0.0013 * (i % 2) as f64),
+            };
+            contact.face_ii[0].outer.iter_mut().for_each(|x| x.x += aside);
+            *counts = lifting_loads(&contact);
+        }
+        assert!(found[0][0] > 100 && found[0][2] > 50, "{found:?}");
+        assert!(found[1][0] > 100 && found[1][1] > found[1][0] + 50, "{found:?}");
+    }
+
+    /// Loads that lift a pad with bounds found quickly, found patiently, and of these those that lift
+    /// both; none may be wrong.
+    fn lifting_loads(contact: &Contact) -> [usize; 3] {
+        let (pads, force, distance) = (Pads::new(contact).unwrap(), 40.0, 0.02);
         let areas =
             [&contact.face_i, &contact.face_ii].map(|face| crate::geometry::patch_area(face));
-        let (mut lifted, mut bounded) = (0, 0);
-        for i in 0..80 {
+        let options = Options::default();
+        let wrench = |i: usize| {
             let t = 0.37 * i as f64;
-            let size = 0.01 * (1 + i % 40) as f64;
-            let wrench = Wrench {
-                force: 4.0 * DVec3::new(t.cos(), (1.7 * t).sin(), 0.0),
+            let size = 0.01 * (1 + i % 23) as f64;
+            Wrench {
+                force: 4.0 * DVec3::new(t.cos(), (1.7 * t).sin(), 0.5 * (0.9 * t).cos()),
                 moment: DVec3::new(size * t.sin(), size * t.cos(), 0.05),
-            };
-            let score = solve_pads(&pads, distance, force, &wrench, &Options::default());
-            let Some(Slip::Rotation { c, sense }) = score.slip else { continue };
-            let load = pads.load(distance, force, &wrench);
-            // At the solution itself.
-            let turn = Twist::about((DVec2::from(c) - pads.origin) / pads.length);
-            let sense = f64::from(sense);
-            let twist = Twist { u1: sense * turn.u1, u2: sense * turn.u2, omega: sense };
-            let found = bounds(&pads, &[(load, twist)])[0];
-            let left = [score.contact_area_i, score.contact_area_ii];
-            if left.iter().zip(areas).any(|(left, whole)| *left < whole * (1.0 - 1e-6)) {
-                assert_eq!(found, None, "{left:?} of {areas:?}");
-                lifted += 1;
-            } else {
-                bounded += usize::from(found.is_some());
+            }
+        };
+        let mut solved = Vec::new();
+        for i in 0..230 {
+            let mut start = None;
+            let score = solve_next(&pads, distance, force, &wrench(i), &options, &mut start);
+            let load = pads.load(distance, force, &wrench(i));
+            let near = start.and_then(|start| Neighbour::at(&pads, &load, start));
+            if let (Some(mu), Some(near), Status::Ok) = (score.mu_s, near, score.status) {
+                let left = [score.contact_area_i, score.contact_area_ii];
+                let lifts = left.iter().zip(areas).filter(|(left, whole)| **left < *whole * 0.999);
+                solved.push((load, mu, near, lifts.count()));
             }
         }
-        assert!(lifted > 20 && bounded > 5, "{lifted} lift, {bounded} have bounds");
+        let mut comparer = Comparer::new(&pads, force);
+        let [mut bounded, mut patiently, mut both] = [0; 3];
+        for (begin, some) in solved.chunks(ABREAST).enumerate() {
+            let loads: Vec<Load> = some.iter().map(|(load, ..)| *load).collect();
+            for shift in [1, 5, 11, 17, 40] {
+                let near = |i: usize| &solved[(ABREAST * begin + i + shift) % solved.len()].2;
+                let question = Question { value: 0.0, sharp: 2e-4 };
+                let quick = comparer.several(&loads, near, &options, (question, false));
+                let found = comparer.several(&loads, near, &options, (question, true));
+                for (i, (_, mu, _, lifts)) in some.iter().enumerate() {
+                    for [least, most] in [quick[i], found[i]].into_iter().flatten() {
+                        assert!(least <= *mu && *mu <= most, "{least} {mu} {most}");
+                    }
+                    if *lifts > 0 {
+                        bounded += usize::from(quick[i].is_some());
+                        patiently += usize::from(found[i].is_some());
+                        both += usize::from(found[i].is_some() && *lifts == 2);
+                    }
+                }
+            }
+        }
+        [bounded, patiently, both]
     }
 }

@@ -58,6 +58,17 @@ pub(super) fn hardly_touching(state: &State, pads: &Pads) -> bool {
     (0..2).any(|k| state.moments[k][0] < HARDLY * pads.moments[k][0])
 }
 
+/// Steps down a valley at most, the share of the value by which a step counts as slow, the fall, as a
+/// share of the steepest that there can be, up to which there is none, the ways along folds at most, and
+/// the value that is left to Newton's method.
+const VALLEY_MOST: usize = 60;
+const VALLEY_SLOW: f64 = 1e-3;
+const VALLEY_FLAT: f64 = 1e-3;
+const VALLEY_FOLDS: usize = 3;
+const VALLEY_FLOOR: f64 = 1e-7;
+/// Longest step of [`Solver::deflated`], of force times the pads' length.
+const DEFLATED_STEP: f64 = 0.1;
+
 impl Solver<'_> {
     /// Newton's method on all seven equations from the pressure `q` without coupling and a rough
     /// slip under it. Only for a coupling so weak that there is one solution: whichever way it was
@@ -271,6 +282,109 @@ impl Solver<'_> {
             at = next;
         }
         at
+    }
+
+    /// Where the map's length is least beside a point, by Levenberg's and Marquardt's method. Where
+    /// that ends at a fold the way goes on along it to both sides, if that leads down.
+    pub(super) fn floor(&mut self, mut at: Node) -> Node {
+        let mut damping = 1e-3;
+        let mut folds = 0;
+        for _ in 0..VALLEY_MOST {
+            let value = at.g.length();
+            if value < VALLEY_FLOOR {
+                break;
+            }
+            let transposed = at.slope.transpose();
+            let (normal, downhill) = (transposed * at.slope, transposed * at.g);
+            let trace = normal.x_axis.x + normal.y_axis.y;
+            // No way leads down: at the floor, or at a fold.
+            let flat =
+                downhill.length_squared() < VALLEY_FLAT * VALLEY_FLAT * trace * value * value;
+            let next = (!flat && damping < 1e6).then(|| {
+                let level = DMat2::from_diagonal(DVec2::splat(damping * trace));
+                self.beside(&at, at.x - (normal + level).inverse() * downhill)
+            });
+            let (next, much) = match next.flatten().filter(|next| next.g.length() < value) {
+                Some(next) => {
+                    damping *= 0.2;
+                    (Some(next), next.g.length() < (1.0 - VALLEY_SLOW) * value)
+                }
+                None if flat || damping >= 1e6 => (None, false),
+                None => {
+                    damping *= 8.0;
+                    continue;
+                }
+            };
+            let here = next.unwrap_or(at);
+            if much {
+                at = here;
+                continue;
+            }
+            folds += 1;
+            let Some(along) = (folds <= VALLEY_FOLDS).then(|| self.along_fold(&here)).flatten()
+            else {
+                return here;
+            };
+            (at, damping) = (along, 1e-3);
+        }
+        at
+    }
+
+    /// A lower point on the line through `at` along which the map changes least.
+    fn along_fold(&mut self, at: &Node) -> Option<Node> {
+        let (flat, _) = flattest(at.slope);
+        let mut best = None;
+        let mut least = at.g.length();
+        for way in [0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4] {
+            for side in [way, -way] {
+                if let Some(next) = self.beside(at, at.x + side * flat)
+                    && next.g.length() < least
+                {
+                    (least, best) = (next.g.length(), Some(next));
+                }
+            }
+        }
+        best
+    }
+
+    /// Another limit state than `known` in the same valley of the map: Newton's method from both
+    /// sides, with steps bent away from what is known (deflation: those for the map over the
+    /// squared distance).
+    pub(super) fn deflated(&mut self, known: &State) -> Option<State> {
+        let here = self.node(&known.z)?;
+        let (flat, _) = flattest(here.slope);
+        for start in [1e-3, -1e-3, 0.01, -0.01, 0.05, -0.05] {
+            let Some(mut at) = self.beside(&here, here.x + start * flat) else { continue };
+            for _ in 0..VALLEY_MOST {
+                if at.g.length() < SETTLED {
+                    break;
+                }
+                let step = -at.slope.inverse() * at.g;
+                let away = at.x - here.x;
+                // Of the factor 1 + 1 / |away|^2.
+                let falls =
+                    -2.0 * away.dot(step) / (away.length_squared() * (1.0 + away.length_squared()));
+                let bent = step / (1.0 - falls);
+                let bent = bent.clamp_length_max(DEFLATED_STEP);
+                let Some(next) =
+                    [1.0, 0.3, 0.1].iter().find_map(|t| self.beside(&at, at.x + t * bent))
+                else {
+                    break;
+                };
+                at = next;
+            }
+            let found = self.newton(at.z, 1.0, 15).filter(|found| !same(known, found));
+            if found.is_some() {
+                return found;
+            }
+        }
+        None
+    }
+
+    /// The point of the map at the contact moment `x`, from one whose pressure and slip are close.
+    pub(super) fn beside(&mut self, near: &Node, x: DVec2) -> Option<Node> {
+        let z = self.state_near(x, Some(&near.z))?;
+        self.node(&z)
     }
 
     /// Derivative of `g` at a coupling. Its determinant is positive where the branch starts and

@@ -10,13 +10,14 @@
 
 use nalgebra::{Matrix3, SMatrix, Vector2, Vector3, Vector4};
 
+use super::abreast::{self, Abreasts, Beside};
 use super::branch::{COUPLING_SEARCH, strong};
 use super::equilibrium::{Integrals, Matrix7, Solver, State, Vector7, solve_newton, unknowns};
 use super::pads::{Load, Pads};
 use super::pressure;
 use super::slip;
 use super::solve::{Options, Search, Start, finish};
-use crate::contact::Twist;
+use crate::contact::{ABREAST, Twist};
 use crate::model::Score;
 use crate::request::{Refiner, Separation};
 
@@ -119,7 +120,7 @@ impl FirstStep {
             *r += wanted;
         }
         let slip = -Vector3::new(residual[0], residual[1], residual[2]);
-        let base = [0, 1].map(|k| -residual[3 + k] * self.offset[k]);
+        let base = [-residual[3] * self.offset[0], -residual[4] * self.offset[1]];
         let rows = lever * self.lever_pressure + self.pressure;
         let turned = lever * (self.lever_slip * slip);
         let row = |r: usize| {
@@ -134,8 +135,8 @@ impl FirstStep {
         let ([a, b, e], [c, d, f]) = (row(0), row(1));
         let inverse = 1.0 / (a * d - b * c);
         let tilt = [(e * d - b * f) * inverse, (a * f - e * c) * inverse];
-        let offset =
-            [0, 1].map(|k| base[k] + self.slope[k][0] * tilt[0] + self.slope[k][1] * tilt[1]);
+        let along = |k: usize| base[k] + self.slope[k][0] * tilt[0] + self.slope[k][1] * tilt[1];
+        let offset = [along(0), along(1)];
         let q = Vector4::new(offset[0], offset[1], tilt[0], tilt[1]);
         let v = self.turn * slip - self.turn_pressure * q;
         (residual, Vector7::from([v.x, v.y, v.z, q.x, q.y, q.z, q.w]))
@@ -175,6 +176,7 @@ pub(crate) struct Comparer<'a> {
     solver: Solver<'a>,
     /// Where the last load was left, or somewhere near.
     reached: Integrals,
+    abreast: Box<Abreasts>,
 }
 
 impl<'a> Comparer<'a> {
@@ -188,12 +190,48 @@ impl<'a> Comparer<'a> {
             half_distance: 0.0,
         };
         let solver = Solver::new(pads, none, Refiner::Newton);
-        Self { force, solver, reached: Integrals::default() }
+        Self { force, solver, reached: Integrals::default(), abreast: Box::default() }
     }
 
     /// The state near the last load's on which something was found out.
     pub(crate) fn reached(&mut self) -> Option<Neighbour> {
         Neighbour::new(&mut self.solver, &self.reached)
+    }
+
+    /// As [`Comparer::compare`] of several loads side by side, up to [`ABREAST`], each beside the state
+    /// of another one, as far as bounds answer the question. `None` for those that are to be compared
+    /// by themselves. `patient`: with more work, for those that did not succeed at first.
+    pub(crate) fn several<'n>(
+        &mut self,
+        loads: &[Load],
+        near: impl Fn(usize) -> &'n Neighbour,
+        options: &Options,
+        (question, patient): (Question, bool),
+    ) -> [Option<[f64; 2]>; ABREAST] {
+        let mut found = [None; ABREAST];
+        let count = loads.len().min(ABREAST);
+        // A pad that lifts ends the grip: that is for the solution to say.
+        let ends = options.separation == Separation::Discard;
+        if options.refiner != Refiner::Newton || ends || count == 0 {
+            return found;
+        }
+        let first = |i: usize| {
+            let (load, near) = (&loads[i], near(i));
+            let (residual, step) = near.first.of(load);
+            Beside { load, z: &near.z, residual, step }
+        };
+        abreast::beside(self.solver.pads, count, first, question, patient, &mut self.abreast);
+        for (i, load) in loads.iter().enumerate().take(count) {
+            let asked = load.size > 0.0 && load.normal[0] > 0.0 && load.normal[1] > 0.0;
+            found[i] = self.abreast.bounds(i).filter(|_| asked);
+        }
+        found
+    }
+
+    /// The state at which one of several loads was left.
+    pub(crate) fn reached_by(&mut self, one: usize) -> Option<Neighbour> {
+        let integrals = self.abreast.integrals(one);
+        Neighbour::new(&mut self.solver, &integrals)
     }
 
     /// What is asked about the `mu_s` of a load, which must have an in-plane part and press both

@@ -75,11 +75,11 @@ pub(super) struct Node {
 pub(super) struct Integrals {
     pub(super) z: Vector7,
     /// Of the dissipation, per face.
-    gradients: [Vector3<f64>; 2],
-    hessians: [Matrix3<f64>; 2],
+    pub(super) gradients: [Vector3<f64>; 2],
+    pub(super) hessians: [Matrix3<f64>; 2],
     /// `d gradient_k / d q_j` for `j` = own offset, a1, a2.
-    by_pressure: [[Vector3<f64>; 3]; 2],
-    moments: [[f64; 6]; 2],
+    pub(super) by_pressure: [[Vector3<f64>; 3]; 2],
+    pub(super) moments: [[f64; 6]; 2],
 }
 
 /// Solves one contact pair under one load; keeps its scratch memory and counts its work.

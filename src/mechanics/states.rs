@@ -164,21 +164,17 @@ impl<'s, 'a> Map<'s, 'a> {
     }
 
     pub(super) fn look(&mut self, x: DVec2, near: Option<&Node>) -> Option<Node> {
-        let z = match near {
-            Some(near) => self.solver.state_near(x, Some(&near.z)),
-            None => self.solver.state_at(x, None),
-        }?;
-        self.solver.node(&z)
+        match near {
+            Some(near) => self.solver.beside(near, x),
+            None => self.solver.state_at(x, None).and_then(|z| self.solver.node(&z)),
+        }
     }
 
     /// Adds the zeros found to `states`; whether their signs add up.
     fn search(&mut self, states: &mut Vec<State>) -> bool {
         self.cells(BEND, MOST_NODES, states);
         self.lowest(states);
-        for known in states.clone() {
-            let partner = self.solver.partner(&known);
-            states.extend(partner.filter(|found| !states.iter().any(|state| same(state, found))));
-        }
+        self.partners(states);
         let open = self.beyond(states);
         // On slivers the outermost points can be beyond what doubles resolve: then the next ring
         // in.
@@ -190,11 +186,22 @@ impl<'s, 'a> Map<'s, 'a> {
         if self.signs(states, ring) != turns {
             self.cells(BEND_AGAIN, 2 * MOST_NODES, states);
         }
+        if states.is_empty() {
+            self.valleys(states);
+        }
         if self.signs(states, ring) != turns {
             self.hidden(states);
         }
         let open = open || ring < RINGS && self.leads_out(ring);
         ring >= WITHIN && !open && self.signs(states, ring) == turns
+    }
+
+    /// Adds the zeros beside those known on the other side of a fold.
+    fn partners(&mut self, states: &mut Vec<State>) {
+        for known in states.clone() {
+            let partner = self.solver.partner(&known);
+            states.extend(partner.filter(|found| !states.iter().any(|state| same(state, found))));
+        }
     }
 
     /// Goes through the mesh, coarse cells first, so that the budget is spent evenly.
@@ -258,6 +265,28 @@ impl<'s, 'a> Map<'s, 'a> {
     /// Newton's method from the points with the smallest values.
     fn lowest(&mut self, states: &mut Vec<State>) {
         self.starts = 0;
+        for node in self.lowest_nodes() {
+            self.start(&node, states);
+        }
+    }
+
+    /// Zeros in the valleys of the map's length, from the points with the smallest values down to
+    /// the valleys' floors. A pair of zeros that was just born lies on one, and neither cells nor
+    /// Newton's method, which stops at the fold beside them, need have seen it.
+    fn valleys(&mut self, states: &mut Vec<State>) {
+        for node in self.lowest_nodes() {
+            let floor = self.solver.floor(node);
+            self.starts = 0;
+            self.start(&floor, states);
+        }
+        for known in states.clone() {
+            let other = self.solver.deflated(&known);
+            states.extend(other.filter(|found| !states.iter().any(|state| same(state, found))));
+        }
+    }
+
+    /// Points with the smallest values, apart from each other.
+    fn lowest_nodes(&self) -> Vec<Node> {
         let mut nodes: Vec<Node> = self.nodes.values().flatten().copied().collect();
         nodes.sort_by(|a, b| {
             let value = |node: &Node| node.g.length();
@@ -275,9 +304,7 @@ impl<'s, 'a> Map<'s, 'a> {
                 }
             }
         }
-        for node in chosen {
-            self.start(&node, states);
-        }
+        chosen
     }
 
     /// Zeros where the value on the outermost ring is least, from there to the rim.

@@ -57,6 +57,18 @@ fn two_states_on_the_last_of_a_contact_are_seen() {
     }
 }
 
+/// Found by [`many_other_kinds`]: a pair of states 0.12 % apart, just born at a fold, whose signs cancel.
+/// Without either the load would be refused.
+#[test]
+fn a_pair_just_born_is_seen() {
+    let path = crate::support::root().join("tests/mechanics/cases/born_pair.json");
+    let case = case::read(&path).unwrap().remove(0);
+    let found = states_of_an_ambiguous_one(&case, "born_pair");
+    let expected = [0.0673765818382913, 0.06745679103157741];
+    let same = |(a, b): (&f64, &f64)| (a / b - 1.0).abs() < 1e-8;
+    assert!(found.len() == 2 && found.iter().zip(&expected).all(same), "{found:?}");
+}
+
 /// Found by [`many_other_kinds`]: on narrow contacts there are several states far from each other at
 /// couplings down to 0.03 of the width.
 #[test]

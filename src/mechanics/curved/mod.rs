@@ -15,11 +15,14 @@ mod screen;
 mod slip;
 mod space;
 
+use std::sync::OnceLock;
+
 use glam::DVec2;
 use nalgebra::Vector5;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::surface::{Piece, Surfaces};
+use crate::contact::quadric::Quadratic;
+use crate::contact::surface::{Field, Piece, Surfaces};
 use crate::error::{Error, Result};
 use crate::model::{Face as Side, Score, Slip, Status, Wrench};
 
@@ -100,6 +103,8 @@ pub struct Pads {
     /// Smallest radius of the round pieces of each face, and the layer's thickness, for notes.
     radii: [Option<f64>; 2],
     layer: Option<f64>,
+    /// Of the squeeze that was asked for first: its force, the distance, and what it says.
+    squeezed: OnceLock<(f64, f64, [Rotation; 2])>,
 }
 
 /// A face pressed without a load.
@@ -138,7 +143,26 @@ impl Pads {
             ],
             radii: pieces.map(radius),
             layer: surfaces.layer,
+            squeezed: OnceLock::new(),
         }
+    }
+
+    /// [`space::rotations`] under a squeeze with `force` \[N\] that presses the faces like this.
+    fn rotations(&self, pressed: &[Pressed<'_>; 2], distance: f64, force: f64) -> [Rotation; 2] {
+        let found = || space::rotations([&pressed[0], &pressed[1]], distance);
+        let &(known_force, known_distance, known) =
+            self.squeezed.get_or_init(|| (force, distance, found()));
+        if known_force == force && known_distance == distance { known } else { found() }
+    }
+
+    /// Whether each face is one piece of a cylinder or a sphere: what is free under one squeeze is so
+    /// under all.
+    fn plainly_round(&self) -> bool {
+        let round = |field: &Field| {
+            let Quadratic { g, l, .. } = field.gap;
+            g == DVec2::ZERO && l != DVec2::ZERO && (l.x == 0.0 || l.y == 0.0 || l.x == l.y)
+        };
+        self.faces.iter().all(|face| matches!(&face.fields[..], [field] if round(field)))
     }
 
     /// Distance of the farthest corner of the pieces from the grip origin \[m\].
@@ -201,9 +225,9 @@ impl Pads {
     /// squeeze with `force` \[N\]: none, one or two unit vectors.
     pub fn free_axes(&self, distance: f64, force: f64) -> Vec<DVec2> {
         let pressed = [0, 1].map(|k| self.faces[k].carry(force, DVec2::ZERO, None));
-        let [Some(one), Some(two)] = &pressed else { return Vec::new() };
+        let [Some(one), Some(two)] = pressed else { return Vec::new() };
         let free = |rotation: &Rotation| matches!(rotation.kind, Kind::Free | Kind::Facets(_));
-        let rotations = space::rotations([one, two], distance);
+        let rotations = self.rotations(&[one, two], distance, force);
         rotations.iter().filter(|rotation| free(rotation)).map(|rotation| rotation.axis).collect()
     }
 }

@@ -9,7 +9,7 @@ use glam::DVec2;
 use super::equilibrium::Problem;
 use super::face::Pressed;
 use super::joint::{Found, Joint, Mode, Place, Reached};
-use super::space::{self, Kind};
+use super::space::{self, Kind, Rotation};
 use super::{Asked, Case, NO_LEVER, Pads, slip, strong};
 use crate::model::Wrench;
 
@@ -60,23 +60,28 @@ impl Pads {
             Some([one, self.faces[1].carry(force - 0.5 * pull, DVec2::ZERO, None)?])
         };
         let none = NO_LEVER * force * distance.abs();
-        let free = |pressed: &[Pressed<'_>; 2]| {
-            let rotations = space::rotations([&pressed[0], &pressed[1]], distance);
+        let free = |rotations: [Rotation; 2]| {
             let free = rotations.map(|rotation| match rotation.kind {
                 Kind::Free | Kind::Facets(_) => Some(true),
                 Kind::Held => Some(false),
                 // As good as one axis, or rolling out: free under any load.
                 Kind::Nearly(stiffness) => (stiffness <= none).then_some(true),
             });
-            Some((rotations, [free[0]?, free[1]?]))
+            Some([free[0]?, free[1]?])
         };
         let pressed = squeeze(0.0)?;
-        let (rotations, is_free) = free(&pressed)?;
+        let rotations = self.rotations(&pressed, distance, force);
+        let is_free = free(rotations)?;
         // The same rotations are free however much one pad is pulled off.
         let pulls = wrenches.iter().map(|wrench| wrench.force.z).filter(|z| z.abs() < 2.0 * force);
         let (low, high) = pulls.fold((0.0, 0.0), |(a, b): (f64, f64), z| (a.min(z), b.max(z)));
-        for pull in [low, high].into_iter().filter(|pull| pull.abs() > 1e-9 * force) {
-            let (others, other_free) = free(&squeeze(pull)?)?;
+        let on_axis = rotations.iter().any(|rotation| rotation.kind == Kind::Free);
+        let nearly = rotations.iter().any(|rotation| matches!(rotation.kind, Kind::Nearly(_)));
+        let always = on_axis && !nearly && self.plainly_round();
+        for pull in [low, high].into_iter().filter(|pull| !always && pull.abs() > 1e-9 * force) {
+            let [one, two] = squeeze(pull)?;
+            let others = space::rotations([&one, &two], distance);
+            let other_free = free(others)?;
             let same = (0..2).all(|i| {
                 let apart = rotations[i].axis.perp_dot(others[i].axis).abs();
                 is_free[i] == other_free[i] && (is_free[0] == is_free[1] || apart < SAME_AXIS)

@@ -5,7 +5,7 @@ use glam::{DAffine2, DMat3, DVec2, DVec3};
 
 use super::places::Edge;
 use super::shapes::{project, to_site};
-use crate::contact::surface::{cut, mapped, pressed};
+use crate::contact::surface::{cut, mapped, pressed, spot};
 use crate::geometry::polygon::{self, Bounds2};
 use crate::geometry::{HalfPlane, clip_ring_half_plane, even_odd, intersect_convex};
 use crate::gripper::{Jaws, Layer};
@@ -137,8 +137,16 @@ impl Relief {
             Jaws::Straight => self.deltas,
             Jaws::Exchanged => [self.deltas[1], self.deltas[0]],
         };
-        let pads = Pads::new(surfaces).ok();
-        let deltas = pads.and_then(|pads| pads.compressions(self.force, near));
+        let whole = |pieces: &[Piece], stiffness: f64| match pieces {
+            [piece] => spot(piece, stiffness, self.force),
+            _ => None,
+        };
+        let [k_i, k_ii] = surfaces.stiffness;
+        let whole = (whole(&surfaces.face_i, k_i), whole(&surfaces.face_ii, k_ii));
+        let deltas = match whole {
+            (Some(one), Some(two)) => Some([one, two]),
+            _ => Pads::new(surfaces).ok().and_then(|pads| pads.compressions(self.force, near)),
+        };
         let Some([one, two]) = deltas else { return Contact::default() };
         let outline = |pieces: &[Piece], delta: f64| -> Patch {
             pieces.iter().flat_map(|piece| pressed(piece, delta)).collect()
