@@ -13,7 +13,8 @@
 #   2 check     both kernels against the processor's and against double precision; sizes, order,
 #               loss of the device
 #     suite     the test suite of both backends, with the reference cases where they lie beside it
-#   3 sweep     rates by twists, loads and contacts; one core, all cores, adapter; every step apart
+#   3 sweep     rates by twists, loads and contacts; one core, all cores, adapter; every step and
+#               the bytes of a grip apart
 #   4 commands  whole plans on processor and adapter, compared to 1e-9 and in order
 #   5 entry     all of it as one entry
 #

@@ -114,6 +114,7 @@ fn loads(criterion: &mut Criterion) {
                     distance: 0.03,
                     force: 40.0,
                     wrenches: &all[..count],
+                    pose: None,
                 }],
             };
             group.throughput(Throughput::Elements(count as u64));
@@ -125,7 +126,7 @@ fn loads(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Grips with a contact each and 500 loads: seeds, and the worst load solved. Elements: grips.
+/// Grips with a contact each and 500 loads: seeds of what can be the worst, and that solved. Elements: grips.
 fn grips(criterion: &mut Criterion) {
     let mut group = group(criterion, "grips of 500 loads, a contact each");
     let (loads, set) = (wrenches(500), SeedSet::default());
@@ -138,12 +139,13 @@ fn grips(criterion: &mut Criterion) {
                 distance: 0.03,
                 force: 40.0,
                 wrenches: &loads,
+                pose: None,
             });
             let batch = Batch { problems: problems.collect() };
             group.throughput(Throughput::Elements(count as u64));
             group.bench_function(
                 BenchmarkId::new(format!("seed, {}", place.name), count),
-                |bencher| bencher.iter(|| place.backend.seed(&batch, &set)),
+                |bencher| bencher.iter(|| place.backend.survivors(&batch, &set)),
             );
             group.bench_function(
                 BenchmarkId::new(format!("score, {}", place.name), count),
@@ -167,6 +169,7 @@ fn set_sizes(criterion: &mut Criterion) {
         distance: 0.03,
         force: 40.0,
         wrenches: &loads,
+        pose: None,
     });
     let batch = Batch { problems: problems.collect() };
     for frequency in [2, 3, 4, 6, 8, 12] {

@@ -35,7 +35,7 @@ fn main() -> Result<()> {
     println!("{:?}, mu_s {:?}, {:?}", score.status, score.mu_s, score.slip);
 
     // Many grips under many loads: which is the worst of each, and what friction it needs.
-    let problem = Problem { contact: &contact, distance, force, wrenches: &wrenches };
+    let problem = Problem { contact: &contact, distance, force, wrenches: &wrenches, pose: None };
     let wider = Problem { distance: 0.06, ..problem };
     let batch = Batch { problems: vec![problem, wider] };
     let scored = Backend::Cpu.score(&batch, &SeedSet::default(), &ScoreOptions::default())?;

@@ -3,7 +3,7 @@
 
 @group(0) @binding(0) var<storage, read> contacts: array<ContactHeader>;
 @group(0) @binding(1) var<storage, read> edges: array<vec4<f32>>;
-@group(0) @binding(2) var<storage, read> twists: array<vec4<f32>>;
+@group(0) @binding(2) var<storage, read> twists: array<TwistRecord>;
 @group(0) @binding(3) var<storage, read_write> basis_out: array<vec4<f32>>;
 @group(0) @binding(4) var<uniform> gauss: array<vec4<f32>, GAUSS_POINTS>;
 
@@ -132,7 +132,7 @@ fn fill_basis(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var face = 0u; face < header.faces; face++) {
         let first = select(header.edges_ii, header.edges_i, face == 0u);
         let end = select(header.edges_end, header.edges_ii, face == 0u);
-        let v = twists[k].xyz;
+        let v = twists[k].twist.xyz;
         let g = basis(first, end, header.radius, v);
         let out = header.basis + (face * count + k) * BASIS;
         basis_out[out] = vec4(g.one, dot(v, g.one));

@@ -17,6 +17,16 @@ override OUT_OF_RANGE: f32;
 override BOUNDED: u32;
 override UNBOUNDED: u32;
 override COUPLED: u32;
+override OPEN: u32;
+override KINDS: u32;
+override F32_TOLERANCE: f32;
+override RANGE: f32;
+override LEAST_LOAD: f32;
+override MOST_PULL: f32;
+override LOAD_ROUNDING: f32;
+override LOAD_MARGIN: f32;
+override SWAY_CONGRUENT: f32;
+override SWAY_DIFFERENT: f32;
 // Dispatches are two-dimensional: a workgroup's number is x + GRID y.
 override GRID: u32;
 
@@ -24,6 +34,9 @@ const BASIS = 3u;
 const RING = 6u;
 const GAUSS_POINTS = 6u;
 const NEGATED = 0x80000000u;
+// Loads of a grip that are compared at a time, and the words that hold a bit of each.
+const WINDOW = 1024u;
+const WORDS = 32u;
 const LARGEST = 3.4028234e38;
 
 struct ContactHeader {
@@ -44,6 +57,38 @@ struct ContactHeader {
     variation_slope: vec2<f32>,
     softness: f32,
     spread: f32,
+    tilt: f32,
+    slowest: f32,
+    quickest: f32,
+    padding: u32,
+}
+
+struct TwistRecord {
+    twist: vec4<f32>,
+    ring: array<u32, RING>,
+    padding: array<u32, 2>,
+}
+
+struct CaseRecord {
+    force: vec3<f32>,
+    force_size: f32,
+    moment: vec3<f32>,
+    moment_size: f32,
+}
+
+struct GripRecord {
+    row_1: vec3<f32>,
+    force: f32,
+    row_2: vec3<f32>,
+    moment: f32,
+    row_3: vec3<f32>,
+    distance: f32,
+    lever: vec3<f32>,
+    arm: f32,
+    contact: u32,
+    first: u32,
+    count: u32,
+    every: u32,
 }
 
 struct LoadRecord {
@@ -55,13 +100,6 @@ struct LoadRecord {
     distance: f32,
 }
 
-struct GroupRecord {
-    contact: u32,
-    first: u32,
-    count: u32,
-    padding: u32,
-}
-
 struct SeedRecord {
     twist: vec3<f32>,
     lower: f32,
@@ -69,4 +107,17 @@ struct SeedRecord {
     status: u32,
     best: u32,
     padding: u32,
+}
+
+struct OutcomeRecord {
+    entries: u32,
+    floor: f32,
+}
+
+struct FoundRecord {
+    words: vec4<u32>,
+    upper: f32,
+    kind: u32,
+    load: u32,
+    grip: u32,
 }

@@ -1,15 +1,10 @@
 // The search for the best twist of one load: twin of src/backend/search.rs, same functions in the same order; there is
-// said what they compute. One workgroup takes a group of loads on one contact, one invocation per load; the twists
-// pass through workgroup memory in tiles.
+// said what they compute. One invocation takes one load; the twists pass through workgroup memory in tiles.
 
 @group(0) @binding(0) var<storage, read> contacts: array<ContactHeader>;
 @group(0) @binding(1) var<storage, read> edges: array<vec4<f32>>;
-@group(0) @binding(2) var<storage, read> twists: array<vec4<f32>>;
-@group(0) @binding(3) var<storage, read> rings: array<u32>;
-@group(0) @binding(4) var<storage, read> basis: array<vec4<f32>>;
-@group(0) @binding(5) var<storage, read> loads: array<LoadRecord>;
-@group(0) @binding(6) var<storage, read> groups: array<GroupRecord>;
-@group(0) @binding(7) var<storage, read_write> seeds: array<SeedRecord>;
+@group(0) @binding(2) var<storage, read> twists: array<TwistRecord>;
+@group(0) @binding(3) var<storage, read> basis: array<vec4<f32>>;
 
 // Congruent faces: the twist over its dissipation. Otherwise the twist, and the dissipation's parts per pressure.
 var<workgroup> tile_twist: array<vec4<f32>, GROUP>;
@@ -168,19 +163,18 @@ struct Corner {
 // Bound and interpolated twist from the triangles round the best twist. In each triangle w = a ga + b gb + c gc by
 // Cramer's rule; two of its numerators are products with ga x w.
 fn corner(header: ContactHeader, load: LoadRecord, p: Planes, best: u32) -> Corner {
-    let own = twists[best].xyz;
+    let own = twists[best].twist.xyz;
     let sense = select(1.0, -1.0, dot(load.wrench, own) < 0.0);
     let w = sense * load.wrench;
-    let ring = RING * best;
     let ga = support(header, p, best);
     let u = cross(ga, w);
     var upper = LARGEST;
     var triangle = vec3(best);
     var share = vec3(0.0);
-    var here = rings[ring];
+    var here = twists[best].ring[0];
     var gb = support(header, p, here);
     for (var i = 0u; i < RING; i++) {
-        let next = rings[ring + (i + 1u) % RING];
+        let next = twists[best].ring[(i + 1u) % RING];
         let gc = support(header, p, next);
         let normal = cross(gb, gc);
         let det = dot(ga, normal);
@@ -199,7 +193,7 @@ fn corner(header: ContactHeader, load: LoadRecord, p: Planes, best: u32) -> Corn
     }
     share = sense * share * vec3(1.0, sign_of(triangle.y), sign_of(triangle.z));
     triangle = triangle & vec3(~NEGATED);
-    var twist = share.x * twists[triangle.x].xyz + share.y * twists[triangle.y].xyz + share.z * twists[triangle.z].xyz;
+    var twist = share.x * twists[triangle.x].twist.xyz + share.y * twists[triangle.y].twist.xyz + share.z * twists[triangle.z].twist.xyz;
     let length = sqrt(dot(twist, twist));
     if length > 0.5 {
         twist = twist / length;
@@ -236,17 +230,15 @@ fn finish(header: ContactHeader, load: LoadRecord, p: Planes, best: u32, value: 
     return SeedRecord(found.twist, lower, upper, status, best, 0u);
 }
 
-@compute @workgroup_size(GROUP)
-fn search(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let number = workgroup.x + GRID * workgroup.y;
-    // Workgroups beyond the last repeat it without writing: every barrier is reached by all.
-    let group = groups[min(number, arrayLength(&groups) - 1u)];
-    let wanted = number < arrayLength(&groups) && lane < group.count;
-    let header = contacts[group.contact];
-    let index = group.first + min(lane, group.count - 1u);
-    let load = loads[index];
+// A twist and the value of a load there.
+struct Best {
+    twist: u32,
+    value: f32,
+}
+
+// The best twist of the load of each invocation of a workgroup, all on one contact.
+fn search(header: ContactHeader, load: LoadRecord, p: Planes, lane: u32) -> Best {
     let w = load.wrench;
-    let p = planes(header, load);
     let pressure = vec4(p.at_i, p.at_ii, p.slope);
     let count = arrayLength(&twists);
     let congruent = header.faces == 1u;
@@ -260,9 +252,9 @@ fn search(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
         if k < count {
             let one = gradient(header, 0u, 0u, k).w;
             if congruent {
-                tile_twist[lane] = twists[k] / (mean * one);
+                tile_twist[lane] = twists[k].twist / (mean * one);
             } else {
-                tile_twist[lane] = twists[k];
+                tile_twist[lane] = twists[k].twist;
                 tile_parts[lane] = vec4(
                     one,
                     gradient(header, 1u, 0u, k).w,
@@ -294,7 +286,5 @@ fn search(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
         }
         workgroupBarrier();
     }
-    if wanted {
-        seeds[index] = finish(header, load, p, best, value / least);
-    }
+    return Best(best, value / least);
 }

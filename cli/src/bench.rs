@@ -124,6 +124,17 @@ struct Measured {
     runs: u32,
     seeds: Vec<Seed>,
     scored: Vec<Scored>,
+    traffic: Option<Traffic>,
+}
+
+/// What goes to a graphics processor and comes back, per grip.
+struct Traffic {
+    bytes_up: f64,
+    bytes_down: f64,
+    /// Loads that can be the worst, and windows of loads left to the processor.
+    entries: f64,
+    /// Seconds of the processor: records made, answers fetched and spread.
+    host: f64,
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
@@ -223,6 +234,10 @@ fn figures(
         "exact_solves_per_second": (row.task != Task::Seed).then(|| per_second(solved)),
         "exact_solves_per_grip": per_grip(solved),
         "compared_per_grip": per_grip(compared),
+        "bytes_up_per_grip": measured.traffic.as_ref().map(|traffic| traffic.bytes_up),
+        "bytes_down_per_grip": measured.traffic.as_ref().map(|traffic| traffic.bytes_down),
+        "host_seconds_per_grip": measured.traffic.as_ref().map(|traffic| traffic.host),
+        "entries_per_grip": measured.traffic.as_ref().map(|traffic| traffic.entries),
         "agrees_with_cpu": check.map(|check| check.is_ok()),
         "difference": check.map(|check| match check { Ok(most) => json!(most), Err(why) => json!(why) }),
     })
@@ -239,6 +254,7 @@ fn table(rows: &[serde_json::Value]) -> comfy_table::Table {
         "exact solves/s",
         "solved/grip",
         "compared/grip",
+        "bytes/grip up, down",
         "agrees",
     ]);
     for row in rows {
@@ -263,6 +279,9 @@ fn table(rows: &[serde_json::Value]) -> comfy_table::Table {
             number("exact_solves_per_second"),
             share("exact_solves_per_grip"),
             share("compared_per_grip"),
+            row["bytes_up_per_grip"].as_f64().map_or_else(String::new, |up| {
+                format!("{up:.0}, {:.0}", row["bytes_down_per_grip"].as_f64().unwrap_or(0.0))
+            }),
             agrees,
         ]);
     }
@@ -308,7 +327,36 @@ fn measure(
         }
         runs += 1;
     }
-    Ok(Measured { seconds: started.elapsed().as_secs_f64(), runs, seeds, scored })
+    let seconds = started.elapsed().as_secs_f64();
+    let traffic = traffic(backend, row, set)?;
+    Ok(Measured { seconds, runs, seeds, scored, traffic })
+}
+
+/// By the clock of one more run, with the list of loads on the device as it is for all chunks but the
+/// first.
+#[cfg(feature = "gpu")]
+fn traffic(backend: &Backend, row: &Row, set: &SeedSet) -> anyhow::Result<Option<Traffic>> {
+    let Backend::Gpu(gpu) = backend else { return Ok(None) };
+    if matches!(row.task, Task::Score(Polish::All)) {
+        return Ok(None);
+    }
+    gpu.start_clock()?;
+    backend.survivors(&row.workload.batch(), set)?;
+    let chunks = gpu.stop_clock().unwrap_or_default().chunks;
+    let grips = row.workload.contacts.len().max(1) as f64;
+    // Not what sending takes: a software adapter holds it up.
+    let steps = chunks.iter().flat_map(|chunk| [chunk.make, chunk.fetch, chunk.spread]);
+    Ok(Some(Traffic {
+        host: steps.map(|span| span.seconds()).sum::<f64>() / grips,
+        bytes_up: chunks.iter().map(|chunk| chunk.bytes_up).sum::<u64>() as f64 / grips,
+        bytes_down: chunks.iter().map(|chunk| chunk.bytes_down).sum::<u64>() as f64 / grips,
+        entries: chunks.iter().map(|chunk| chunk.entries).sum::<usize>() as f64 / grips,
+    }))
+}
+
+#[cfg(not(feature = "gpu"))]
+fn traffic(_: &Backend, _: &Row, _: &SeedSet) -> anyhow::Result<Option<Traffic>> {
+    Ok(None)
 }
 
 /// Largest relative difference, or what differs beyond the tolerance.

@@ -12,7 +12,7 @@ use anyhow::{Context, bail};
 use clap::Args as ClapArgs;
 use glam::{DMat3, DVec3};
 use gripfast::backend::{
-    Backend, Batch, CurvedProblem, Problem, ScoreOptions, Scored, SeedSet, score_curved,
+    Backend, Batch, CurvedProblem, Pose, Problem, ScoreOptions, Scored, SeedSet, score_curved,
 };
 use gripfast::error::Error;
 use gripfast::load::{LoadSet, wrench_in_grip};
@@ -85,6 +85,8 @@ struct Entry {
 
 enum Wrenches {
     Own(Vec<Wrench>),
+    /// Those on the part, which all grips of a result share.
+    OnPart(Arc<[Wrench]>, Pose),
     Common,
 }
 
@@ -286,6 +288,7 @@ impl Job<'_> {
         let mut take = |entry: Entry, out: &mut dyn Write| -> anyhow::Result<()> {
             block.loads += match &entry.wrenches {
                 Wrenches::Own(own) => own.len(),
+                Wrenches::OnPart(shared, _) => shared.len(),
                 Wrenches::Common => self.common.len(),
             };
             block.entries.push(entry);
@@ -328,20 +331,21 @@ impl Job<'_> {
             }
             Source::Result(set) => {
                 let force = self.force.unwrap_or(set.provenance.resolved.force.0);
-                let own: Vec<Wrench> = set.loads.iter().map(|load| load.wrench).collect();
-                let loads = if self.given { self.common } else { &own };
+                let own = set.loads.iter().map(|load| load.wrench);
+                let loads: Arc<[Wrench]> =
+                    if self.given { self.common.into() } else { own.collect() };
+                let centre_of_mass = set.part.mass.centre_of_mass;
                 for ranked in set.grips {
                     let grip = ranked.grip;
-                    let wrenches = loads
-                        .iter()
-                        .map(|wrench| {
-                            wrench_in_grip(
-                                wrench,
-                                set.part.mass.centre_of_mass,
-                                &grip.part_from_grip,
-                            )
-                        })
-                        .collect();
+                    let pose = Pose { centre_of_mass, part_from_grip: grip.part_from_grip };
+                    let wrenches = if grip.surfaces.is_none() {
+                        Wrenches::OnPart(Arc::clone(&loads), pose)
+                    } else {
+                        let seen = |wrench: &Wrench| {
+                            wrench_in_grip(wrench, centre_of_mass, &grip.part_from_grip)
+                        };
+                        Wrenches::Own(loads.iter().map(seen).collect())
+                    };
                     let (id, distance) = (Some(grip.id.into()), grip.distance());
                     let entry = Entry {
                         id,
@@ -352,7 +356,7 @@ impl Job<'_> {
                             .transpose()?,
                         distance,
                         force,
-                        wrenches: Wrenches::Own(wrenches),
+                        wrenches,
                     };
                     take(entry, out)?;
                 }
@@ -403,6 +407,7 @@ impl Job<'_> {
     fn wrenches<'e>(&'e self, entry: &'e Entry) -> &'e [Wrench] {
         match &entry.wrenches {
             Wrenches::Own(own) => own,
+            Wrenches::OnPart(shared, _) => shared,
             Wrenches::Common => self.common,
         }
     }
@@ -421,6 +426,10 @@ impl Job<'_> {
             distance: entry.distance,
             force: entry.force,
             wrenches: self.wrenches(entry),
+            pose: match &entry.wrenches {
+                Wrenches::OnPart(_, pose) => Some(*pose),
+                _ => None,
+            },
         });
         let batch = Batch { problems: problems.collect() };
         let curved: Vec<CurvedProblem<'_>> = entries
@@ -451,6 +460,7 @@ impl Job<'_> {
             counts.compared += compared as u64;
             counts.loads += match &entry.wrenches {
                 Wrenches::Own(own) => own.len() as u64,
+                Wrenches::OnPart(shared, _) => shared.len() as u64,
                 Wrenches::Common => self.common.len() as u64,
             };
             let Some((load, score)) = worst else { continue };

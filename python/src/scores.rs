@@ -58,6 +58,7 @@ pub(crate) fn score<'py>(
             distance: scales[grip].0,
             force: scales[grip].1,
             wrenches: &wrenches[grip],
+            pose: None,
         };
         let batch = Batch { problems: (0..count).map(problem).collect() };
         let options = ScoreOptions { polish: Polish::All, ..ScoreOptions::default() };

@@ -1,47 +1,74 @@
-//! The kernels on the processor: contacts in parallel, loads in lanes. Answers depend neither on
-//! the number of threads nor on the instruction set.
-
-use rayon::prelude::*;
+//! The search on the processor: loads in lanes. Answers depend neither on the number of threads nor
+//! on the instruction set.
 
 use super::lanes::LANES;
-use super::layout::{GroupRecord, LoadRecord, SeedRecord};
-use super::prepare::Chunk;
+use super::layout::{LoadRecord, SeedRecord};
+use super::prepare::{Records, not_searched};
+use super::problem::{Problem, Seed, SeedStatus, check_load};
 use super::search::Field;
 use super::seeds::SeedSet;
 use super::table::Table;
 use crate::contact::widest;
+use crate::error::Result;
 
-/// Loads that one task searches at least.
-const TASK: usize = 1 << 10;
+/// Loads of one problem, rising, with their seeds.
+pub(super) type Found = Vec<(u32, Seed)>;
 
-/// Seeds of every load of the chunk, in its order.
-pub(crate) fn run(chunk: &Chunk, seeds: &SeedSet) -> Vec<SeedRecord> {
-    let mut records = vec![SeedRecord::default(); chunk.loads.len()];
-    // Groups are in the order of contacts: cut them, and the records, contact by contact.
-    let mut jobs = Vec::with_capacity(chunk.contacts.len());
-    let (mut groups, mut loads, mut rest) =
-        (chunk.groups.as_slice(), chunk.loads.as_slice(), records.as_mut_slice());
-    for (index, header) in chunk.contacts.iter().enumerate() {
-        let (mine, others) =
-            groups.split_at(groups.partition_point(|group| group.contact as usize <= index));
-        let count = mine.iter().map(|group: &GroupRecord| group.count as usize).sum();
-        let (own, later) = loads.split_at(count);
-        let (out, remaining) = rest.split_at_mut(count);
-        (groups, loads, rest) = (others, later, remaining);
-        jobs.push((header, own, out));
+/// A contact on which loads are searched.
+pub(super) struct Searched<'a> {
+    pub(super) records: &'a Records,
+    pub(super) seeds: &'a SeedSet,
+    pub(super) table: Table<'a>,
+}
+
+impl<'a> Searched<'a> {
+    pub(super) fn new(records: &'a Records, seeds: &'a SeedSet) -> Self {
+        let table = Table::new(&records.header, records.faces(), seeds);
+        Self { records, seeds, table }
     }
-    jobs.into_par_iter().for_each(|(header, loads, out)| {
-        let face = |first: u32, end: u32| &chunk.edges[first as usize..end as usize];
-        let edges =
-            [face(header.edges_i, header.edges_ii), face(header.edges_ii, header.edges_end)];
-        let table = Table::new(header, edges, seeds);
-        let field = Field { header, edges, table: &table, rings: seeds.rings() };
-        loads
-            .par_chunks(TASK)
-            .zip(out.par_chunks_mut(TASK))
-            .for_each(|(loads, out)| search(&field, loads, out));
-    });
-    records
+
+    pub(super) fn field(&self) -> Field<'_> {
+        Field {
+            header: &self.records.header,
+            edges: self.records.faces(),
+            table: &self.table,
+            rings: self.seeds.rings(),
+        }
+    }
+
+    /// Some loads of the problem with this `index`, with their seeds.
+    ///
+    /// # Errors
+    /// A bad value for a load that is not finite.
+    pub(super) fn found(
+        &self,
+        problem: &Problem<'_>,
+        index: usize,
+        loads: impl Iterator<Item = usize>,
+    ) -> Result<Found> {
+        let mut found = Found::new();
+        let mut searched: Vec<(usize, f64)> = Vec::new();
+        let mut records: Vec<LoadRecord> = Vec::new();
+        for load in loads {
+            let wrench = &problem.wrench(load);
+            check_load((load, wrench), index)?;
+            let seed = match self.records.load(problem, wrench) {
+                Ok((record, scale)) => {
+                    searched.push((found.len(), scale));
+                    records.push(record);
+                    not_searched(SeedStatus::NoContact)
+                }
+                Err(status) => not_searched(status),
+            };
+            found.push((load as u32, seed));
+        }
+        let mut answers = vec![SeedRecord::default(); records.len()];
+        search(&self.field(), &records, &mut answers);
+        for ((place, scale), record) in searched.into_iter().zip(&answers) {
+            found[place].1 = self.records.answer(record, scale)?;
+        }
+        Ok(found)
+    }
 }
 
 widest! {
@@ -92,8 +119,13 @@ mod tests {
                 face_i: rectangle(0.01, 0.008, 0.0),
                 face_ii: rectangle(0.01 - shift, 0.008, -shift),
             });
-            let problem =
-                Problem { contact: &contact, distance: 0.02, force: 40.0, wrenches: &wrenches };
+            let problem = Problem {
+                contact: &contact,
+                distance: 0.02,
+                force: 40.0,
+                wrenches: &wrenches,
+                pose: None,
+            };
             let prepared = Prepared::new(&contact).records.unwrap();
             let loads: Vec<LoadRecord> =
                 wrenches.iter().map(|wrench| prepared.load(&problem, wrench).unwrap().0).collect();

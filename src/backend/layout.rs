@@ -6,9 +6,14 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// Loads that share a contact and are searched together: the workgroup size of the search, and the
-/// number of twists that one workgroup holds in its memory at a time.
+/// Loads of a grip that are searched together: the workgroup size of the search, and the number of
+/// twists that one workgroup holds in its memory at a time.
 pub const GROUP: usize = 64;
+
+/// Loads of a grip whose upper bounds a workgroup holds in its memory at a time (12 of the 16 KiB
+/// that every implementation has): they are compared with the best lower bound of these and those
+/// before.
+pub const WINDOW: usize = 1024;
 
 /// Workgroup size of the basis kernel: consecutive twists of one contact.
 pub const BASIS_GROUP: usize = 64;
@@ -70,6 +75,38 @@ pub const UNBOUNDED: u32 = 2;
 /// [`SeedRecord::status`]: different faces; twist and bounds that allow for the friction coupling.
 pub const COUPLED: u32 = 3;
 
+/// [`FoundRecord::kind`]: not a seed, but up to 128 loads for the processor, a bit for each.
+pub const OPEN: u32 = 4;
+/// [`FoundRecord::kind`] is a status plus so many times the best twist.
+pub const KINDS: u32 = 8;
+
+/// Scaled numbers beyond this are not computed with: the load gets no bounds.
+pub const RANGE: f32 = 1e6;
+/// In-plane load over the gripping force below which a load is the processor's: its square is near
+/// the end of the range of f32.
+pub const LEAST_LOAD: f32 = 1e-15;
+/// Normal force over the gripping force from which on a load is the processor's: at 2 a pad is
+/// pulled off.
+pub const MOST_PULL: f32 = 1.999;
+
+/// Error of a load made in f32 from the list and the pose, over the sizes that it is made of:
+/// `|w' - w| <= LOAD_ROUNDING (|F| (1 + |lever|) + |M|)`, all scaled, and the same for `f3, m1, m2`.
+///
+/// With `u = 2^-24`: numbers of list, pose and lever are rounded once (`u` each), three products and
+/// their sum take `3 u`, the factors and a cross product `2 u` to `4 u`: `7 u` of each product for
+/// the force, `10 u` for the moment of the force, `9 u` for the moment. The sums of the products'
+/// sizes over three components are at most `3^(1/2)` and `6^(1/2)` times the vectors' lengths, which
+/// makes `25 u`; a quotient and a root for the unit vector, which Vulkan allows `2.5` and `2` units
+/// in the last place, `10 u`. That is `2.1e-6`.
+pub const LOAD_ROUNDING: f32 = 2.5e-6;
+/// [`super::LOAD_TOLERANCE`]: loads whose bounds would be widened by more are the processor's.
+pub const LOAD_MARGIN: f32 = super::LOAD_TOLERANCE as f32;
+/// Largest change of pressure by that error, over the mean: a fifth of [`CONTACT_MARGIN`] ...
+pub const SWAY_CONGRUENT: f32 = 0.01;
+/// ... and for different faces such that the integral of the change over both is an eighth of
+/// [`LEAST_VARIATION`].
+pub const SWAY_DIFFERENT: f32 = 2.5e-4;
+
 /// [`LoadRecord::distance`] of a load whose numbers leave the range in which bounds are computed:
 /// above every distance within it.
 pub const OUT_OF_RANGE: f32 = 2e6;
@@ -123,10 +160,76 @@ pub struct ContactHeader {
     pub softness: f32,
     /// Bound on the change of that integral per change of slope.
     pub spread: f32,
+    /// Largest change of pressure at a vertex per change of a scaled load, times the face's area.
+    pub tilt: f32,
+    /// The dissipation of a unit twist is at least this times the least pressure anywhere over that
+    /// of the gripping force alone (congruent faces: at least this) ...
+    pub slowest: f32,
+    /// ... and at most this.
+    pub quickest: f32,
+    /// Not used.
+    pub padding: u32,
 }
 
 /// A directed edge from `(ax, ay)` to `(bx, by)`, material on its left.
 pub type EdgeRecord = [f32; 4];
+
+/// A twist and its neighbours ([`super::SeedSet`]).
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+pub struct TwistRecord {
+    /// `(u1, u2, omega, 0)`.
+    pub twist: [f32; 4],
+    /// The ring.
+    pub ring: [u32; 6],
+    /// Not used.
+    pub padding: [u32; 2],
+}
+
+/// A load as it is listed, in the frame of the list.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+pub struct CaseRecord {
+    /// Force over the list's unit of force.
+    pub force: [f32; 3],
+    /// Its size, rounded up.
+    pub force_size: f32,
+    /// Moment over the list's unit of moment.
+    pub moment: [f32; 3],
+    /// Its size, rounded up.
+    pub moment_size: f32,
+}
+
+/// A grip, or a part of its loads: what makes [`LoadRecord`]s of a list's [`CaseRecord`]s.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+pub struct GripRecord {
+    /// First axis of the grip in the frame of the list.
+    pub row_1: [f32; 3],
+    /// The list's unit of force over the gripping force.
+    pub force: f32,
+    /// Second axis.
+    pub row_2: [f32; 3],
+    /// The list's unit of moment over gripping force and length unit.
+    pub moment: f32,
+    /// Third axis.
+    pub row_3: [f32; 3],
+    /// [`LoadRecord::distance`].
+    pub distance: f32,
+    /// From the contact's origin to the point that the moments are about, in the frame of the list,
+    /// over the length unit.
+    pub lever: [f32; 3],
+    /// Its length, rounded up.
+    pub arm: f32,
+    /// Index of the contact.
+    pub contact: u32,
+    /// First load in the list.
+    pub first: u32,
+    /// Number of loads.
+    pub count: u32,
+    /// 1: all of them come back; 0: those that can be the worst.
+    pub every: u32,
+}
 
 /// One load.
 #[repr(C)]
@@ -147,20 +250,6 @@ pub struct LoadRecord {
     pub distance: f32,
 }
 
-/// Up to [`GROUP`] consecutive loads on one contact.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
-pub struct GroupRecord {
-    /// Index of the contact.
-    pub contact: u32,
-    /// First load.
-    pub first: u32,
-    /// Number of loads.
-    pub count: u32,
-    /// Not used.
-    pub padding: u32,
-}
-
 /// What the search found for one load.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
@@ -177,4 +266,31 @@ pub struct SeedRecord {
     pub best: u32,
     /// Not used.
     pub padding: u32,
+}
+
+/// What the screen says of one grip.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+pub struct OutcomeRecord {
+    /// Entries made for it, and one more; [`UNWRITTEN`] where it was not looked at.
+    pub entries: u32,
+    /// Some load's `mu_s` is at least this.
+    pub floor: f32,
+}
+
+/// An entry that comes back: the seed of a load, or loads without bounds.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+pub struct FoundRecord {
+    /// Twist and lower bound on `mu_s` as in [`SeedRecord`], but not of the unit wrench; or
+    /// ([`OPEN`]) a bit for each load.
+    pub words: [u32; 4],
+    /// Upper bound on `mu_s`.
+    pub upper: f32,
+    /// Status plus [`KINDS`] times the best twist, or [`OPEN`].
+    pub kind: u32,
+    /// The load's place in the grip's part of the list, or that of the first bit.
+    pub load: u32,
+    /// Index of the grip.
+    pub grip: u32,
 }

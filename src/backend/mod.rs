@@ -46,7 +46,7 @@ pub use crate::request::{Choice, Polish};
 pub use choice::{Selection, select};
 pub use curved::{CurvedProblem, score_curved, score_curved_best};
 pub use job::Backend;
-pub use problem::{Batch, F32_TOLERANCE, Problem, Seed, SeedStatus};
+pub use problem::{Batch, F32_TOLERANCE, LOAD_TOLERANCE, Pose, Problem, Seed, SeedStatus};
 pub use score::{ScoreOptions, Scored};
 pub use seeds::{NEGATED, RING, SeedSet};
 pub use top::Best;

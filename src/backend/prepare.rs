@@ -9,8 +9,7 @@ use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
 use super::layout::{
-    BOUNDED, COUPLED, ContactHeader, EdgeRecord, GROUP, GroupRecord, LoadRecord, OUT_OF_RANGE,
-    SeedRecord, UNBOUNDED,
+    BOUNDED, COUPLED, ContactHeader, EdgeRecord, LoadRecord, OUT_OF_RANGE, SeedRecord, UNBOUNDED,
 };
 use super::problem::{F32_TOLERANCE, Problem, Seed, SeedStatus};
 use crate::contact::{Loops, Twist};
@@ -25,8 +24,8 @@ use crate::model::{Contact, Wrench};
 /// of the radius, so the integrals of a sliver are uncertain by that times this number.
 const RESOLVED: f64 = 60.0;
 
-/// Scaled numbers beyond this are not computed with: the load gets no bounds.
-pub(super) const RANGE: f64 = 1e6;
+/// [`super::layout::RANGE`].
+pub(super) const RANGE: f64 = super::layout::RANGE as f64;
 
 /// In-plane load over the gripping force below which there is no load: the square of less is not a
 /// number of f64.
@@ -184,6 +183,8 @@ impl Records {
             variation(contact, &faces, |p| (p - pads.origin) / unit)
         };
         let resolved = |k: usize| radius * lengths[k] / gyration / faces[k].area <= RESOLVED;
+        let softness = largest_eigenvalue(compliance);
+        let [slowest, quickest] = dissipation_range(&faces, radius, same);
         let spread: f64 = (0..2).map(|k| faces[k].area * reach(k, faces[k].centroid)).sum();
         let header = ContactHeader {
             edges_i: 0,
@@ -205,8 +206,13 @@ impl Records {
             variation_first,
             variation_second,
             variation_slope,
-            softness: largest_eigenvalue(compliance) as f32,
+            softness: softness as f32,
             spread: spread as f32,
+            tilt: (2.0 * radius * (1.0 + radius) * softness * faces[0].area.max(faces[1].area))
+                as f32,
+            slowest: slowest as f32,
+            quickest: quickest as f32,
+            padding: 0,
         };
         Some(Self { header, edges, origin: pads.origin, unit })
     }
@@ -288,62 +294,25 @@ impl Records {
     }
 }
 
+/// Bounds on the dissipation of a unit twist, [`ContactHeader::slowest`] and
+/// [`ContactHeader::quickest`]: no point moves faster than `q = (1 + radius^2)^(1/2)`, so the
+/// integral of `p |v|` is at least that of `p v^2` over `q`, a quadratic form of the twist, and at
+/// most twice `q`; for congruent faces, whose summed pressure is known, also at most the root of
+/// twice that form (Schwarz).
+fn dissipation_range(faces: &[Moments; 2], radius: f64, same: bool) -> [f64; 2] {
+    let about = faces.each_ref().map(about_origin);
+    let first = about.iter().map(|face| face.1 / face.0).sum::<DVec2>().length();
+    let polar: f64 = about.iter().map(|face| (face.2.x_axis.x + face.2.y_axis.y) / face.0).sum();
+    let (mean, apart) = ((2.0 + polar) / 2.0, ((2.0 - polar) / 2.0).hypot(first));
+    let fastest = (1.0 + radius * radius).sqrt();
+    let most = if same { (2.0 * (mean + apart).max(2.0)).sqrt() } else { 2.0 * fastest };
+    [(mean - apart).min(2.0) / fastest, most]
+}
+
 /// Of a symmetric matrix.
 fn largest_eigenvalue(m: DMat2) -> f64 {
     let (mean, half) = ((m.x_axis.x + m.y_axis.y) / 2.0, (m.x_axis.x - m.y_axis.y) / 2.0);
     mean + half.hypot(m.y_axis.x)
-}
-
-/// What a kernel works on in one go.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Chunk {
-    pub(crate) contacts: Vec<ContactHeader>,
-    pub(crate) edges: Vec<EdgeRecord>,
-    pub(crate) loads: Vec<LoadRecord>,
-    pub(crate) groups: Vec<GroupRecord>,
-    /// Length of the basis array in vectors of four numbers.
-    pub(crate) basis: usize,
-}
-
-impl Chunk {
-    /// Adds a contact with its loads, in groups. A contact without loads is left out.
-    pub(crate) fn push(
-        &mut self,
-        records: &Records,
-        loads: impl IntoIterator<Item = Vec<LoadRecord>>,
-        twists: usize,
-    ) {
-        let first = self.loads.len();
-        for part in loads {
-            self.loads.extend(part);
-        }
-        if self.loads.len() == first {
-            return;
-        }
-        let first_edge = self.edges.len() as u32;
-        let mut header = records.header;
-        header.edges_i += first_edge;
-        header.edges_ii += first_edge;
-        header.edges_end += first_edge;
-        header.basis = self.basis as u32;
-        for start in (first..self.loads.len()).step_by(GROUP) {
-            let count = GROUP.min(self.loads.len() - start) as u32;
-            self.groups.push(GroupRecord {
-                contact: self.contacts.len() as u32,
-                first: start as u32,
-                count,
-                padding: 0,
-            });
-        }
-        self.edges.extend_from_slice(&records.edges);
-        self.basis += basis_length(&header, twists);
-        self.contacts.push(header);
-    }
-}
-
-/// Vectors that the basis of a contact takes.
-pub(crate) fn basis_length(header: &ContactHeader, twists: usize) -> usize {
-    header.faces as usize * super::layout::BASIS * twists
 }
 
 /// The answer for a load that is not searched.

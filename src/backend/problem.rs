@@ -2,14 +2,21 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use crate::contact::Twist;
 use crate::error::{Error, Result};
-use crate::model::{Contact, LARGEST_SCALE, Wrench};
+use crate::load::wrench_in_grip;
+use crate::model::{Contact, Frame, LARGEST_SCALE, Wrench};
 
-/// Relative widening of both bounds. The largest error of the 32-bit kernels seen so far is 1.6e-6
-/// with 81 twists and 9.5e-6 with 321, both of an upper bound (`gripfast bench check` on 450 random
-/// contacts, software Vulkan; the processor's are alike). Vulkan allows a logarithm 5e-7 off.
+/// Relative widening of both bounds. The largest error of the 32-bit kernels seen so far is 2.1e-6
+/// with 81 twists and 9.5e-6 with 321, both of an upper bound (`gripfast bench check` on up to 2,000
+/// random contacts, software Vulkan; the processor's are alike). Vulkan allows a logarithm 5e-7 off.
 pub const F32_TOLERANCE: f64 = 2e-5;
+
+/// Largest share by which bounds are widened besides on a graphics processor, which makes its loads in
+/// single precision from the list and the pose.
+pub const LOAD_TOLERANCE: f64 = 5e-4;
 
 /// One grip: its contact and the loads on it.
 #[derive(Debug, Clone, Copy)]
@@ -22,8 +29,38 @@ pub struct Problem<'a> {
     pub distance: f64,
     /// Gripping force \[N\].
     pub force: f64,
-    /// Wrenches on the body in the grip frame, moments about its origin.
+    /// Wrenches on the body: in the grip frame with moments about its origin, or as `pose` says.
+    /// Problems that share the slice share what is made of it for a graphics processor.
     pub wrenches: &'a [Wrench],
+    /// Where the grip is, when the wrenches are those on the part; `None`: they are in the grip
+    /// frame.
+    pub pose: Option<Pose>,
+}
+
+/// Where a grip is on the part that the loads act on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// The point that the moments of the wrenches are about, part frame \[m\].
+    pub centre_of_mass: DVec3,
+    /// The grip frame in the part frame, in which the wrenches are.
+    pub part_from_grip: Frame,
+}
+
+impl Problem<'_> {
+    /// A load in the grip frame about its origin.
+    #[inline]
+    pub(super) fn wrench(&self, load: usize) -> Wrench {
+        self.seen(&self.wrenches[load])
+    }
+
+    /// One of the wrenches in the grip frame about its origin.
+    #[inline(always)]
+    pub(super) fn seen(&self, wrench: &Wrench) -> Wrench {
+        match &self.pose {
+            None => *wrench,
+            Some(pose) => wrench_in_grip(wrench, pose.centre_of_mass, &pose.part_from_grip),
+        }
+    }
 }
 
 /// Grips to seed in one call.
@@ -72,7 +109,8 @@ pub struct Seed {
 /// Refuses numbers that are not finite.
 pub(crate) fn check(problem: &Problem<'_>, index: usize) -> Result<()> {
     check_grip(problem, index)?;
-    problem.wrenches.iter().enumerate().try_for_each(|load| check_load(load, index))
+    let mut loads = problem.wrenches.iter().enumerate();
+    loads.try_for_each(|(load, wrench)| check_load((load, &problem.seen(wrench)), index))
 }
 
 /// [`check`] of all but the loads.
@@ -90,6 +128,17 @@ pub(super) fn check_grip(problem: &Problem<'_>, index: usize) -> Result<()> {
             place(),
             format!("distance between the faces {} m", problem.distance),
             "give a distance of at most 1e60 m",
+        ));
+    }
+    if let Some(pose) = &problem.pose
+        && !(pose.centre_of_mass.is_finite()
+            && pose.part_from_grip.origin.is_finite()
+            && pose.part_from_grip.rotation.is_finite())
+    {
+        return Err(Error::input(
+            place(),
+            "the pose is not finite",
+            "give finite numbers for the frame and the centre of mass",
         ));
     }
     Ok(())

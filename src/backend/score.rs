@@ -6,10 +6,10 @@ use std::ops::Range;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::job::Backend;
+use super::job::{Backend, Survivors};
 use super::prepare::Contacts;
 use super::problem::{Batch, F32_TOLERANCE, Problem, Seed, SeedStatus};
-use super::screen::Survivors;
+use super::screen::Wanted;
 use super::seeds::SeedSet;
 use super::worst::{Ended, Work};
 use crate::contact::{PlaneWrench, Twist};
@@ -69,8 +69,8 @@ impl Backend {
         seeds: &SeedSet,
         options: &ScoreOptions,
     ) -> Result<Vec<Scored>> {
-        let all = options.polish == Polish::All;
-        self.by_blocks((BLOCK, all), batch, seeds, |Block { range, contacts, survivors }| {
+        let wanted = if options.polish == Polish::All { Wanted::All } else { Wanted::Worst };
+        self.by_blocks((BLOCK, wanted), batch, seeds, |Block { range, contacts, survivors }| {
             cases(&contacts, &batch.problems[range], &survivors, options)
                 .into_par_iter()
                 .map(|case| case.score(None))
@@ -78,11 +78,11 @@ impl Backend {
         })
     }
 
-    /// Seeds one block of the batch, of `most` loads or one problem, after another; `all` loads, or
-    /// those that can be the worst. While a block is seeded, the one before is solved.
+    /// Seeds one block of the batch, of `most` loads or one problem, after another. While a block is
+    /// seeded, the one before is solved.
     pub(super) fn by_blocks(
         &self,
-        (most, all): (usize, bool),
+        (most, wanted): (usize, Wanted),
         batch: &Batch<'_>,
         seeds: &SeedSet,
         mut solve: impl FnMut(Block) -> Vec<Scored> + Send,
@@ -99,7 +99,7 @@ impl Backend {
             let part = Batch { problems: batch.problems[range.clone()].to_vec() };
             let seed = || -> Result<Block> {
                 let contacts = Contacts::new(&part.problems)?;
-                let survivors = self.survivors_on(&contacts, &part, seeds, all)?;
+                let survivors = self.survivors_on(&contacts, &part, seeds, wanted)?;
                 Ok(Block { range, contacts, survivors })
             };
             let (block, before) = rayon::join(seed, || waiting.take().map(&mut solve));
@@ -169,8 +169,8 @@ pub(super) struct Case<'a> {
 }
 
 impl Case<'_> {
-    pub(super) fn wrench(&self, load: usize) -> &Wrench {
-        &self.problem.wrenches[self.loads[load] as usize]
+    pub(super) fn wrench(&self, load: usize) -> Wrench {
+        self.problem.wrench(self.loads[load] as usize)
     }
 
     /// The answer with the load's number among all.
@@ -190,7 +190,7 @@ impl Case<'_> {
         let (SeedStatus::Unbounded, Some(pads)) = (seed.status, self.pads) else {
             return seed.lower;
         };
-        let load = pads.load(self.problem.distance, self.problem.force, self.wrench(load));
+        let load = pads.load(self.problem.distance, self.problem.force, &self.wrench(load));
         let bound = |v: Twist| {
             let speed = |x: &DVec2| v.velocity(*x).length_squared();
             let fastest = |k: usize| pads.hulls[k].iter().map(speed).fold(0.0, f64::max).sqrt();
@@ -262,7 +262,7 @@ impl Case<'_> {
             return Vec::new();
         }
         let lever = TwistOut::new(self.problem.contact);
-        loads.iter().map(|&load| lever.margin(self.problem.force, self.wrench(load))).collect()
+        loads.iter().map(|&load| lever.margin(self.problem.force, &self.wrench(load))).collect()
     }
 
     pub(super) fn options(&self, load: usize, search: Search) -> Options {
@@ -286,7 +286,7 @@ impl Case<'_> {
                 pads,
                 self.problem.distance,
                 self.problem.force,
-                self.wrench(load),
+                &self.wrench(load),
                 &options,
             ),
             None => refused(Status::NoContact, 0),

@@ -10,20 +10,18 @@
 //! that goes round the sphere in triangles: a quarter of them leaves out most loads already, and the
 //! others are compared by all.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
-use super::job::Backend;
+use super::cpu::{Found, Searched};
 use super::lanes::{LANES, Lanes, Loads, dot, larger, pick, pick_number, smaller};
-use super::layout::{
-    CONTACT_MARGIN, EdgeRecord, LEAST_DISSIPATION, LoadRecord, OUT_OF_RANGE, SeedRecord,
-};
+use super::layout::{CONTACT_MARGIN, EdgeRecord, LEAST_DISSIPATION, OUT_OF_RANGE};
 use super::prepare::{Contacts, RANGE, Records, not_searched};
-use super::problem::{
-    Batch, F32_TOLERANCE, Problem, Seed, SeedStatus, check, check_grip, check_load,
-};
+use super::problem::{Batch, F32_TOLERANCE, Problem, Seed, SeedStatus, check, check_grip};
 use super::search::{Field, Planes, sign_of};
 use super::seeds::{NEGATED, RING, SeedSet};
-use super::table::{PARTS, Table};
+use super::table::PARTS;
 use crate::contact::widest;
 use crate::error::Result;
 use crate::model::Wrench;
@@ -39,119 +37,94 @@ const ORDINARY: (f64, f64) = (1e-30, 1.999);
 /// Loads that one task looks at, at least.
 const TASK: usize = 1 << 11;
 
-/// The loads of some problems that can be the worst, with their seeds, one problem after the other.
-#[derive(Debug, Default)]
-pub(super) struct Survivors {
-    /// Which load of its problem each is; rising within a problem.
-    pub(super) loads: Vec<u32>,
-    /// Its seed.
-    pub(super) seeds: Vec<Seed>,
-    /// End of each problem's.
-    pub(super) ends: Vec<usize>,
+/// Which loads of a grip come with their seeds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// All.
+    All,
+    /// Those that can be the worst.
+    Worst,
 }
 
-impl Survivors {
-    /// Every load.
-    fn all(problems: &[Problem<'_>], seeds: Vec<Seed>) -> Self {
-        let mut all = Self { seeds, ..Self::default() };
-        for problem in problems {
-            all.loads.extend(0..problem.wrenches.len() as u32);
-            all.ends.push(all.loads.len());
-        }
-        all
+/// The loads of each problem that are wanted, with their seeds.
+///
+/// # Errors
+/// As [`super::Backend::seed`].
+pub(super) fn survivors(
+    contacts: &Contacts,
+    batch: &Batch<'_>,
+    seeds: &SeedSet,
+    wanted: Wanted,
+) -> Result<Vec<Found>> {
+    let mut users: Vec<Vec<usize>> = vec![Vec::new(); contacts.ready.len()];
+    for (index, &slot) in contacts.slots.iter().enumerate() {
+        check_grip(&batch.problems[index], index)?;
+        users[slot].push(index);
     }
-
-    /// The loads of each problem with their seeds.
-    pub(super) fn by_problem(&self) -> impl Iterator<Item = (&[u32], &[Seed])> {
-        let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        starts
-            .zip(&self.ends)
-            .map(|(start, &end)| (&self.loads[start..end], &self.seeds[start..end]))
-    }
-}
-
-impl Backend {
-    /// The loads of each grip that can be the one with the largest `mu_s`, in their order, with
-    /// their seeds as [`Backend::seed`] gives them. On the processor the others are left out by a
-    /// bound; on a graphics processor all loads come back.
-    ///
-    /// # Errors
-    /// As [`Backend::seed`].
-    pub fn survivors(&self, batch: &Batch<'_>, seeds: &SeedSet) -> Result<Vec<Vec<(usize, Seed)>>> {
-        let contacts = Contacts::new(&batch.problems)?;
-        let found = self.survivors_on(&contacts, batch, seeds, false)?;
-        let pairs = |(loads, seeds): (&[u32], &[Seed])| {
-            loads.iter().map(|&load| load as usize).zip(seeds.iter().copied()).collect()
+    let of_contact = |(slot, users): (usize, Vec<usize>)| -> Result<Vec<(usize, Found)>> {
+        let Some(records) = &contacts.ready[slot].records else {
+            let none = |index: usize| Ok((index, without_contact(&batch.problems[index], index)?));
+            return users.into_iter().map(none).collect();
         };
-        Ok(found.by_problem().map(pairs).collect())
-    }
-
-    /// [`Backend::survivors`] with the batch's contacts made ready before; with `all` of the loads.
-    pub(super) fn survivors_on(
-        &self,
-        contacts: &Contacts,
-        batch: &Batch<'_>,
-        seeds: &SeedSet,
-        all: bool,
-    ) -> Result<Survivors> {
-        if all || !matches!(self, Self::Cpu) {
-            let found = self.seed_on(contacts, batch, seeds)?;
-            return Ok(Survivors::all(&batch.problems, found));
-        }
-        let mut users: Vec<Vec<usize>> = vec![Vec::new(); contacts.ready.len()];
-        for (index, &slot) in contacts.slots.iter().enumerate() {
-            check_grip(&batch.problems[index], index)?;
-            users[slot].push(index);
-        }
-        let of_contact = |(slot, users): (usize, Vec<usize>)| -> Result<Vec<(usize, Found)>> {
-            let Some(records) = &contacts.ready[slot].records else {
-                users.iter().try_for_each(|&index| check(&batch.problems[index], index))?;
-                let none = |index: usize| {
-                    let count = batch.problems[index].wrenches.len() as u32;
-                    (index, (0..count).map(|load| (load, not_searched(SeedStatus::NoContact))))
-                };
-                let all = users.into_iter().map(none);
-                return Ok(all.map(|(index, found)| (index, found.collect())).collect());
-            };
+        let loads = users.iter().map(|&index| batch.problems[index].wrenches.len()).sum();
+        let least = (users.len() * TASK).div_ceil(usize::max(loads, 1));
+        let users = users.par_iter().with_min_len(least);
+        if wanted == Wanted::Worst {
             let screen = Screen::new(records, seeds);
-            let loads = users.iter().map(|&index| batch.problems[index].wrenches.len()).sum();
-            let least = (users.len() * TASK).div_ceil(usize::max(loads, 1));
-            let one =
-                |&index: &usize| Ok((index, screen.survivors(&batch.problems[index], index)?));
-            users.par_iter().with_min_len(least).map(one).collect()
-        };
-        let found: Result<Vec<Vec<(usize, Found)>>> =
-            users.into_par_iter().enumerate().map(of_contact).collect();
-        let found = found.or_else(|error| {
-            // Of several loads that are not finite the first one is told.
-            let mut problems = batch.problems.iter().enumerate();
-            problems.try_for_each(|(index, problem)| check(problem, index))?;
-            Err(error)
-        })?;
-        let mut by_problem: Vec<Found> = vec![Vec::new(); batch.problems.len()];
-        for (index, found) in found.into_iter().flatten() {
-            by_problem[index] = found;
+            let one = |&index: &usize| {
+                let problem = &batch.problems[index];
+                Ok((index, screen.survivors(problem, index, 0..problem.wrenches.len())?.0))
+            };
+            return users.map(one).collect();
         }
-        let mut survivors = Survivors::default();
-        for found in by_problem {
-            for (load, seed) in found {
-                survivors.loads.push(load);
-                survivors.seeds.push(seed);
-            }
-            survivors.ends.push(survivors.loads.len());
-        }
-        Ok(survivors)
+        let searched = Searched::new(records, seeds);
+        users.map(|&index| Ok((index, every(&searched, &batch.problems[index], index)?))).collect()
+    };
+    let found: Result<Vec<Vec<(usize, Found)>>> =
+        users.into_par_iter().enumerate().map(of_contact).collect();
+    let found = found.or_else(|error| {
+        // Of several loads that are not finite the first one is told.
+        let mut problems = batch.problems.iter().enumerate();
+        problems.try_for_each(|(index, problem)| check(problem, index))?;
+        Err(error)
+    })?;
+    let mut by_problem: Vec<Found> = vec![Vec::new(); batch.problems.len()];
+    for (index, found) in found.into_iter().flatten() {
+        by_problem[index] = found;
     }
+    Ok(by_problem)
 }
 
-/// Loads of one problem that can be the worst, with their seeds.
-type Found = Vec<(u32, Seed)>;
+/// All loads of a problem, on several threads where they are many.
+fn every(searched: &Searched<'_>, problem: &Problem<'_>, index: usize) -> Result<Found> {
+    let count = problem.wrenches.len();
+    let starts = (0..count).into_par_iter().step_by(TASK);
+    let parts: Vec<Found> = starts
+        .map(|start| searched.found(problem, index, start..count.min(start + TASK)))
+        .collect::<Result<_>>()?;
+    Ok(parts.concat())
+}
+
+/// The loads of a problem whose contact has no area.
+///
+/// # Errors
+/// A bad value for a load that is not finite.
+pub(super) fn without_contact(problem: &Problem<'_>, index: usize) -> Result<Found> {
+    check(problem, index)?;
+    let none = |load: u32| (load, not_searched(SeedStatus::NoContact));
+    Ok((0..problem.wrenches.len() as u32).map(none).collect())
+}
+
+/// Whether a seed is that of a load which can be the worst where another one's `mu_s` is at least
+/// `floor`.
+pub(super) fn can_be_worst(seed: &Seed, floor: f64) -> bool {
+    let bounded = matches!(seed.status, SeedStatus::Bounded | SeedStatus::Coupled);
+    !(bounded && seed.upper < floor)
+}
 
 /// A contact on which loads are screened.
-struct Screen<'a> {
-    records: &'a Records,
-    seeds: &'a SeedSet,
-    table: Table<'a>,
+pub(super) struct Screen<'a> {
+    pub(super) searched: Searched<'a>,
     /// A quarter of the twists ([`SeedSet::half`]), by which most loads are left out already.
     few: Twists,
     /// All of them.
@@ -169,16 +142,15 @@ struct Twists {
 }
 
 impl<'a> Screen<'a> {
-    fn new(records: &'a Records, seeds: &'a SeedSet) -> Self {
-        let table = Table::new(&records.header, records.faces(), seeds);
+    pub(super) fn new(records: &'a Records, seeds: &'a SeedSet) -> Self {
+        let searched = Searched::new(records, seeds);
         let none = || Twists { parts: Vec::new(), reach: f32::MAX };
-        let mut screen =
-            Self { records, seeds, table, few: none(), all: none(), squeezed: Vec::new() };
-        screen.all.parts = screen.table.parts().to_vec();
+        let mut screen = Self { searched, few: none(), all: none(), squeezed: Vec::new() };
+        screen.all.parts = screen.searched.table.parts().to_vec();
         if records.header.resolved == 0 {
             return screen;
         }
-        let field = screen.field();
+        let field = screen.searched.field();
         let planes = field.planes(&Loads::new(&[]));
         let [at_i, at_ii] = [planes.at_i[0], planes.at_ii[0]];
         let slope = [planes.slope[0][0], planes.slope[1][0]];
@@ -199,7 +171,7 @@ impl<'a> Screen<'a> {
         };
         [screen.few.reach, screen.all.reach] = reaches;
         if screen.few.reach < f32::MAX {
-            let parts = screen.table.parts();
+            let parts = screen.searched.table.parts();
             screen.few.parts = seeds.half().iter().map(|&(k, _)| parts[k as usize]).collect();
         }
         screen.squeezed = squeezed;
@@ -208,11 +180,11 @@ impl<'a> Screen<'a> {
 
     /// `R` of a quarter of the twists and of all under a pressure.
     fn reaches<const PRESSURES: usize>(&self, pressures: [f32; PRESSURES]) -> [f32; 2] {
-        let table = &self.table;
+        let Searched { records, seeds, table } = &self.searched;
         let support = |k: usize| table.support(k, pressures);
-        let supports: Vec<[f32; 3]> = (0..self.seeds.len()).map(support).collect();
+        let supports: Vec<[f32; 3]> = (0..seeds.len()).map(support).collect();
         // Twists over their dissipation.
-        let congruent = self.records.header.faces == 1;
+        let congruent = records.header.faces == 1;
         let over = |n: &[f32; PARTS]| {
             let d: f32 = pressures.iter().zip(&n[3..]).map(|(p, n)| p * n).sum();
             let by = if congruent { 1.0 } else { 1.0 / larger(d, LEAST_DISSIPATION) };
@@ -221,62 +193,36 @@ impl<'a> Screen<'a> {
         let unit: Vec<[f32; 3]> = table.parts().iter().map(over).collect();
         let of = |(k, ring): (usize, &[u32; RING])| least_sum(supports[k], &unit, ring);
         let least = |sums: &mut dyn Iterator<Item = f32>| sums.fold(f32::MAX, smaller);
-        let few = self.seeds.half().iter().map(|(k, ring)| (*k as usize, ring));
-        let all = self.seeds.rings().iter().enumerate();
+        let few = seeds.half().iter().map(|(k, ring)| (*k as usize, ring));
+        let all = seeds.rings().iter().enumerate();
         // Nothing is known of no twists.
         [least(&mut few.map(of)), least(&mut all.map(of))]
             .map(|least| if least > 0.0 && least < f32::MAX { 3.0 / least } else { f32::MAX })
     }
 
-    fn field(&self) -> Field<'_> {
-        Field {
-            header: &self.records.header,
-            edges: self.records.faces(),
-            table: &self.table,
-            rings: self.seeds.rings(),
-        }
-    }
-
-    /// The loads that can be the worst.
-    fn survivors(&self, problem: &Problem<'_>, index: usize) -> Result<Found> {
-        let mut bounds = vec![0.0; problem.wrenches.len().next_multiple_of(LANES)];
-        let floor = ceilings(self, problem, &mut bounds);
-        let mut found = Found::new();
-        let mut searched: Vec<(usize, f64)> = Vec::new();
-        let mut records: Vec<LoadRecord> = Vec::new();
-        for (load, wrench) in problem.wrenches.iter().enumerate() {
-            if !reaches(bounds[load], floor) {
-                continue;
-            }
-            // A number that is not finite leaves a load without a bound.
-            check_load((load, wrench), index)?;
-            let seed = match self.records.load(problem, wrench) {
-                Ok((record, scale)) => {
-                    searched.push((found.len(), scale));
-                    records.push(record);
-                    not_searched(SeedStatus::NoContact)
-                }
-                Err(status) => not_searched(status),
-            };
-            found.push((load as u32, seed));
-        }
-        let mut answers = vec![SeedRecord::default(); records.len()];
-        super::cpu::search(&self.field(), &records, &mut answers);
-        for ((place, scale), record) in searched.into_iter().zip(&answers) {
-            found[place].1 = self.records.answer(record, scale)?;
-        }
-        found.retain(|(_, seed)| {
-            let bounded = matches!(seed.status, SeedStatus::Bounded | SeedStatus::Coupled);
-            !(bounded && seed.upper < f64::from(floor) * (1.0 - F32_TOLERANCE))
-        });
-        Ok(found)
+    /// The loads of a range that can be the worst of it; the largest `mu_s` is at least the number
+    /// that comes with them.
+    pub(super) fn survivors(
+        &self,
+        problem: &Problem<'_>,
+        index: usize,
+        range: Range<usize>,
+    ) -> Result<(Found, f64)> {
+        let mut bounds = vec![0.0; range.len().next_multiple_of(LANES)];
+        let floor = ceilings(self, problem, &range, &mut bounds);
+        let left = range.clone().filter(|load| reaches(bounds[load - range.start], floor));
+        // A number that is not finite leaves a load without a bound.
+        let mut found = self.searched.found(problem, index, left)?;
+        let floor = f64::from(floor) * (1.0 - F32_TOLERANCE);
+        found.retain(|(_, seed)| can_be_worst(seed, floor));
+        Ok((found, floor))
     }
 }
 
 widest! {
     /// Writes what each load's `mu_s` is at most, infinite where that is not known; what the largest
     /// is at least.
-    fn ceilings(screen: &Screen<'_>, problem: &Problem<'_>, out: &mut [f32]) -> f32 = ceilings_all
+    fn ceilings(screen: &Screen<'_>, problem: &Problem<'_>, range: &Range<usize>, out: &mut [f32]) -> f32 = ceilings_all
 }
 
 /// Whether a load whose `mu_s` is at most `ceiling` may have that of another one, at least `floor`.
@@ -286,14 +232,20 @@ fn reaches(ceiling: f32, floor: f32) -> bool {
 }
 
 #[inline(always)]
-fn ceilings_all(screen: &Screen<'_>, problem: &Problem<'_>, out: &mut [f32]) -> f32 {
-    let field = screen.field();
-    let count = problem.wrenches.len();
+fn ceilings_all(
+    screen: &Screen<'_>,
+    problem: &Problem<'_>,
+    range: &Range<usize>,
+    out: &mut [f32],
+) -> f32 {
+    let field = screen.searched.field();
+    let all = &problem.wrenches[range.clone()];
+    let count = all.len();
     let mut blocks = Vec::with_capacity(count.div_ceil(LANES));
     let mut floor = 0.0;
     let mut left: Vec<u32> = Vec::with_capacity(count);
-    for (wrenches, out) in problem.wrenches.chunks(LANES).zip(out.chunks_mut(LANES)) {
-        let (loads, ordinary) = side_by_side(screen.records, problem, wrenches);
+    for (wrenches, out) in all.chunks(LANES).zip(out.chunks_mut(LANES)) {
+        let (loads, ordinary) = side_by_side(screen.searched.records, problem, wrenches);
         let [low, high] = screen.range(&field, &loads, &screen.few);
         for lane in 0..LANES {
             let known = ordinary[lane] && high[lane] < f32::MAX;
@@ -333,6 +285,7 @@ fn side_by_side(
     let zero = [0.0_f64; LANES];
     let (mut force, mut moment) = ([zero; 3], [zero; 3]);
     for (lane, wrench) in wrenches.iter().enumerate().take(LANES) {
+        let wrench = problem.seen(wrench);
         for m in 0..3 {
             force[m][lane] = wrench.force[m];
             moment[m][lane] = wrench.moment[m];

@@ -328,7 +328,7 @@ impl Field<'_> {
 
     /// Records of the loads whose best twists are `best` with the values `value`.
     #[inline(always)]
-    fn finish(
+    pub(crate) fn finish(
         &self,
         loads: &Loads,
         planes: &Planes,

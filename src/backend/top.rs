@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::job::Backend;
 use super::problem::Batch;
 use super::score::{BLOCK, Block, Case, ScoreOptions, Scored, cases, usable};
+use super::screen::Wanted;
 use super::seeds::SeedSet;
 use crate::error::Result;
 
@@ -64,13 +65,18 @@ impl Backend {
         best: &mut Best,
         merit: &(dyn Fn(usize, f64) -> f64 + Sync),
     ) -> Result<Vec<Scored>> {
-        self.by_blocks((BLOCK, false), batch, seeds, |Block { range, contacts, survivors }| {
-            let cases = cases(&contacts, &batch.problems[range.clone()], &survivors, options);
-            let merit = |index: usize, mu: f64| merit(range.start + index, mu);
-            let lower = |(index, case): (usize, &Case<'_>)| merit(index, case.lower());
-            let promise = cases.par_iter().enumerate().map(lower).collect();
-            race(promise, best, &merit, &|index, beaten| cases[index].score(Some(beaten)))
-        })
+        self.by_blocks(
+            (BLOCK, Wanted::Worst),
+            batch,
+            seeds,
+            |Block { range, contacts, survivors }| {
+                let cases = cases(&contacts, &batch.problems[range.clone()], &survivors, options);
+                let merit = |index: usize, mu: f64| merit(range.start + index, mu);
+                let lower = |(index, case): (usize, &Case<'_>)| merit(index, case.lower());
+                let promise = cases.par_iter().enumerate().map(lower).collect();
+                race(promise, best, &merit, &|index, beaten| cases[index].score(Some(beaten)))
+            },
+        )
     }
 }
 

@@ -22,6 +22,9 @@ fn shaders_and_their_twins_have_the_same_functions_in_the_same_order() {
     assert_eq!(fan, names(include_str!("fan.rs"), "fn"));
     let search = names(include_str!("../../shaders/search.wgsl"), "fn");
     assert_eq!(search, names(include_str!("search.rs"), "fn"));
+    let screen = names(include_str!("../../shaders/screen.wgsl"), "fn");
+    assert_eq!(screen, names(include_str!("gpu/twin.rs"), "fn"));
+    assert!(screen.contains(&"doubt".to_owned()));
     assert!(fan.contains(&"fill_basis".to_owned()) && search.contains(&"support".to_owned()));
 }
 

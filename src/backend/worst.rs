@@ -267,7 +267,7 @@ impl Work<'_> {
     /// A load and the state of one like it to those that wait; whether there is such a state.
     fn beside(&self, load: usize, waiting: &mut Waiting) -> bool {
         let (case, Some(pads)) = (self.case, self.case.pads) else { return false };
-        let scaled = pads.load(case.problem.distance, case.problem.force, case.wrench(load));
+        let scaled = pads.load(case.problem.distance, case.problem.force, &case.wrench(load));
         let here = place(&scaled);
         let near = self.neighbours.nearest(&here).filter(|&(apart, _)| apart < LIKE);
         if let Some((apart, near)) = near {
@@ -470,7 +470,7 @@ impl Work<'_> {
             return HashMap::new();
         }
         let ready = |&load: &usize| {
-            let scaled = pads.load(case.problem.distance, case.problem.force, case.wrench(load));
+            let scaled = pads.load(case.problem.distance, case.problem.force, &case.wrench(load));
             (scaled, pads.scaled_twist(case.seeds[load].twist))
         };
         let loads: Vec<(Load, Twist)> = coupled.iter().map(ready).collect();
@@ -493,7 +493,7 @@ impl Work<'_> {
             return self.answer(load, case.solve(load));
         };
         let (problem, options) = (case.problem, case.options(load, Search::Off));
-        let scaled = pads.load(problem.distance, problem.force, case.wrench(load));
+        let scaled = pads.load(problem.distance, problem.force, &case.wrench(load));
         let here = place(&scaled);
         let nearest = self.neighbours.nearest(&here);
         let apart = nearest.map_or(f32::INFINITY, |(apart, _)| apart);
@@ -518,7 +518,7 @@ impl Work<'_> {
             _ => {}
         }
         let mut start = near.map(Neighbour::start);
-        let wrench = case.wrench(load);
+        let wrench = &case.wrench(load);
         let score = solve_next(pads, problem.distance, problem.force, wrench, &options, &mut start);
         if usable(&score).is_none() {
             return self.answer(load, case.solve(load));
@@ -570,7 +570,7 @@ impl Work<'_> {
 /// `mu_s` of congruent faces in full contact: their summed pressure is constant.
 fn slip_only(pads: &Pads, case: &Case<'_>, load: usize) -> f64 {
     let (problem, seed) = (case.problem, case.seeds[load].twist);
-    let load = pads.load(problem.distance, problem.force, case.wrench(load));
+    let load = pads.load(problem.distance, problem.force, &case.wrench(load));
     let field = Field { area: &pads.areas[0], p: [2.0 / pads.moments[0][0], 0.0, 0.0] };
     slip::solve(&[field], load.direction, Some(pads.scaled_twist(seed)), Refiner::Newton).mu
         * load.size

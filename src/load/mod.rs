@@ -268,6 +268,7 @@ impl LoadSet {
 
 /// Carries a wrench in the part frame about the centre of mass into the grip frame about its
 /// origin.
+#[inline]
 pub fn wrench_in_grip(wrench: &Wrench, centre_of_mass: DVec3, part_from_grip: &Frame) -> Wrench {
     let grip_from_part: DMat3 = part_from_grip.rotation.transpose();
     let arm = centre_of_mass - part_from_grip.origin;

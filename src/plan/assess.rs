@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use crate::backend::{
-    Backend, Batch, Best, CurvedProblem, Problem, ScoreOptions, Scored, SeedSet, score_curved,
-    score_curved_best,
+    Backend, Batch, Best, CurvedProblem, Pose, Problem, ScoreOptions, Scored, SeedSet,
+    score_curved, score_curved_best,
 };
 use crate::error::{Error, Result};
 use crate::geometry::patch_area;
@@ -17,11 +17,11 @@ use crate::gripper::Gripper;
 use crate::load::wrench_in_grip;
 use crate::mechanics::twist_out::{self, FreeTwistOut, TwistOut};
 use crate::mechanics::{Options, Pads, curved, inverse, refused};
-use crate::model::{Grip, Patch, Status, Surfaces, Wrench};
+use crate::model::{Grip, LoadCase, Patch, Status, Surfaces, Wrench};
 use crate::part::MassProperties;
 use crate::rank::{self, Weights};
 use crate::request::{Polish, Request};
-use crate::results::{LoadCase, LoadScore, PadFriction, RankedGrip};
+use crate::results::{LoadScore, PadFriction, RankedGrip};
 
 use super::limits::Limits;
 
@@ -221,14 +221,9 @@ impl Assessor<'_> {
     }
 
     fn assess_plane(&self, grips: Vec<Grip>, best: Option<&mut Best>) -> Result<Vec<RankedGrip>> {
-        let wrenches: Vec<Vec<Wrench>> = grips.par_iter().map(|grip| self.wrenches(grip)).collect();
-        let batch = Batch {
-            problems: grips
-                .iter()
-                .zip(&wrenches)
-                .map(|(grip, wrenches)| self.problem(grip, wrenches))
-                .collect(),
-        };
+        let wrenches = self.in_part();
+        let batch =
+            Batch { problems: grips.iter().map(|grip| self.problem(grip, &wrenches)).collect() };
         let scored = match best {
             None => self.backend.score(&batch, self.seeds, &self.settings.score)?,
             Some(best) => {
@@ -240,15 +235,11 @@ impl Assessor<'_> {
                 self.backend.score_best(&batch, self.seeds, &self.settings.score, best, &merit)?
             }
         };
-        let jobs = grips
-            .into_par_iter()
-            .zip(wrenches.par_iter())
-            .zip(scored)
-            .filter(|(_, scored)| !scored.outranked);
-        let measure = |((grip, wrenches), scored): ((Grip, &Vec<Wrench>), Scored)| {
+        let jobs = grips.into_par_iter().zip(scored).filter(|(_, scored)| !scored.outranked);
+        let measure = |(grip, scored): (Grip, Scored)| {
             let lever = TwistOut::new(&grip.contact);
             let margin = |wrench: &Wrench| lever.margin(self.settings.force, wrench);
-            self.measure(grip, wrenches, &scored, least(&lever), &margin)
+            self.measure(grip, &scored, least(&lever), &margin)
         };
         Ok(jobs.map(measure).collect())
     }
@@ -276,11 +267,11 @@ impl Assessor<'_> {
                 score_curved_best(&problems, best, &merit)
             }
         };
-        let jobs = grips.into_par_iter().zip(wrenches.par_iter()).zip(levers).zip(scored);
+        let jobs = grips.into_par_iter().zip(levers).zip(scored);
         jobs.filter(|(_, scored)| !scored.outranked)
-            .map(|(((grip, wrenches), lever), scored)| {
+            .map(|((grip, lever), scored)| {
                 let margin = |wrench: &Wrench| lever.margin(self.settings.force, wrench);
-                self.measure(grip, wrenches, &scored, least(&lever), &margin)
+                self.measure(grip, &scored, least(&lever), &margin)
             })
             .collect()
     }
@@ -301,12 +292,16 @@ impl Assessor<'_> {
 
     /// The loads as a grip sees them.
     fn wrenches(&self, grip: &Grip) -> Vec<Wrench> {
-        self.loads
-            .iter()
-            .map(|load| {
-                wrench_in_grip(&load.wrench, self.mass.centre_of_mass, &grip.part_from_grip)
-            })
-            .collect()
+        self.loads.iter().map(|load| self.wrench(grip, load)).collect()
+    }
+
+    fn wrench(&self, grip: &Grip, load: &LoadCase) -> Wrench {
+        wrench_in_grip(&load.wrench, self.mass.centre_of_mass, &grip.part_from_grip)
+    }
+
+    /// The loads as they are on the part, for all grips.
+    fn in_part(&self) -> Vec<Wrench> {
+        self.loads.iter().map(|load| load.wrench).collect()
     }
 
     fn problem<'a>(&self, grip: &'a Grip, wrenches: &'a [Wrench]) -> Problem<'a> {
@@ -315,6 +310,10 @@ impl Assessor<'_> {
             distance: grip.distance(),
             force: self.settings.force,
             wrenches,
+            pose: Some(Pose {
+                centre_of_mass: self.mass.centre_of_mass,
+                part_from_grip: grip.part_from_grip,
+            }),
         }
     }
 
@@ -331,13 +330,13 @@ impl Assessor<'_> {
     fn measure(
         &self,
         grip: Grip,
-        wrenches: &[Wrench],
         scored: &Scored,
         least: f64,
         margin: &dyn Fn(&Wrench) -> f64,
     ) -> RankedGrip {
         let (load, score) = scored.worst.unwrap_or((0, refused(Status::NoContact, 0)));
-        let wrench = wrenches.get(load).copied().unwrap_or_default();
+        let wrench =
+            self.loads.get(load).map_or_else(Wrench::default, |load| self.wrench(&grip, load));
         // Under a pull on one pad a round face is pressed more than without a load on the other.
         let share = |left: f64, patch: &Patch| (left / patch_area(patch)).min(1.0);
         let contact_share = share(score.contact_area_i, &grip.contact.face_i)
@@ -374,16 +373,22 @@ impl Assessor<'_> {
         let mut open: Vec<&mut &mut RankedGrip> =
             grips.iter_mut().filter(|ranked| ranked.mu_by_load.len() != self.loads.len()).collect();
         for block in open.chunks_mut((ANSWERS_AT_ONCE / self.loads.len().max(1)).max(1)) {
-            let wrenches: Vec<Vec<Wrench>> =
-                block.par_iter().map(|ranked| self.wrenches(&ranked.grip)).collect();
-            let jobs = || block.iter().zip(&wrenches);
-            let plane = jobs().filter(|(ranked, _)| ranked.grip.surfaces.is_none());
-            let problems = plane.map(|(ranked, wrenches)| self.problem(&ranked.grip, wrenches));
+            let in_part = self.in_part();
+            let plane = block.iter().filter(|ranked| ranked.grip.surfaces.is_none());
+            let problems = plane.map(|ranked| self.problem(&ranked.grip, &in_part));
             let batch = Batch { problems: problems.collect() };
             let ready = Surfaced::new(block.iter().map(|ranked| &ranked.grip), self.settings.force);
-            let curved = jobs().filter(|(ranked, _)| ranked.grip.surfaces.is_some());
+            let curved: Vec<&Grip> = block
+                .iter()
+                .map(|ranked| &ranked.grip)
+                .filter(|grip| grip.surfaces.is_some())
+                .collect();
+            let wrenches: Vec<Vec<Wrench>> =
+                curved.par_iter().map(|grip| self.wrenches(grip)).collect();
             let problems: Vec<CurvedProblem<'_>> = curved
-                .map(|(ranked, wrenches)| self.curved_problem(&ranked.grip, &ready, wrenches))
+                .iter()
+                .zip(&wrenches)
+                .map(|(grip, wrenches)| self.curved_problem(grip, &ready, wrenches))
                 .collect();
             let mut curved = score_curved(&problems, Polish::All).into_iter();
             let mut plane = self.backend.score(&batch, self.seeds, &options)?.into_iter();

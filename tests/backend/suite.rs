@@ -6,18 +6,21 @@
 
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use gripfast::backend::{
-    Backend, Batch, Best, Polish, Problem, ScoreOptions, Scored, Seed, SeedSet, SeedStatus,
+    Backend, Batch, Best, F32_TOLERANCE, LOAD_TOLERANCE, Polish, Pose, Problem, ScoreOptions,
+    Scored, Seed, SeedSet, SeedStatus,
 };
 use gripfast::contact::{Field, Loops};
+use gripfast::load::wrench_in_grip;
 use gripfast::mechanics::{self, Options, slip};
-use gripfast::model::{Contact, Patch, Polygon, Wrench};
+use gripfast::model::{Contact, Frame, Patch, Polygon, Wrench};
 
 use crate::support::random::Random;
 
-/// Largest relative difference allowed between the bounds of two backends.
-const TOLERANCE: f64 = 4e-5;
+/// Largest relative difference allowed between the bounds of two backends: each widens them for single
+/// precision, and a graphics processor for its loads too.
+const TOLERANCE: f64 = 2.0 * F32_TOLERANCE + LOAD_TOLERANCE;
 
 fn gpu() -> Option<Backend> {
     #[cfg(feature = "gpu")]
@@ -149,7 +152,7 @@ fn the_comparer_sees_one_wrong_number() {
     };
     assert!(agrees(&[right; 3], &[right; 3]).is_ok());
     let wrong = [
-        Seed { lower: 0.5001, ..right },
+        Seed { lower: 0.5004, ..right },
         Seed { upper: 0.6, ..right },
         Seed { upper: f64::NAN, ..right },
         Seed { twist: [0.1, f64::NAN, 3.0].into(), ..right },
@@ -212,7 +215,8 @@ fn bounds_enclose_the_answer(backend: &Backend) {
             let strength = 10_f64.powf(random.range(-2.0, 0.0));
             let wrenches: Vec<Wrench> =
                 (0..20).map(|_| random.wrench(force * strength, size)).collect();
-            let problem = Problem { contact: &contact, distance, force, wrenches: &wrenches };
+            let problem =
+                Problem { contact: &contact, distance, force, wrenches: &wrenches, pose: None };
             let seeds = seed(backend, vec![problem], &set);
             for (sum, count) in counts.iter_mut().zip(assert_bounds(&seeds, &problem)) {
                 *sum += count;
@@ -248,7 +252,8 @@ fn survivors_are_the_loads_that_can_be_the_worst(backend: &Backend) {
         wrenches.push(Wrench::default());
         wrenches.push(Wrench { force: DVec3::Z * 3.0 * force, ..Wrench::default() });
         let distance = size * random.range(-2.0, 5.0);
-        let problem = Problem { contact: &contact, distance, force, wrenches: &wrenches };
+        let problem =
+            Problem { contact: &contact, distance, force, wrenches: &wrenches, pose: None };
         let seeds = seed(backend, vec![problem], &set);
         let batch = Batch { problems: vec![problem] };
         let found = backend.survivors(&batch, &set).unwrap().remove(0);
@@ -270,8 +275,7 @@ fn survivors_are_the_loads_that_can_be_the_worst(backend: &Backend) {
         loads += wrenches.len();
     }
     println!("left out: {left_out:?} of {loads}");
-    let screens = matches!(backend, Backend::Cpu);
-    assert!(!screens || left_out[0] > loads / 8 && left_out[1] > loads / 50, "{left_out:?}");
+    assert!(left_out[0] > loads / 8 && left_out[1] > loads / 50, "{left_out:?}");
 }
 
 fn seeds_start_the_solver_close(backend: &Backend) {
@@ -281,8 +285,13 @@ fn seeds_start_the_solver_close(backend: &Backend) {
     for _ in 0..12 {
         let contact = random.congruent(0.02);
         let wrenches: Vec<Wrench> = (0..40).map(|_| random.wrench(20.0, 0.02)).collect();
-        let problem =
-            Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches };
+        let problem = Problem {
+            contact: &contact,
+            distance: 0.03,
+            force: 20.0,
+            wrenches: &wrenches,
+            pose: None,
+        };
         let [few, many] = [&set, &dense].map(|set| seed(backend, vec![problem], set));
         let area = Loops::new(&contact.face_i);
         let p = [1.0 / gripfast::contact::moments(&area)[0], 0.0, 0.0];
@@ -327,8 +336,13 @@ fn few_loads_of_a_ball_are_solved(backend: &Backend) {
     .enumerate()
     {
         let wrenches = ball(500, point);
-        let problem =
-            Problem { contact: &contact, distance: 0.03, force: 40.0, wrenches: &wrenches };
+        let problem = Problem {
+            contact: &contact,
+            distance: 0.03,
+            force: 40.0,
+            wrenches: &wrenches,
+            pose: None,
+        };
         let batch = Batch { problems: vec![problem] };
         let answer = backend.score(&batch, &SeedSet::default(), &ScoreOptions::default()).unwrap();
         let all = backend
@@ -384,6 +398,7 @@ fn few_loads_of_a_ball_are_solved_on_different_faces(backend: &Backend) {
                 distance: 0.03,
                 force: 40.0,
                 wrenches: &wrenches,
+                pose: None,
             }],
         };
         let answer =
@@ -420,7 +435,13 @@ fn the_best_grips_are_those_of_the_whole_list(backend: &Backend) {
         .collect();
     let problems: Vec<Problem<'_>> = grips
         .iter()
-        .map(|(contact, wrenches, _)| Problem { contact, distance: 0.02, force: 15.0, wrenches })
+        .map(|(contact, wrenches, _)| Problem {
+            contact,
+            distance: 0.02,
+            force: 15.0,
+            wrenches,
+            pose: None,
+        })
         .collect();
     let merit = |index: usize, mu: f64| 1.0 / mu + grips[index].2;
     let held = |scored: &Scored| {
@@ -482,6 +503,57 @@ fn the_best_grips_are_those_of_the_whole_list(backend: &Backend) {
     assert!(race(problems.len(), 50).iter().all(|scored| !scored.outranked));
 }
 
+/// A list of loads on the part and poses of grips give what the loads give as each grip sees them.
+fn grips_as_poses_are_grips_with_loads_of_their_own(backend: &Backend) {
+    let mut random = Random::new(83);
+    let set = SeedSet::default();
+    let list: Vec<Wrench> = (0..130).map(|_| random.wrench(3.0, 0.03)).collect();
+    let grips: Vec<(Arc<Contact>, Pose)> = (0..60)
+        .map(|i| {
+            let contact = match i % 3 {
+                0 => random.similar(0.02),
+                1 => random.congruent(0.02),
+                _ => Arc::new(Contact { face_i: random.patch(0.02), face_ii: random.patch(0.02) }),
+            };
+            let axis = random.vector().normalize();
+            let rotation = DMat3::from_axis_angle(axis, random.range(-3.0, 3.0));
+            let centre_of_mass = random.vector();
+            let origin = centre_of_mass + random.vector() * 0.03;
+            (contact, Pose { centre_of_mass, part_from_grip: Frame { rotation, origin } })
+        })
+        .collect();
+    let seen: Vec<Vec<Wrench>> = grips
+        .iter()
+        .map(|(_, Pose { centre_of_mass, part_from_grip })| {
+            list.iter().map(|w| wrench_in_grip(w, *centre_of_mass, part_from_grip)).collect()
+        })
+        .collect();
+    let problem = |i: usize, pose, wrenches| {
+        let distance = 0.001 * (i % 40) as f64;
+        Problem { contact: &grips[i].0, distance, force: 40.0, wrenches, pose }
+    };
+    let poses = (0..grips.len()).map(|i| problem(i, Some(grips[i].1), &list)).collect();
+    let own = (0..grips.len()).map(|i| problem(i, None, &seen[i])).collect();
+    let score = |backend: &Backend, problems| {
+        let batch = Batch { problems };
+        backend.score(&batch, &set, &ScoreOptions::default()).unwrap()
+    };
+    let expected = score(&Backend::Cpu, own);
+    let found = score(backend, poses);
+    if matches!(backend, Backend::Cpu) {
+        assert_eq!(found, expected);
+    }
+    let mut held = 0;
+    for (a, b) in found.iter().zip(&expected) {
+        let ((load, a), (other, b)) = (a.worst.unwrap(), b.worst.unwrap());
+        assert!(load == other && a.status == b.status, "{a:?} instead of {b:?}");
+        let same = a.mu_s.zip(b.mu_s).is_none_or(|(a, b)| (a / b - 1.0).abs() < 1e-9);
+        assert!(same && a.mu_s.is_some() == b.mu_s.is_some(), "{a:?} instead of {b:?}");
+        held += usize::from(a.status.holds());
+    }
+    assert!(held > 20, "{held}");
+}
+
 fn degenerate_contacts_and_loads(backend: &Backend) {
     let set = SeedSet::default();
     let square = congruent(rectangle(0.02, 0.02, DVec2::ZERO));
@@ -498,7 +570,8 @@ fn degenerate_contacts_and_loads(backend: &Backend) {
         wrench([1e200, 1e200, 0.0], [0.0; 3]),
         wrench([1.0, 1.0, 1.0], [10.0, 0.0, 0.0]),
     ];
-    let problem = Problem { contact: &square, distance: 0.03, force: 40.0, wrenches: &wrenches };
+    let problem =
+        Problem { contact: &square, distance: 0.03, force: 40.0, wrenches: &wrenches, pose: None };
     let seeds = seed(backend, vec![problem], &set);
     let status: Vec<SeedStatus> = seeds.iter().map(|seed| seed.status).collect();
     use SeedStatus::{Bounded, NoLoad, NoNormalForce, Unbounded};
@@ -588,6 +661,7 @@ fn batch_sizes(backend: &Backend) {
         distance: 0.03,
         force: 20.0,
         wrenches: &wrenches[..count],
+        pose: None,
     };
     let whole = seed(backend, vec![problem(100_000)], &set);
     for count in [0, 1, 63, 64, 65] {
@@ -633,6 +707,7 @@ fn same_bytes_twice_and_permuted_answers_for_a_permuted_batch(backend: &Backend)
         distance: 0.01 * i as f64,
         force: 20.0,
         wrenches: &grips[i].1,
+        pose: None,
     };
     let order: Vec<usize> = (0..grips.len()).map(|i| (i * 77) % grips.len()).collect();
     let first = seed(backend, (0..grips.len()).map(problem).collect(), &set);
@@ -677,7 +752,13 @@ fn final_answers_are_those_of_the_processor(backend: &Backend) {
     let problems = || Batch {
         problems: grips
             .iter()
-            .map(|(contact, wrenches)| Problem { contact, distance: 0.02, force: 15.0, wrenches })
+            .map(|(contact, wrenches)| Problem {
+                contact,
+                distance: 0.02,
+                force: 15.0,
+                wrenches,
+                pose: None,
+            })
             .collect(),
     };
     let found = backend.score(&problems(), &set, &ScoreOptions::default()).unwrap();
@@ -711,6 +792,7 @@ fn reference_cases(backend: &Backend) {
             distance: case.distance,
             force: case.force,
             wrenches: &wrenches,
+            pose: None,
         };
         let id = case.id.as_deref().unwrap_or("?");
         let found = seed(backend, vec![problem], &SeedSet::default())[0];
@@ -754,7 +836,8 @@ fn gpu_that_is_lost_in_mid_batch() {
     let mut random = Random::new(47);
     let contact = random.congruent(0.02);
     let wrenches: Vec<Wrench> = (0..2300).map(|_| random.wrench(20.0, 0.02)).collect();
-    let problem = Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches };
+    let problem =
+        Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches, pose: None };
     let batch = Batch { problems: vec![problem] };
     let set = SeedSet::default();
     let expected = Backend::Cpu.seed(&batch, &set).unwrap();
@@ -792,6 +875,7 @@ suite!(
     few_loads_of_a_ball_are_solved,
     few_loads_of_a_ball_are_solved_on_different_faces,
     the_best_grips_are_those_of_the_whole_list,
+    grips_as_poses_are_grips_with_loads_of_their_own,
     degenerate_contacts_and_loads,
     batch_sizes,
     same_bytes_twice_and_permuted_answers_for_a_permuted_batch,

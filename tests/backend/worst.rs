@@ -51,6 +51,7 @@ impl Case {
             distance: grip.distance(),
             force,
             wrenches,
+            pose: None,
         });
         let options = ScoreOptions { polish, ..Default::default() };
         let batch = Batch { problems: problems.collect() };

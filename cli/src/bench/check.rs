@@ -70,14 +70,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             format!("kernels, {} twists, {contacts} contacts", set.len()),
             if check.tolerance_holds() && check.bounded > 0 {
                 Ok(format!(
-                    "bounds {:.1e} from double precision at most; tolerance {:.0e}",
-                    check.largest, check.tolerance
+                    "bounds {:.1e} from double precision at most; tolerance {:.0e}; loads off by \
+{:.2} of the stated error at most",
+                    check.largest, check.tolerance, check.load_error
                 ))
             } else {
                 Err(format!(
-                    "bounds {:.1e} from double precision, more than the tolerance {:.0e}: \
-F32_TOLERANCE is too small for this adapter",
-                    check.largest, check.tolerance
+                    "bounds {:.1e} from double precision, tolerance {:.0e}; loads off by {:.2} of \
+the stated error: F32_TOLERANCE or LOAD_ROUNDING is too small for this adapter",
+                    check.largest, check.tolerance, check.load_error
                 ))
             },
         );
@@ -145,7 +146,7 @@ the processor's from it |\n|---|---|---|---|---|---|\n";
             }
             let _ = writeln!(
                 text,
-                "| search, {twists} twists | another twist of equal value; another status | {}; {} \
+                "| screen, {twists} twists | another twist of equal value; another status | {}; {} \
 of {} | | | |",
                 check.other_twist, check.other_status, check.loads
             );

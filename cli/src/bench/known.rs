@@ -1,19 +1,26 @@
 //! What the kernels cost and what adapters can do: the counts of docs/performance.md and the
 //! numbers of the makers.
 
-/// Instructions of one lane in the search, for one load and one twist: congruent faces, different
+/// Instructions of one lane in the screen, for one load and one twist: congruent faces, different
 /// ones.
 pub(crate) const EVALUATION: [f64; 2] = [8.0, 16.0];
 
-/// Instructions of one lane in the search, for one load's ring: congruent faces, different ones.
-pub(crate) const RING: [f64; 2] = [450.0, 900.0];
+/// Instructions of one lane in the screen, for one load: made (50), its ring (450; 900), the width of
+/// its bounds (30; 150).
+pub(crate) const LOAD: [f64; 2] = [530.0, 1100.0];
 
 /// Instructions of one lane in the basis, for one edge, face and twist: the mean over the near and
 /// far twists of a set.
 pub(crate) const BASIS_EDGE: f64 = 650.0;
 
-/// Bytes that the search moves for one load: its record in, the answer out.
-pub(crate) const LOAD_BYTES: f64 = 64.0;
+/// Bytes that the screen reads for one load of a grip; from the cache where the list fits it.
+pub(crate) const LOAD_BYTES: f64 = 32.0;
+
+/// Bytes of a grip: its record in, its outcome out.
+pub(crate) const GRIP_BYTES: f64 = 88.0;
+
+/// Bytes of an entry: cleared, written, copied for the way back.
+pub(crate) const ENTRY_BYTES: f64 = 128.0;
 
 /// Bytes of the basis for one face and twist.
 pub(crate) const BASIS_BYTES: f64 = 48.0;

@@ -1,8 +1,9 @@
 //! `gripfast bench sweep`: rates over twists, loads and kinds of contact, on one core, on all cores
 //! and on the adapter, with the time of each step.
 
+mod table;
+
 use std::collections::HashMap;
-use std::fmt::Write as _;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -58,6 +59,10 @@ struct Steps {
     /// Whole call.
     whole: f64,
     chunks: usize,
+    /// Bytes to the device and back, and entries that came, per grip.
+    bytes_up: f64,
+    bytes_down: f64,
+    entries: f64,
     make: f64,
     send: f64,
     upload: Option<f64>,
@@ -84,7 +89,7 @@ struct Scoring {
     polish: Option<f64>,
 }
 
-/// How far the search kernel is from the adapter's limits.
+/// How far the screen is from the adapter's limits.
 #[derive(Debug, Clone, Serialize)]
 struct Share {
     /// Of the whole call, in kernels.
@@ -143,6 +148,13 @@ impl Place {
     fn seed(&self, batch: &Batch<'_>, set: &SeedSet) -> anyhow::Result<Vec<Seed>> {
         let run = || self.backend.seed(batch, set);
         Ok(self.pool.as_ref().map_or_else(run, |pool| pool.install(run))?)
+    }
+
+    /// What scoring takes of the seeds.
+    fn survivors(&self, batch: &Batch<'_>, set: &SeedSet) -> anyhow::Result<()> {
+        let run = || self.backend.survivors(batch, set);
+        std::hint::black_box(self.pool.as_ref().map_or_else(run, |pool| pool.install(run))?);
+        Ok(())
     }
 
     fn score(&self, batch: &Batch<'_>, set: &SeedSet) -> anyhow::Result<Vec<Scored>> {
@@ -310,7 +322,7 @@ impl Cell<'_> {
         Ok(row)
     }
 
-    /// Rates of the seeds. Gives the seeds of one grip and the seconds that they took.
+    /// Rates of the seeds, of those loads that can be the worst. Gives the seeds of one grip and the seconds that they took.
     fn seeds(&self, row: &mut Row, seconds: f64) -> anyhow::Result<(Vec<Seed>, f64)> {
         let start = Instant::now();
         let over = || start.elapsed().as_secs_f64();
@@ -321,13 +333,14 @@ impl Cell<'_> {
             let batch = workload.batch();
             // Twice for a single grip: the first call compiles or allocates.
             if grips == 1 {
-                self.place.seed(&batch, self.set)?;
+                one_grip = self.place.seed(&batch, self.set)?;
+                self.place.survivors(&batch, self.set)?;
             }
             let begin = Instant::now();
-            let seeds = self.place.seed(&batch, self.set)?;
+            self.place.survivors(&batch, self.set)?;
             let once = begin.elapsed().as_secs_f64();
             if grips == 1 {
-                (one_grip, one_time) = (seeds, once);
+                one_time = once;
             }
             let more = (grips * 8).min(MOST_LOADS / self.loads);
             if once < 0.1 * seconds && over() < 0.4 * seconds && more > grips {
@@ -337,7 +350,7 @@ impl Cell<'_> {
             let begin = Instant::now();
             let mut runs = 0;
             while runs == 0 || over() < 0.8 * seconds {
-                std::hint::black_box(self.place.seed(&batch, self.set)?);
+                self.place.survivors(&batch, self.set)?;
                 runs += 1;
             }
             let each = begin.elapsed().as_secs_f64() / runs as f64;
@@ -352,7 +365,8 @@ impl Cell<'_> {
 
     #[cfg(not(feature = "gpu"))]
     fn steps(&self, _: &mut Row, _: &Workload) -> anyhow::Result<()> {
-        let _ = (self.limits, known::EVALUATION, known::RING, known::BASIS_EDGE);
+        let _ = (self.limits, known::EVALUATION, known::LOAD, known::BASIS_EDGE);
+        let _ = (known::GRIP_BYTES, known::ENTRY_BYTES);
         let _ =
             (known::BASIS_BYTES, known::LOAD_BYTES, self.contacts.edges(), self.contacts.faces());
         Ok(())
@@ -364,7 +378,7 @@ impl Cell<'_> {
         let Backend::Gpu(gpu) = &self.place.backend else { return Ok(()) };
         gpu.start_clock()?;
         let begin = Instant::now();
-        self.place.seed(&workload.batch(), self.set)?;
+        self.place.survivors(&workload.batch(), self.set)?;
         let whole = begin.elapsed().as_secs_f64();
         let chunks = gpu.stop_clock().unwrap_or_default().chunks;
         let device = |span: &dyn Fn(
@@ -377,9 +391,15 @@ impl Cell<'_> {
             |span: &dyn Fn(&gripfast::backend::ChunkSpans) -> gripfast::backend::Span| -> f64 {
                 chunks.iter().map(|chunk| span(chunk).seconds()).sum()
             };
+        let per_grip = |number: &dyn Fn(&gripfast::backend::ChunkSpans) -> f64| -> f64 {
+            chunks.iter().map(number).sum::<f64>() / row.grips.max(1) as f64
+        };
         let steps = Steps {
             whole,
             chunks: chunks.len(),
+            bytes_up: per_grip(&|chunk| chunk.bytes_up as f64),
+            bytes_down: per_grip(&|chunk| chunk.bytes_down as f64),
+            entries: per_grip(&|chunk| chunk.entries as f64),
             make: sum(&|chunk| chunk.make),
             send: sum(&|chunk| chunk.send),
             upload: device(&|device| device.upload),
@@ -394,9 +414,11 @@ impl Cell<'_> {
             let faces = self.contacts.faces();
             let (loads, twists) = (workload.loads() as f64, self.set.len() as f64);
             let distinct = if self.contacts == Contacts::Shared { 1 } else { row.grips };
-            let evaluation = known::EVALUATION[faces - 1] * twists + known::RING[faces - 1];
-            let bytes =
-                known::LOAD_BYTES * loads + known::BASIS_BYTES * twists * (distinct * faces) as f64;
+            let evaluation = known::EVALUATION[faces - 1] * twists + known::LOAD[faces - 1];
+            let grips = row.grips as f64;
+            let bytes = known::LOAD_BYTES * loads
+                + (known::GRIP_BYTES + known::ENTRY_BYTES * steps.entries) * grips
+                + known::BASIS_BYTES * twists * (distinct * faces) as f64;
             let edges = (distinct * faces * self.contacts.edges()) as f64;
             let work = evaluation * loads + known::BASIS_EDGE * edges * twists;
             row.share = Some(Share {
@@ -434,7 +456,7 @@ impl Cell<'_> {
         let workload = self.workload(grips);
         let batch = workload.batch();
         let begin = Instant::now();
-        self.place.seed(&batch, self.set)?;
+        self.place.survivors(&batch, self.set)?;
         let seeds_only = begin.elapsed().as_secs_f64();
         self.start_clock()?;
         let (mut runs, mut spent) = (0, 0.0);
@@ -484,123 +506,5 @@ impl Cell<'_> {
     #[cfg(not(feature = "gpu"))]
     fn stop_clock(&self) -> Option<f64> {
         None
-    }
-}
-
-impl Report {
-    fn markdown(&self) -> String {
-        let mut text = String::new();
-        match &self.adapter {
-            Some(adapter) => {
-                let _ = writeln!(text, "Adapter: {adapter}; {} threads.", self.threads);
-            }
-            None => {
-                let _ = writeln!(text, "No adapter; {} threads.", self.threads);
-            }
-        }
-        if self.software_adapter {
-            text += "**The adapter is software: its figures show that everything runs, and say \
-nothing about speed.**\n";
-        }
-        text += "\nLoads a second (millions) and evaluations (load x twist) a second (millions); in \
-brackets grips scored to the end a second.\n\n\
-| twists | loads | contacts | one core | all cores | adapter | evaluations | over one core | \
-over all cores | bounds, answers apart |\n|---|---|---|---|---|---|---|---|---|---|\n";
-        let places = if self.adapter.is_some() { 3 } else { 2 };
-        for cell in self.rows.chunks(places) {
-            let rate = |row: Option<&Row>| {
-                let Some(row) = row.filter(|row| row.runs > 0) else { return String::new() };
-                let grips = row.scoring.as_ref().map_or_else(String::new, |scoring| {
-                    format!(" ({:.0})", scoring.grips_per_second)
-                });
-                format!("{:.3}{grips}", row.loads_per_second * 1e-6)
-            };
-            let ratio = |ratio: Option<f64>| ratio.map_or_else(String::new, |x| format!("{x:.2}"));
-            let Some(last) = cell.last() else { continue };
-            let adapter = cell.get(2);
-            let apart = adapter.and_then(|row| row.difference).map_or_else(
-                || last.left_out.clone().unwrap_or_default(),
-                |[bounds, answers]| format!("{bounds:.0e}, {answers:.0e}"),
-            );
-            let _ = writeln!(
-                text,
-                "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {apart} |",
-                last.twists,
-                last.loads,
-                last.contacts,
-                rate(cell.first()),
-                rate(cell.get(1)),
-                rate(adapter),
-                if last.runs > 0 {
-                    format!("{:.1}", last.evaluations_per_second * 1e-6)
-                } else {
-                    String::new()
-                },
-                ratio(adapter.and_then(|row| row.over_one_core)),
-                ratio(adapter.and_then(|row| row.over_all_cores)),
-            );
-        }
-        if self.adapter.is_some() {
-            self.step_table(&mut text);
-        }
-        if let Some(why) = &self.failure {
-            let _ = writeln!(text, "\n**FAILED**: {why}");
-        } else if !self.complete {
-            text += "\nThe time was over before the last rows.\n";
-        }
-        text
-    }
-
-    fn step_table(&self, text: &mut String) {
-        let clock = if self.timestamps {
-            "Upload, basis, search and readback by the device's timestamps"
-        } else {
-            "The adapter has no timestamps: its steps are in `wait`"
-        };
-        let _ = write!(
-            text,
-            "\nSteps of a batch on the adapter, nanoseconds a load. {clock}; make, send, wait, \
-fetch and spread by the processor's clock; polish: exact answers, nanoseconds a load of the grips \
-scored. Arithmetic and memory: share of the adapter's limit while the kernels run{}.\n\n\
-| twists | loads | contacts | loads a run | chunks | make | send | upload | basis | search | \
-readback | wait | fetch | spread | whole | polish | kernels of whole | arithmetic | memory |\n\
-|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
-            if self.limits.is_some() { "" } else { " (unknown for this one)" }
-        );
-        for row in &self.rows {
-            let Some(steps) = &row.steps else { continue };
-            let loads = (row.grips * row.loads) as f64;
-            let each = |seconds: f64| format!("{:.1}", seconds / loads * 1e9);
-            let maybe = |seconds: Option<f64>| seconds.map_or_else(String::new, each);
-            let percent = |share: Option<f64>| {
-                share.map_or_else(String::new, |share| format!("{:.1} %", share * 100.0))
-            };
-            let polish = row.scoring.as_ref().and_then(|scoring| {
-                Some(scoring.polish? / (scoring.grips * row.loads) as f64 * loads)
-            });
-            let _ = writeln!(
-                text,
-                "| {} | {} | {} | {loads} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | \
-{} | {} | {} | {} |",
-                row.twists,
-                row.loads,
-                row.contacts,
-                steps.chunks,
-                each(steps.make),
-                each(steps.send),
-                maybe(steps.upload),
-                maybe(steps.basis),
-                maybe(steps.search),
-                maybe(steps.readback),
-                each(steps.wait),
-                each(steps.fetch),
-                each(steps.spread),
-                each(steps.whole),
-                maybe(polish),
-                percent(row.share.as_ref().map(|share| share.kernels)),
-                percent(row.share.as_ref().and_then(|share| share.arithmetic)),
-                percent(row.share.as_ref().and_then(|share| share.memory)),
-            );
-        }
     }
 }

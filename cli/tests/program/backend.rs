@@ -198,6 +198,12 @@ fn devices_and_bench_write_json() {
     let results = report["results"].as_array().unwrap();
     assert_eq!(results.len(), 7 * if devices.is_empty() { 1 } else { 2 });
     assert!(results.iter().all(|row| row["loads_per_second"].as_f64().unwrap() > 0.0), "{report}");
+    // A grip takes a pose up and few of its loads down, on an adapter only.
+    for row in results.iter().filter(|row| row["workload"] != "solve_all") {
+        let bytes = ["bytes_up_per_grip", "bytes_down_per_grip"].map(|key| row[key].as_f64());
+        assert_eq!(bytes[0].is_some(), row["backend"] != "cpu", "{row}");
+        assert!(bytes.iter().flatten().all(|bytes| (8.0..1600.0).contains(bytes)), "{row}");
+    }
 }
 
 /// `benches/device.sh` in seconds, with this build's program and without the test binary.

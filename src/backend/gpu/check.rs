@@ -3,25 +3,32 @@
 
 use std::sync::Arc;
 
-use glam::{DMat2, DVec2, DVec3};
+use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 
-use super::super::job::Job;
-use super::super::layout::{BOUNDED, COUPLED, LEAST_DISSIPATION, LoadRecord, SeedRecord};
-use super::super::prepare::{Contacts, Records, not_searched};
+use super::super::lanes::Loads;
+use super::super::layout::{
+    CaseRecord, ContactHeader, EdgeRecord, FoundRecord, GripRecord, LEAST_DISSIPATION, LoadRecord,
+    OPEN, SeedRecord,
+};
+use super::super::prepare::{Contacts, Records};
+use super::super::screen::Wanted;
+use super::super::search::Field as SearchField;
 use super::super::seeds::{NEGATED, RING};
-use super::super::table::contact_basis;
-use super::super::{Batch, Problem, SeedStatus, cpu};
-use super::{Chunk, ChunkSpans, Failure, Gpu, State, map};
+use super::super::table::{Table, contact_basis};
+use super::super::{Batch, Pose, Problem};
+use super::chunk::{Chunk, Maker, plans};
+use super::survivors::seed;
+use super::{Answer, ChunkSpans, Failure, Gpu, State, map, twin};
 use crate::backend::{F32_TOLERANCE, SeedSet};
 use crate::contact::{Field, Loops, Twist, friction};
 use crate::error::{Error, Result};
 use crate::geometry::polygon::rings_moments;
-use crate::model::{Contact, Patch, Polygon, Wrench};
+use crate::model::{Contact, Frame, Patch, Polygon, Wrench};
 
 /// Largest differences of one number of a kernel.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Deviation {
-    /// `fill_basis` or `search`.
+    /// `fill_basis` or `screen`.
     pub kernel: &'static str,
     /// Which number, and relative to what.
     pub number: &'static str,
@@ -44,6 +51,8 @@ pub struct KernelCheck {
     pub other_twist: usize,
     /// Loads that got bounds on one of them only: a hair inside or outside full contact.
     pub other_status: usize,
+    /// Largest error of a load that is made in single precision, over the bound that is stated.
+    pub load_error: f64,
     /// Loads searched.
     pub loads: usize,
     /// Loads with bounds.
@@ -55,9 +64,10 @@ pub struct KernelCheck {
 }
 
 impl KernelCheck {
-    /// Whether the tolerance covers every difference of a bound that was seen.
+    /// Whether the tolerance covers every difference of a bound that was seen, and the stated error
+    /// that of every load.
     pub fn tolerance_holds(&self) -> bool {
-        self.largest <= self.tolerance
+        self.largest <= self.tolerance && self.load_error <= 1.0
     }
 }
 
@@ -190,6 +200,16 @@ impl Random {
         DVec3::new(self.within(-1.0, 1.0), self.within(-1.0, 1.0), self.within(-1.0, 1.0))
     }
 
+    /// A grip somewhere on a part of some decimetres.
+    pub(super) fn pose(&mut self) -> Pose {
+        let axis = (self.vector() + DVec3::new(0.0, 0.0, 1e-3)).normalize();
+        let rotation = DMat3::from_quat(DQuat::from_axis_angle(axis, self.within(-3.0, 3.0)));
+        Pose {
+            centre_of_mass: self.vector() * 0.1,
+            part_from_grip: Frame { rotation, origin: self.vector() * 0.1 },
+        }
+    }
+
     /// A star-shaped polygon.
     fn patch(&mut self) -> Patch {
         let corners = 3 + self.within(0.0, 8.0) as usize;
@@ -208,7 +228,7 @@ impl Random {
     }
 
     /// Congruent faces, or those of a pad that hangs over an edge.
-    fn contact(&mut self, same: bool) -> Contact {
+    pub(super) fn contact(&mut self, same: bool) -> Contact {
         let face_i = self.patch();
         let cut = self.within(0.6, 1.0);
         let face_ii = if same {
@@ -222,19 +242,67 @@ impl Random {
     }
 }
 
+/// A contact, where it is on the part, and what acts on that.
+type RandomGrip = (Arc<Contact>, Pose, Vec<Wrench>);
+
 /// Contacts under a hundred loads each; every second one with different faces.
-fn random_grips(contacts: usize) -> Vec<(Arc<Contact>, Vec<Wrench>)> {
+fn random_grips(contacts: usize) -> Vec<RandomGrip> {
     let mut random = Random(31);
     let wrench = |random: &mut Random| {
-        let size = 40.0 * 10_f64.powf(random.within(-2.0, -0.3));
+        let size = 40.0 * 10_f64.powf(random.within(-2.5, -0.8));
         Wrench { force: random.vector() * size, moment: random.vector() * size * 0.01 }
     };
     (0..contacts)
         .map(|i| {
             let contact = Arc::new(random.contact(i % 2 == 0));
-            (contact, (0..100).map(|_| wrench(&mut random)).collect())
+            let mut pose = random.pose();
+            // Within some lengths of the pad, or few loads leave it in full contact.
+            pose.part_from_grip.origin = pose.centre_of_mass + random.vector() * 0.02;
+            (contact, pose, (0..100).map(|_| wrench(&mut random)).collect())
         })
         .collect()
+}
+
+/// What the twin of the screen says of a chunk.
+pub(super) fn twins(chunk: &Chunk, seeds: &SeedSet) -> Answer {
+    let cases = cases(chunk);
+    let (mut outcomes, mut entries) = (Vec::new(), Vec::new());
+    for (header, index) in chunk.contacts.iter().zip(0..) {
+        let edges = edges(chunk, header);
+        let table = Table::new(header, edges, seeds);
+        let field = SearchField { header, edges, table: &table, rings: seeds.rings() };
+        let grips = chunk.grips.iter().zip(0..).filter(|(grip, _)| grip.contact == index);
+        outcomes.extend(grips.map(|grip| twin::screen(&field, grip, &cases, &mut entries)));
+    }
+    Answer { outcomes, entries }
+}
+
+/// The listed loads of a chunk.
+fn cases(chunk: &Chunk) -> Vec<CaseRecord> {
+    chunk.lists.iter().flat_map(|list| list.records.iter().copied()).collect()
+}
+
+/// A contact's edges, face by face.
+fn edges<'c>(chunk: &'c Chunk, header: &ContactHeader) -> [&'c [EdgeRecord]; 2] {
+    let face = |a: u32, b: u32| &chunk.edges[a as usize..b as usize];
+    [face(header.edges_i, header.edges_ii), face(header.edges_ii, header.edges_end)]
+}
+
+/// The seeds of a grip's loads among the entries; `None` where a load was left to the processor.
+pub(super) fn by_load(
+    entries: &[FoundRecord],
+    grip: u32,
+) -> std::collections::BTreeMap<u32, Option<SeedRecord>> {
+    let mut all = std::collections::BTreeMap::new();
+    for entry in entries.iter().filter(|entry| entry.grip == grip) {
+        if entry.kind == OPEN {
+            let bit = |bit: &u32| entry.words[*bit as usize / 32] >> (bit % 32) & 1 == 1;
+            all.extend((0..128).filter(bit).map(|bit| (entry.load + bit, None)));
+        } else {
+            all.insert(entry.load, Some(seed(entry)));
+        }
+    }
+    all
 }
 
 /// Largest deviations so far.
@@ -246,8 +314,25 @@ struct Compared {
     bounds: [Most; 3],
     other_twist: usize,
     other_status: usize,
+    load_error: f64,
     loads: usize,
     bounded: usize,
+}
+
+/// A load as both kernels make it.
+struct Made {
+    load: LoadRecord,
+    /// Share by which its bounds are widened.
+    share: f32,
+}
+
+impl Made {
+    fn new(field: &SearchField<'_>, grip: &GripRecord, listed: &CaseRecord) -> Self {
+        let load = twin::make_load(grip, listed);
+        let planes = field.planes(&Loads::new(&[load]));
+        let error = twin::load_error(grip, listed);
+        Self { share: twin::doubt(field, &load, (&planes, 0), error, 0.0), load }
+    }
 }
 
 impl Compared {
@@ -273,29 +358,39 @@ impl Compared {
         }
     }
 
+    /// The error of a load that was made in single precision.
+    fn made(&mut self, found: &LoadRecord, exact: &LoadRecord, error: f32) {
+        let numbers = |load: &LoadRecord| {
+            let [x, y, z] = load.wrench.map(|x| f64::from(x) * f64::from(load.scale));
+            [x, y, z, f64::from(load.f3), f64::from(load.m1), f64::from(load.m2)]
+        };
+        let apart = numbers(found).into_iter().zip(numbers(exact)).map(|(a, b)| (a - b).abs());
+        self.load_error = apart.fold(self.load_error, |most, x| most.max(x / f64::from(error)));
+    }
+
     /// The seed of one load: of the device and the processor.
     fn load(
         &mut self,
         exact: &Exact,
-        load: &LoadRecord,
-        [found, twin]: [&SeedRecord; 2],
+        made: &Made,
+        [found, twin]: [Option<SeedRecord>; 2],
         seeds: &SeedSet,
     ) {
         self.loads += 1;
-        self.other_status += usize::from(found.status != twin.status);
+        self.other_status += usize::from(found.is_some() != twin.is_some());
+        let (Some(found), Some(twin)) = (found, twin) else { return };
         let same = found.best == twin.best;
         self.other_twist += usize::from(!same);
-        let has_bounds = |status: u32| matches!(status, BOUNDED | COUPLED);
-        if !(has_bounds(found.status) && has_bounds(twin.status)) {
-            return;
-        }
         self.bounded += 1;
+        let load = made.load;
         let [f3, m1, m2] = [load.f3, load.m1, load.m2].map(f64::from);
         let gradients = exact.gradients(f3, m1, m2);
         let w = DVec3::from(load.wrench.map(f64::from));
-        let value = lower(w, &gradients, seeds);
+        // The bounds of that load, not widened for what it is off.
+        let (scale, share) = (f64::from(load.scale), f64::from(made.share));
+        let value = scale * (1.0 - share) * lower(w, &gradients, seeds);
         self.bounds[0].add(found.lower, twin.lower, value, value);
-        let value = upper(w, &gradients, seeds, found.best as usize);
+        let value = scale * (1.0 + share) * upper(w, &gradients, seeds, found.best as usize);
         if same {
             self.bounds[1].add(found.upper, twin.upper, value, value);
             for m in 0..3 {
@@ -316,14 +411,15 @@ impl Compared {
             basis[0].of("fill_basis", "dissipation, relative", true),
             basis[1].of("fill_basis", "weight 1, of the area", true),
             basis[2].of("fill_basis", "weights x1 and x2, of the area", true),
-            bounds[0].of("search", "lower bound, relative", true),
-            bounds[1].of("search", "upper bound, relative", true),
-            bounds[2].of("search", "interpolated twist, absolute", false),
+            bounds[0].of("screen", "lower bound, relative", true),
+            bounds[1].of("screen", "upper bound, relative", true),
+            bounds[2].of("screen", "interpolated twist, absolute", false),
         ];
         KernelCheck {
             deviations,
             other_twist: self.other_twist,
             other_status: self.other_status,
+            load_error: self.load_error,
             loads: self.loads,
             bounded: self.bounded,
             tolerance: F32_TOLERANCE,
@@ -341,54 +437,60 @@ impl Gpu {
     /// [`crate::error::ErrorKind::Device`] when the device fails or leaves a record unwritten.
     pub fn check_kernels(&self, seeds: &SeedSet, contacts: usize) -> Result<KernelCheck> {
         let grips = random_grips(contacts);
-        let problems: Vec<Problem<'_>> = grips
-            .iter()
-            .map(|(contact, wrenches)| Problem { contact, distance: 0.0, force: 40.0, wrenches })
-            .collect();
-        let batch = Batch { problems };
+        let problems = grips.iter().map(|(contact, pose, wrenches)| Problem {
+            contact,
+            distance: 0.0,
+            force: 40.0,
+            wrenches,
+            pose: Some(*pose),
+        });
+        let batch = Batch { problems: problems.collect() };
         let made = Contacts::new(&batch.problems)?;
-        let job = Job::new(&made, &batch, seeds)?;
-        let mut answers = vec![not_searched(SeedStatus::NoContact); job.loads];
+        let users = (0..batch.problems.len()).map(|index| (made.slots[index], vec![index]));
+        let limits = (self.limits(), seeds.len());
         let mut compared = Compared::default();
-        for mut plan in job.plans(self.limits(), &mut answers) {
-            let chunk = job.build(&mut plan);
-            let members: Vec<usize> = plan.iter().map(|(contact, _)| *contact).collect();
-            let (records, found) = self.records_and_basis(&chunk, seeds)?;
-            let twins = cpu::run(&chunk, seeds);
-            for (header, (&member, index)) in chunk.contacts.iter().zip(members.iter().zip(0..)) {
-                let Some(prepared) = &job.contacts.ready[member].records else { continue };
-                let exact = Exact::new(&grips[member].0, prepared, seeds);
-                let face = |a: u32, b: u32| &chunk.edges[a as usize..b as usize];
-                let edges = [
-                    face(header.edges_i, header.edges_ii),
-                    face(header.edges_ii, header.edges_end),
-                ];
-                let twin = contact_basis(header, edges, seeds.twists()).concat();
-                compared.basis(&exact, &twin, &found[header.basis as usize * 4..], seeds);
-                let groups = chunk.groups.iter().filter(|group| group.contact == index);
-                for load in groups.flat_map(|group| group.first..group.first + group.count) {
-                    let load = load as usize;
-                    compared.load(
-                        &exact,
-                        &chunk.loads[load],
-                        [&records[load], &twins[load]],
-                        seeds,
-                    );
+        for plan in plans(&made, &batch.problems, users.collect(), limits) {
+            let with = (seeds.len(), Wanted::All);
+            let chunk = Maker::default().chunk((&made, &batch.problems), &plan, with);
+            let (answer, found) = self.answer_and_basis(&chunk, seeds)?;
+            let (twin, listed) = (twins(&chunk, seeds), cases(&chunk));
+            for ((header, index), (slot, pieces)) in chunk.contacts.iter().zip(0..).zip(&plan) {
+                let Some(prepared) = &made.ready[*slot].records else { continue };
+                let problem = &batch.problems[pieces[0].problem];
+                let exact = Exact::new(problem.contact, prepared, seeds);
+                let edges = edges(&chunk, header);
+                let basis = contact_basis(header, edges, seeds.twists()).concat();
+                compared.basis(&exact, &basis, &found[header.basis as usize * 4..], seeds);
+                let table = Table::new(header, edges, seeds);
+                let field = SearchField { header, edges, table: &table, rings: seeds.rings() };
+                for (grip, number) in
+                    chunk.grips.iter().zip(0..).filter(|(grip, _)| grip.contact == index)
+                {
+                    let [found, twin] =
+                        [&answer, &twin].map(|answer| by_load(&answer.entries, number));
+                    for load in 0..grip.count {
+                        let listed = &listed[(grip.first + load) as usize];
+                        let made = Made::new(&field, grip, listed);
+                        let wrench = problem.wrench(load as usize);
+                        if let Ok((exact, _)) = prepared.load(problem, &wrench) {
+                            compared.made(&made.load, &exact, twin::load_error(grip, listed));
+                        }
+                        let of = |all: &std::collections::BTreeMap<u32, Option<SeedRecord>>| {
+                            all.get(&load).copied().flatten()
+                        };
+                        compared.load(&exact, &made, [of(&found), of(&twin)], seeds);
+                    }
                 }
             }
         }
         Ok(compared.check())
     }
 
-    /// The records of a chunk, and the basis that the first kernel left.
-    fn records_and_basis(
-        &self,
-        chunk: &Chunk,
-        seeds: &SeedSet,
-    ) -> Result<(Vec<SeedRecord>, Vec<f32>)> {
+    /// What came of a chunk, and the basis that the first kernel left.
+    fn answer_and_basis(&self, chunk: &Chunk, seeds: &SeedSet) -> Result<(Answer, Vec<f32>)> {
         let mut state = State::default();
         let ticket = self.submit(&mut state, 0, chunk, seeds, std::time::Instant::now())?;
-        let records = self.collect(&ticket, &mut ChunkSpans::default())?;
+        let answer = self.collect(&ticket, &mut ChunkSpans::default())?;
         let fault = |why: String| Error::from(Failure::Fault(why));
         let Some(basis) = &state.slots[0].basis else {
             return Err(fault("the basis was not kept".to_owned()));
@@ -402,14 +504,8 @@ impl Gpu {
         let mut encoder = self.device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(basis, 0, &readback, 0, bytes);
         let submission = self.queue.submit([encoder.finish()]);
-        let mapped = map(&readback, wgpu::MapMode::Read);
-        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
-        self.device.poll(wait).map_err(|error| fault(error.to_string()))?;
-        self.check_lost()?;
-        if !matches!(mapped.try_recv(), Ok(Ok(()))) {
-            return Err(fault("the basis was not ready after the wait".to_owned()));
-        }
+        self.wait(&submission, &map(&readback, wgpu::MapMode::Read))?;
         let view = readback.get_mapped_range(..).map_err(|error| fault(error.to_string()))?;
-        Ok((records, bytemuck::pod_collect_to_vec(&view)))
+        Ok((answer, bytemuck::pod_collect_to_vec(&view)))
     }
 }

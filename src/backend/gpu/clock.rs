@@ -42,7 +42,7 @@ pub struct DeviceSpans {
     pub upload: Option<Span>,
     /// The basis kernel.
     pub basis: Span,
-    /// The search kernel.
+    /// The screen.
     pub search: Span,
     /// Records to memory that the processor reads; `None` where timestamps are for kernels only.
     pub readback: Option<Span>,
@@ -53,6 +53,10 @@ pub struct DeviceSpans {
 pub struct ChunkSpans {
     /// Loads in it.
     pub loads: usize,
+    /// Grips in it; one with very many loads counts as several.
+    pub grips: usize,
+    /// Seeds that came back, and windows of loads left to the processor.
+    pub entries: usize,
     /// Bytes to the device.
     pub bytes_up: u64,
     /// Bytes back.
@@ -65,7 +69,7 @@ pub struct ChunkSpans {
     pub wait: Span,
     /// The processor copies the answers.
     pub fetch: Span,
-    /// The processor turns them into seeds.
+    /// The processor turns them into seeds, and finds those of the loads left to it.
     pub spread: Span,
     /// On the device; `None` without timestamps, or when the device was lost.
     pub device: Option<DeviceSpans>,

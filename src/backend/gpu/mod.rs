@@ -1,10 +1,19 @@
 //! The kernels on the graphics processor, through wgpu. Two sets of buffers: while one chunk
 //! computes, the next is uploaded and the one before read back.
+//!
+//! Up go contacts and grips, each grip a pose of some 80 bytes, and the list of loads unless it lies
+//! there already. The loads of a grip are made where they are searched. Back come eight bytes for
+//! each grip, and 32 for each load that can be its worst; loads without bounds come back as bits. No
+//! memory, there or here, grows with grips times loads.
 
 mod adapter;
+mod buffers;
 mod check;
+mod chunk;
 mod clock;
 mod shader;
+mod survivors;
+mod twin;
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
@@ -14,11 +23,14 @@ pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, list};
 pub use check::{Deviation, KernelCheck};
 pub use clock::{ChunkSpans, DeviceSpans, Span, Timeline};
 
-use super::job::Limits;
-use super::layout::{ContactHeader, EdgeRecord, GAUSS, GroupRecord, LoadRecord, SeedRecord};
-use super::prepare::Chunk;
+use super::layout::{
+    CaseRecord, ContactHeader, EdgeRecord, FoundRecord, GAUSS, GripRecord, OutcomeRecord,
+    TwistRecord,
+};
 use super::seeds::SeedSet;
 use crate::error::{Error, Result};
+use buffers::map;
+use chunk::{Chunk, Limits, List};
 use clock::Clock;
 use shader::Kernel;
 
@@ -26,8 +38,17 @@ use shader::Kernel;
 const CHUNK_BYTES: u64 = 64 << 20;
 
 /// Most loads in one chunk: so many that a submission's own cost (some 0.1 ms) is lost in the time
-/// that the processor takes to make and spread them, and so few that a block has several chunks.
-const CHUNK_LOADS: u64 = 1 << 17;
+/// that the processor takes for their grips, and so few that a block has several chunks.
+const CHUNK_LOADS: usize = 1 << 18;
+
+/// Entries for each grip of a chunk that there is room for at least: some 5 to 40 come back of 500
+/// loads ...
+const ROOM: f64 = 96.0;
+/// ... and for so many loads one.
+const LOADS_A_ROOM: usize = 4;
+
+/// What the count of entries takes in front of the outcomes.
+const TALLY: u64 = 16;
 
 /// Why a chunk did not come back.
 #[derive(Debug)]
@@ -54,12 +75,14 @@ pub struct Gpu {
     device: wgpu::Device,
     queue: wgpu::Queue,
     fan: Kernel,
-    search: Kernel,
+    screen: Kernel,
     gauss: wgpu::Buffer,
     limits: Limits,
     lost: Arc<AtomicBool>,
     /// Chunks that the processor computed because the device was lost.
     redone: AtomicU64,
+    /// Grips that the processor looked at because there was no room for their entries.
+    crowded: AtomicU64,
     /// Whether a lost device is an error.
     strict: bool,
     state: Mutex<State>,
@@ -71,8 +94,13 @@ pub struct Gpu {
 /// Buffers that are kept between calls.
 #[derive(Debug, Default)]
 struct State {
-    seeds: Option<(SeedSet, wgpu::Buffer, wgpu::Buffer)>,
+    seeds: Option<(SeedSet, wgpu::Buffer)>,
+    /// The lists of loads that lie on the device.
+    lists: Vec<Arc<List>>,
+    cases: Option<wgpu::Buffer>,
     slots: [Slot; 2],
+    /// Entries for each grip that came of the last chunk.
+    rate: f64,
 }
 
 /// One chunk's buffers; they only grow.
@@ -82,9 +110,9 @@ struct Slot {
     contacts: Option<wgpu::Buffer>,
     edges: Option<wgpu::Buffer>,
     basis: Option<wgpu::Buffer>,
-    loads: Option<wgpu::Buffer>,
-    groups: Option<wgpu::Buffer>,
-    seeds: Option<wgpu::Buffer>,
+    grips: Option<wgpu::Buffer>,
+    tally: Option<wgpu::Buffer>,
+    found: Option<wgpu::Buffer>,
     readback: Option<wgpu::Buffer>,
     queries: Option<(wgpu::QuerySet, wgpu::Buffer)>,
 }
@@ -104,10 +132,21 @@ struct Ticket {
     submission: wgpu::SubmissionIndex,
     mapped: Mapped,
     readback: wgpu::Buffer,
-    /// Of the records; timestamps lie behind them.
-    bytes: u64,
+    grips: usize,
+    /// Entries that there is room for, and those that are read back in any case.
+    entries: [usize; 2],
+    found: wgpu::Buffer,
     timed: bool,
     spans: ChunkSpans,
+}
+
+/// What came back of a chunk.
+#[derive(Debug)]
+pub(crate) struct Answer {
+    /// Of each grip.
+    outcomes: Vec<OutcomeRecord>,
+    /// Of all grips, in no order.
+    entries: Vec<FoundRecord>,
 }
 
 impl Gpu {
@@ -135,7 +174,7 @@ impl Gpu {
         device.set_device_lost_callback(move |_, _| flag.store(true, Ordering::Release));
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let fan = Kernel::new(&device, "fill_basis", shader::FAN, &shader::FAN_BINDINGS);
-        let search = Kernel::new(&device, "search", shader::SEARCH, &shader::SEARCH_BINDINGS);
+        let screen = Kernel::new(&device, "screen", shader::SCREEN, &shader::SCREEN_BINDINGS);
         let gauss = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("gauss"),
             size: size_of_val(&GAUSS) as u64,
@@ -150,26 +189,29 @@ impl Gpu {
             .min(available.max_storage_buffer_binding_size)
             .min(available.max_buffer_size);
         let rows = u64::from(available.max_compute_workgroups_per_dimension);
-        // A group per load is the worst case; they fill a grid of GRID columns.
-        let loads = (bytes / size_of::<LoadRecord>() as u64)
-            .min(u64::from(shader::GRID) * rows)
-            .min(CHUNK_LOADS) as usize;
+        let fit = |each: usize| (bytes / each as u64) as usize;
+        // Grips fill a grid of GRID columns.
+        let grid = (u64::from(shader::GRID) * rows) as usize;
         let limits = Limits {
-            loads,
-            contacts: (bytes / size_of::<ContactHeader>() as u64).min(rows) as usize,
-            edges: (bytes / size_of::<EdgeRecord>() as u64) as usize,
-            basis: (bytes / size_of::<[f32; 4]>() as u64) as usize,
+            loads: CHUNK_LOADS,
+            grips: fit(size_of::<GripRecord>()).min(grid),
+            contacts: fit(size_of::<ContactHeader>()).min(rows as usize),
+            edges: fit(size_of::<EdgeRecord>()),
+            basis: fit(size_of::<[f32; 4]>()),
+            cases: fit(size_of::<CaseRecord>()),
+            entries: fit(size_of::<FoundRecord>()),
         };
         Ok(Self {
             info,
             device,
             queue,
             fan,
-            search,
+            screen,
             gauss,
             limits,
             lost,
             redone: AtomicU64::new(0),
+            crowded: AtomicU64::new(0),
             strict,
             state: Mutex::default(),
             clock: Mutex::default(),
@@ -193,6 +235,12 @@ impl Gpu {
         self.redone.load(Ordering::Relaxed)
     }
 
+    /// Grips (of one with very many loads, parts of it) that the processor looked at because more
+    /// came back of their chunk than there was room for.
+    pub fn grips_redone(&self) -> u64 {
+        self.crowded.load(Ordering::Relaxed)
+    }
+
     /// Rehearses the loss of the device: it goes before the chunk number `before` (from 1), and a
     /// chunk has no more than `loads` loads.
     pub fn lose_before(&mut self, before: u64, loads: usize) {
@@ -213,19 +261,19 @@ impl Gpu {
         self.limits
     }
 
-    /// Computes chunk after chunk, handing each chunk's records to `take` in order. `next` makes
-    /// the following chunk while the device works on the one before.
+    /// Computes chunk after chunk, handing each chunk's answer to `take` in order; `None` when the
+    /// device was lost. `next` makes the following chunk while the device works on the one before.
     pub(crate) fn run<T>(
         &self,
         seeds: &SeedSet,
         next: impl FnMut() -> Option<(Chunk, T)>,
-        take: impl FnMut(Vec<SeedRecord>, T) -> Result<()>,
+        take: impl FnMut(Option<Answer>, T) -> Result<()>,
     ) -> Result<()> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let outcome = self.run_chunks(&mut state, seeds, next, take);
         if outcome.is_err() {
             // A chunk may still be in flight: its buffers are not used again.
-            state.slots = Default::default();
+            *state = State { seeds: state.seeds.take(), ..State::default() };
         }
         outcome
     }
@@ -235,38 +283,41 @@ impl Gpu {
         state: &mut State,
         seeds: &SeedSet,
         mut next: impl FnMut() -> Option<(Chunk, T)>,
-        mut take: impl FnMut(Vec<SeedRecord>, T) -> Result<()>,
+        mut take: impl FnMut(Option<Answer>, T) -> Result<()>,
     ) -> Result<()> {
-        let mut in_flight: Option<(Chunk, T, std::result::Result<Ticket, Failure>)> = None;
+        let mut in_flight: Option<(T, std::result::Result<Ticket, Failure>)> = None;
         let mut slot = 0;
         loop {
             let begin = Instant::now();
             let submitted = next().map(|(chunk, rest)| {
                 let ticket = self.submit(state, slot, &chunk, seeds, begin);
-                (chunk, rest, ticket)
+                if ticket.is_err() {
+                    // What was sent may not have come.
+                    state.lists.clear();
+                }
+                (rest, ticket)
             });
             slot = 1 - slot;
-            let Some((chunk, rest, ticket)) = std::mem::replace(&mut in_flight, submitted) else {
+            let Some((rest, ticket)) = std::mem::replace(&mut in_flight, submitted) else {
                 if in_flight.is_none() {
                     return Ok(());
                 }
                 continue;
             };
             let mut spans = ChunkSpans::default();
-            let outcome = ticket.and_then(|ticket| {
-                let records = self.collect(&ticket, &mut spans)?;
-                Ok(records)
-            });
-            let records = match outcome {
-                Ok(records) => records,
+            let answer = match ticket.and_then(|ticket| self.collect(&ticket, &mut spans)) {
+                Ok(answer) => {
+                    state.rate = answer.entries.len() as f64 / answer.outcomes.len().max(1) as f64;
+                    Some(answer)
+                }
                 Err(Failure::Lost(_)) if !self.strict => {
                     self.redone.fetch_add(1, Ordering::Relaxed);
-                    super::cpu::run(&chunk, seeds)
+                    None
                 }
                 Err(failure) => return Err(failure.into()),
             };
             let begin = Instant::now();
-            take(records, rest)?;
+            take(answer, rest)?;
             if let Some(clock) = &mut *self.clock() {
                 spans.spread = clock.span(begin, Instant::now());
                 clock.timeline.chunks.push(spans);
@@ -326,23 +377,31 @@ impl Gpu {
 
     /// The twists on the device, unless they are there.
     fn keep_seeds(&self, state: &mut State, seeds: &SeedSet) {
-        if state.seeds.as_ref().is_some_and(|(known, ..)| known == seeds) {
+        if state.seeds.as_ref().is_some_and(|(known, _)| known == seeds) {
             return;
         }
-        let upload = |name: &str, bytes: &[u8]| {
-            let buffer = self.buffer(
-                name,
-                bytes.len() as u64,
-                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            );
-            self.queue.write_buffer(&buffer, 0, bytes);
-            buffer
-        };
-        let (twists, rings) = (
-            upload("twists", bytemuck::cast_slice(seeds.twists())),
-            upload("rings", bytemuck::cast_slice(seeds.rings())),
-        );
-        state.seeds = Some((seeds.clone(), twists, rings));
+        let pairs = seeds.twists().iter().zip(seeds.rings());
+        let records: Vec<TwistRecord> =
+            pairs.map(|(&twist, &ring)| TwistRecord { twist, ring, padding: [0; 2] }).collect();
+        let bytes = bytemuck::cast_slice::<TwistRecord, u8>(&records);
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        let buffer = self.buffer("twists", bytes.len() as u64, usage);
+        self.queue.write_buffer(&buffer, 0, bytes);
+        state.seeds = Some((seeds.clone(), buffer));
+    }
+
+    /// Entries of a chunk that there is room for, and those that are read back in any case: a
+    /// quarter more than came of the one before.
+    fn entries(&self, rate: f64, chunk: &Chunk) -> [usize; 2] {
+        let grips = chunk.grips.len();
+        // Each load, and each window of 128 with some left open.
+        let most = (chunk.loads + chunk.loads / 128 + grips).min(self.limits.entries);
+        let share = |each: f64| ((each * grips as f64) as usize + 64).min(most);
+        if chunk.every {
+            return [most; 2];
+        }
+        let room = share(ROOM.max(2.0 * rate)).max((chunk.loads / LOADS_A_ROOM).min(most));
+        [room, share(1.25 * rate).min(room)]
     }
 
     fn encode(
@@ -356,33 +415,49 @@ impl Gpu {
         let timed = self.has_timestamps() && self.clock().is_some();
         let copies = timed && self.times_copies();
         self.keep_seeds(state, seeds);
-        let State { seeds: known, slots } = state;
+        // Lists that lie there already are not sent again.
+        let known = |(a, b): (&Arc<List>, &Arc<List>)| Arc::ptr_eq(a, b) || a == b;
+        let there = state.lists.len() == chunk.lists.len()
+            && state.lists.iter().zip(&chunk.lists).all(known);
+        let cases: Vec<CaseRecord> = if there {
+            Vec::new()
+        } else {
+            chunk.lists.iter().flat_map(|list| list.records.iter().copied()).collect()
+        };
+        let all = chunk.lists.iter().map(|list| list.records.len()).sum::<usize>();
+        let case_bytes = (all * size_of::<CaseRecord>()) as u64;
+        let [room, sure] = self.entries(state.rate, chunk);
+        let State { seeds: known, lists, cases: on_device, slots, .. } = state;
         let slot = &mut slots[slot];
-        let records = (chunk.loads.len() * size_of::<SeedRecord>()) as u64;
+        let tally_bytes = TALLY + (chunk.grips.len() * size_of::<OutcomeRecord>()) as u64;
+        let [found_bytes, back_bytes] =
+            [room, sure].map(|count| (count * size_of::<FoundRecord>()) as u64);
         let basis_bytes = (chunk.basis * size_of::<[f32; 4]>()) as u64;
         let input = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let output = input | wgpu::BufferUsages::COPY_SRC;
         let arrays: [&[u8]; 4] = [
             bytemuck::cast_slice::<ContactHeader, u8>(&chunk.contacts),
             bytemuck::cast_slice::<EdgeRecord, u8>(&chunk.edges),
-            bytemuck::cast_slice::<LoadRecord, u8>(&chunk.loads),
-            bytemuck::cast_slice::<GroupRecord, u8>(&chunk.groups),
+            bytemuck::cast_slice::<GripRecord, u8>(&chunk.grips),
+            bytemuck::cast_slice::<CaseRecord, u8>(&cases),
         ];
         let lengths = arrays.map(|array| array.len() as u64);
         let staging = self.staged(&mut slot.staging, &arrays)?;
         let inputs = [
             self.grown(&mut slot.contacts, "contacts", lengths[0], input),
             self.grown(&mut slot.edges, "edges", lengths[1], input),
-            self.grown(&mut slot.loads, "loads", lengths[2], input),
-            self.grown(&mut slot.groups, "groups", lengths[3], input),
+            self.grown(&mut slot.grips, "grips", lengths[2], input),
+            self.grown(on_device, "loads", case_bytes, input),
         ];
+        lists.clone_from(&chunk.lists);
         let basis = self.grown(&mut slot.basis, "basis", basis_bytes, output);
-        let found = self.grown(&mut slot.seeds, "seeds", records, output);
+        let tally = self.grown(&mut slot.tally, "tally", tally_bytes, output);
+        let found = self.grown(&mut slot.found, "found", found_bytes, output);
         let times = u64::from(clock::QUERIES) * u64::from(wgpu::QUERY_SIZE);
         let readback = self.grown(
             &mut slot.readback,
             "readback",
-            records + times,
+            tally_bytes + back_bytes + times,
             wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
         );
         let queries = timed.then(|| &*slot.queries.get_or_insert_with(|| self.queries()));
@@ -403,29 +478,29 @@ impl Gpu {
         };
         stamp(&mut encoder, clock::UPLOAD);
         let mut offset = 0;
-        for (buffer, length) in inputs.iter().zip(lengths) {
+        for (buffer, length) in inputs.iter().zip(lengths).filter(|(_, length)| *length > 0) {
             encoder.copy_buffer_to_buffer(&staging, offset, buffer, 0, length);
             offset += length;
         }
-        // Zero is the status UNWRITTEN.
-        encoder.clear_buffer(&found, 0, Some(records));
-        if let Some((seeds, twists, rings)) = &*known {
-            let (twists, rings) = (
-                (twists, size_of_val(seeds.twists()) as u64),
-                (rings, size_of_val(seeds.rings()) as u64),
-            );
-            let [contacts, edges, loads, groups] = [0, 1, 2, 3].map(|i| (&inputs[i], lengths[i]));
+        // Zero is UNWRITTEN, and no entry of an earlier chunk is taken for one of this.
+        encoder.clear_buffer(&tally, 0, Some(tally_bytes));
+        encoder.clear_buffer(&found, 0, Some(found_bytes));
+        if let Some((seeds, twists)) = &*known {
+            let twists = (twists, (seeds.len() * size_of::<TwistRecord>()) as u64);
+            let [contacts, edges, grips] = [0, 1, 2].map(|i| (&inputs[i], lengths[i]));
+            let cases = (&inputs[3], case_bytes);
             let (basis, gauss) = ((&basis, basis_bytes), (&self.gauss, size_of_val(&GAUSS) as u64));
             let fan = self.fan.bind(device, &[contacts, edges, twists, basis, gauss]);
-            let bound = [contacts, edges, twists, rings, basis, loads, groups, (&found, records)];
-            let search = self.search.bind(device, &bound);
+            let (tally, found) = ((&tally, tally_bytes), (&found, found_bytes));
+            let bound = [contacts, edges, twists, basis, cases, grips, tally, found];
+            let screen = self.screen.bind(device, &bound);
             let twists = seeds.len().div_ceil(super::layout::BASIS_GROUP) as u32;
-            let count = chunk.groups.len() as u32;
+            let count = chunk.grips.len() as u32;
             for (kernel, bound, place, [x, y]) in [
                 (&self.fan, fan, clock::BASIS, [twists, chunk.contacts.len() as u32]),
                 (
-                    &self.search,
-                    search,
+                    &self.screen,
+                    screen,
                     clock::SEARCH,
                     [count.min(shader::GRID), count.div_ceil(shader::GRID)],
                 ),
@@ -436,149 +511,30 @@ impl Gpu {
                 pass.dispatch_workgroups(x, y, 1);
             }
         }
-        encoder.copy_buffer_to_buffer(&found, 0, &readback, 0, records);
+        encoder.copy_buffer_to_buffer(&tally, 0, &readback, 0, tally_bytes);
+        encoder.copy_buffer_to_buffer(&found, 0, &readback, tally_bytes, back_bytes);
         stamp(&mut encoder, clock::READBACK);
         if let Some((set, resolved)) = queries {
             // Places that were not written are not read either.
             let first = if copies { clock::UPLOAD } else { clock::BASIS };
             let end = if copies { clock::QUERIES } else { clock::READBACK };
             encoder.resolve_query_set(set, first..end, resolved, 0);
-            encoder.copy_buffer_to_buffer(resolved, 0, &readback, records, times);
+            encoder.copy_buffer_to_buffer(resolved, 0, &readback, tally_bytes + back_bytes, times);
         }
         let submission = queue.submit([encoder.finish()]);
         slot.staging =
             Some(Staging { mapped: map(&staging, wgpu::MapMode::Write), buffer: staging });
         let mapped = map(&readback, wgpu::MapMode::Read);
         let spans = ChunkSpans {
-            loads: chunk.loads.len(),
+            loads: chunk.loads,
             bytes_up: lengths.iter().sum(),
-            bytes_down: records,
+            bytes_down: tally_bytes + back_bytes,
+            grips: chunk.grips.len(),
             ..ChunkSpans::default()
         };
-        Ok(Ticket { submission, mapped, readback, bytes: records, timed, spans })
+        let (grips, entries) = (chunk.grips.len(), [room, sure]);
+        Ok(Ticket { submission, mapped, readback, grips, entries, found, timed, spans })
     }
-
-    /// The arrays, one behind the other, in memory that the device copies from: that of the chunk
-    /// before the last, which was waited for, where it is large enough.
-    fn staged(
-        &self,
-        place: &mut Option<Staging>,
-        arrays: &[&[u8]],
-    ) -> std::result::Result<wgpu::Buffer, Failure> {
-        let bytes: usize = arrays.iter().map(|array| array.len()).sum();
-        let used = place.take().filter(|staging| {
-            staging.buffer.size() >= bytes as u64 && matches!(staging.mapped.try_recv(), Ok(Ok(())))
-        });
-        let buffer = used.map_or_else(
-            || {
-                self.device.create_buffer(&wgpu::BufferDescriptor {
-                    label: Some("staging"),
-                    size: (bytes as u64).next_power_of_two().max(16),
-                    usage: wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC,
-                    mapped_at_creation: true,
-                })
-            },
-            |staging| staging.buffer,
-        );
-        let mut view = buffer
-            .get_mapped_range_mut(0..bytes as u64)
-            .map_err(|error| Failure::Lost(format!("memory for the upload: {error}")))?;
-        let mut from = 0;
-        for array in arrays {
-            view.slice(from..from + array.len()).copy_from_slice(array);
-            from += array.len();
-        }
-        drop(view);
-        buffer.unmap();
-        Ok(buffer)
-    }
-
-    /// Waits for a chunk and copies its records.
-    fn collect(
-        &self,
-        ticket: &Ticket,
-        spans: &mut ChunkSpans,
-    ) -> std::result::Result<Vec<SeedRecord>, Failure> {
-        let begin = Instant::now();
-        let wait = wgpu::PollType::Wait {
-            submission_index: Some(ticket.submission.clone()),
-            timeout: None,
-        };
-        let outcome = self.device.poll(wait);
-        let ready = Instant::now();
-        self.check_lost()?;
-        outcome.map_err(|error| match error {
-            // A device that is gone takes no submission; its own word of that may come later.
-            wgpu::PollError::WrongSubmissionIndex(..) => {
-                Failure::Lost("it did not take the work".to_owned())
-            }
-            error => Failure::Fault(format!("waiting for the graphics processor: {error}")),
-        })?;
-        match ticket.mapped.try_recv() {
-            Ok(Ok(())) => {}
-            Ok(Err(error)) => return Err(Failure::Lost(format!("reading back: {error}"))),
-            Err(_) => {
-                return Err(Failure::Fault("the answers were not ready after the wait".to_owned()));
-            }
-        }
-        let view = ticket
-            .readback
-            .get_mapped_range(..)
-            .map_err(|error| Failure::Fault(error.to_string()))?;
-        let (records, rest) = view.split_at(ticket.bytes as usize);
-        let records = bytemuck::pod_collect_to_vec(records);
-        if let Some(clock) = &*self.clock() {
-            *spans = ticket.spans;
-            spans.wait = clock.span(begin, ready);
-            spans.fetch = clock.span(ready, Instant::now());
-            if ticket.timed {
-                let count = clock::QUERIES as usize * size_of::<u64>();
-                let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&rest[..count]);
-                spans.device = clock.device(&ticks, self.times_copies());
-            }
-        }
-        drop(view);
-        ticket.readback.unmap();
-        Ok(records)
-    }
-
-    fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
-        self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size: size.max(16),
-            usage,
-            mapped_at_creation: false,
-        })
-    }
-
-    /// The slot's buffer, replaced by a larger one where `size` needs it.
-    fn grown(
-        &self,
-        place: &mut Option<wgpu::Buffer>,
-        label: &str,
-        size: u64,
-        usage: wgpu::BufferUsages,
-    ) -> wgpu::Buffer {
-        match place {
-            Some(buffer) if buffer.size() >= size => buffer.clone(),
-            _ => {
-                let most = self.device.limits().max_buffer_size;
-                place
-                    .insert(self.buffer(label, size.next_power_of_two().min(most).max(size), usage))
-                    .clone()
-            }
-        }
-    }
-}
-
-/// Asks for the buffer's memory, once the device is done with it.
-fn map(buffer: &wgpu::Buffer, mode: wgpu::MapMode) -> Mapped {
-    let (sender, mapped) = mpsc::channel();
-    buffer.map_async(mode, .., move |outcome| {
-        // The receiver is gone only when the call was abandoned.
-        let _ = sender.send(outcome);
-    });
-    mapped
 }
 
 #[cfg(test)]

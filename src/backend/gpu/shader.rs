@@ -1,20 +1,25 @@
 //! The two kernels: their text, constants, binding layouts and pipelines.
 
 use super::super::layout;
+use super::super::problem::F32_TOLERANCE;
 
 /// What both kernels share.
 pub(crate) const LAYOUT: &str = include_str!("../../../shaders/layout.wgsl");
 /// The basis kernel.
 pub(crate) const FAN: &str = include_str!("../../../shaders/fan.wgsl");
-/// The search kernel.
-pub(crate) const SEARCH: &str = include_str!("../../../shaders/search.wgsl");
+/// The functions that the screen searches with, and the screen.
+pub(crate) const SCREEN: &str = concat!(
+    include_str!("../../../shaders/search.wgsl"),
+    "\n",
+    include_str!("../../../shaders/screen.wgsl")
+);
 
 /// Workgroups per row of a dispatch (the guaranteed least of every implementation is 65,535 per
 /// dimension).
 pub(crate) const GRID: u32 = 32_768;
 
 /// The constants that the shaders leave open, from [`layout`].
-pub(crate) fn constants() -> [(&'static str, f64); 17] {
+pub(crate) fn constants() -> [(&'static str, f64); 27] {
     [
         ("GROUP", layout::GROUP as f64),
         ("BASIS_GROUP", layout::BASIS_GROUP as f64),
@@ -32,6 +37,16 @@ pub(crate) fn constants() -> [(&'static str, f64); 17] {
         ("BOUNDED", f64::from(layout::BOUNDED)),
         ("UNBOUNDED", f64::from(layout::UNBOUNDED)),
         ("COUPLED", f64::from(layout::COUPLED)),
+        ("OPEN", f64::from(layout::OPEN)),
+        ("KINDS", f64::from(layout::KINDS)),
+        ("F32_TOLERANCE", F32_TOLERANCE),
+        ("RANGE", f64::from(layout::RANGE)),
+        ("LEAST_LOAD", f64::from(layout::LEAST_LOAD)),
+        ("MOST_PULL", f64::from(layout::MOST_PULL)),
+        ("LOAD_ROUNDING", f64::from(layout::LOAD_ROUNDING)),
+        ("LOAD_MARGIN", f64::from(layout::LOAD_MARGIN)),
+        ("SWAY_CONGRUENT", f64::from(layout::SWAY_CONGRUENT)),
+        ("SWAY_DIFFERENT", f64::from(layout::SWAY_DIFFERENT)),
         ("GRID", f64::from(GRID)),
     ]
 }
@@ -48,15 +63,16 @@ pub(crate) enum Access {
 pub(crate) const FAN_BINDINGS: [Access; 5] =
     [Access::Read, Access::Read, Access::Read, Access::Write, Access::Uniform];
 
-/// Bindings of the search kernel: contacts, edges, twists, rings, basis, loads, groups, seeds.
-pub(crate) const SEARCH_BINDINGS: [Access; 8] = [
+/// Bindings of the screen, as many as every implementation has: contacts, edges, twists, basis,
+/// listed loads, grips, tally, entries.
+pub(crate) const SCREEN_BINDINGS: [Access; 8] = [
     Access::Read,
     Access::Read,
     Access::Read,
     Access::Read,
     Access::Read,
     Access::Read,
-    Access::Read,
+    Access::Write,
     Access::Write,
 ];
 
@@ -143,7 +159,10 @@ impl Kernel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use layout::{ContactHeader, GroupRecord, LoadRecord, SeedRecord};
+    use layout::{
+        CaseRecord, ContactHeader, FoundRecord, GripRecord, LoadRecord, OutcomeRecord, SeedRecord,
+        TwistRecord,
+    };
     use std::mem::offset_of;
 
     fn module(text: &str) -> naga::Module {
@@ -179,12 +198,16 @@ mod tests {
 
     #[test]
     fn records_have_the_same_offsets_in_rust_and_in_the_shaders() {
-        for text in [FAN, SEARCH] {
+        for text in [FAN, SCREEN] {
             let module = module(text);
-            assert_same_layout!(&module, ContactHeader: edges_i, edges_ii, edges_end, basis, faces, radius, area_i, area_ii, centroid_i, centroid_ii, compliance, resolved, variation_first, variation_second, variation_slope, softness, spread);
+            assert_same_layout!(&module, ContactHeader: edges_i, edges_ii, edges_end, basis, faces, radius, area_i, area_ii, centroid_i, centroid_ii, compliance, resolved, variation_first, variation_second, variation_slope, softness, spread, tilt, slowest, quickest, padding);
+            assert_same_layout!(&module, TwistRecord: twist, ring, padding);
+            assert_same_layout!(&module, CaseRecord: force, force_size, moment, moment_size);
+            assert_same_layout!(&module, GripRecord: row_1, force, row_2, moment, row_3, distance, lever, arm, contact, first, count, every);
             assert_same_layout!(&module, LoadRecord: wrench, scale, f3, m1, m2, distance);
-            assert_same_layout!(&module, GroupRecord: contact, first, count, padding);
             assert_same_layout!(&module, SeedRecord: twist, lower, upper, status, best, padding);
+            assert_same_layout!(&module, OutcomeRecord: entries, floor);
+            assert_same_layout!(&module, FoundRecord: words, upper, kind, load, grip);
         }
     }
 
@@ -206,13 +229,15 @@ mod tests {
         assert_eq!(fixed("GAUSS_POINTS"), layout::GAUSS.len().to_string());
         assert_eq!(fixed("RING"), super::super::super::RING.to_string());
         assert_eq!(fixed("NEGATED"), format!("{:#x}", super::super::super::NEGATED));
+        assert_eq!(fixed("WINDOW"), layout::WINDOW.to_string());
+        assert_eq!(fixed("WORDS"), (layout::WINDOW / 32).to_string());
         assert_eq!(fixed("LARGEST").parse::<f32>().unwrap(), f32::MAX);
     }
 
     #[test]
     fn bindings_are_those_of_the_shaders() {
         for (text, bindings) in
-            [(FAN, FAN_BINDINGS.as_slice()), (SEARCH, SEARCH_BINDINGS.as_slice())]
+            [(FAN, FAN_BINDINGS.as_slice()), (SCREEN, SCREEN_BINDINGS.as_slice())]
         {
             let module = module(text);
             let mut found: Vec<(u32, Access)> = module

@@ -1,13 +1,19 @@
 //! Rust f32 against WGSL, record by record, and the loss of a device.
 
-use super::super::job::Job;
-use super::super::layout::{BOUNDED, UNWRITTEN};
-use super::super::prepare::{Contacts, not_searched};
-use super::super::{Backend, Batch, Polish, Problem, ScoreOptions, SeedStatus, cpu};
-use super::check::Random;
+use super::super::layout::{BOUNDED, COUPLED, LOAD_MARGIN, SeedRecord, UNWRITTEN};
+use super::super::prepare::Contacts;
+use super::super::screen::Wanted;
+use super::super::{
+    Backend, Batch, F32_TOLERANCE, LOAD_TOLERANCE, Polish, Pose, Problem, ScoreOptions, Seed,
+    SeedStatus,
+};
+use super::check::{Random, by_load, twins};
+use super::chunk::{Maker, Plan, plans};
 use super::*;
 use crate::model::{Contact, Patch, Polygon, Wrench};
-use glam::DVec2;
+use glam::{DVec2, DVec3};
+
+mod screen;
 
 /// Largest difference allowed between the processor's and the shader's records, relative to values
 /// of order one. Vulkan allows a logarithm 5e-7 off, fused products change the last bits, and a
@@ -63,8 +69,8 @@ fn compare(found: &[SeedRecord], expected: &[SeedRecord]) -> std::result::Result
         return Err(format!("{} records instead of {}", found.len(), expected.len()));
     }
     for (i, (a, b)) in found.iter().zip(expected).enumerate() {
-        if a.status == UNWRITTEN || b.status == UNWRITTEN {
-            return Err(format!("record {i} was not written"));
+        if a.status != b.status {
+            return Err(format!("record {i}: {a:?} instead of {b:?}"));
         }
         let numbers = |r: &SeedRecord| [r.lower, r.upper, r.twist[0], r.twist[1], r.twist[2]];
         if !numbers(a).iter().chain(&numbers(b)).all(|x| x.is_finite()) {
@@ -87,70 +93,171 @@ fn compare(found: &[SeedRecord], expected: &[SeedRecord]) -> std::result::Result
     Ok(())
 }
 
-/// Records of both kernels for the same chunks.
-fn records(
+/// A contact, what acts on the part, and where it is there.
+type Grip = (Arc<Contact>, Vec<Wrench>, Pose);
+
+/// Grips near the middle of a part; every second one sees the first grip's loads.
+fn grips(random: &mut Random, count: usize, most: f64) -> Vec<Grip> {
+    (0..count)
+        .map(|_| {
+            let loads = (random.within(0.0, 1.0) * most) as usize;
+            let wrench = |random: &mut Random| Wrench {
+                force: random.vector() * 3.0,
+                moment: random.vector() * 0.02 * random.within(0.0, 1.0),
+            };
+            let wrenches = (0..loads).map(|_| wrench(random)).collect();
+            let mut pose = random.pose();
+            pose.part_from_grip.origin = pose.centre_of_mass + random.vector() * 0.02;
+            let hangs_over = random.within(0.0, 1.0) < 0.4;
+            let contact =
+                if hangs_over { Arc::new(random.contact(false)) } else { random.two_stars() };
+            (contact, wrenches, pose)
+        })
+        .collect()
+}
+
+fn problems(grips: &[Grip]) -> Vec<Problem<'_>> {
+    let problem = |index: usize| Problem {
+        contact: &grips[index].0,
+        distance: 0.001 * (index % 100) as f64,
+        force: 40.0,
+        wrenches: &grips[if index.is_multiple_of(2) { index } else { 0 }].1,
+        pose: Some(grips[index].2),
+    };
+    (0..grips.len()).map(problem).collect()
+}
+
+/// Some grips on three contacts under the loads of a ball.
+fn ball_grips(random: &mut Random, count: usize, loads: usize) -> (Vec<Grip>, Vec<Wrench>) {
+    let directions = crate::geometry::sphere::directions(loads);
+    let list = directions.into_iter().map(|force| Wrench { force, moment: DVec3::ZERO }).collect();
+    let contacts =
+        [random.contact(true), random.contact(false), random.contact(true)].map(Arc::new);
+    let grip = |index: usize| {
+        let mut pose = random.pose();
+        pose.part_from_grip.origin = pose.centre_of_mass + random.vector() * 0.01;
+        (Arc::clone(&contacts[index % 3]), Vec::new(), pose)
+    };
+    ((0..count).map(grip).collect(), list)
+}
+
+fn on_ball<'a>(grips: &'a [Grip], wrenches: &'a [Wrench]) -> Batch<'a> {
+    let problem = |(contact, _, pose): &'a Grip| Problem {
+        contact,
+        distance: 0.02,
+        force: 40.0,
+        wrenches,
+        pose: Some(*pose),
+    };
+    Batch { problems: grips.iter().map(problem).collect() }
+}
+
+/// The chunks of some problems.
+fn chunks(
     gpu: &Gpu,
-    problems: Vec<Problem<'_>>,
-    seeds: &SeedSet,
-) -> (Vec<SeedRecord>, Vec<SeedRecord>) {
-    let batch = Batch { problems };
-    let contacts = Contacts::new(&batch.problems).unwrap();
-    let job = Job::new(&contacts, &batch, seeds).unwrap();
-    let mut answers = vec![not_searched(SeedStatus::NoContact); job.loads];
-    let mut chunks: Vec<Chunk> =
-        job.plans(gpu.limits(), &mut answers).iter_mut().map(|plan| job.build(plan)).collect();
-    let expected = chunks.iter().flat_map(|chunk| cpu::run(chunk, seeds)).collect();
-    let mut found = Vec::new();
-    let mut next =
-        chunks.drain(..).filter(|chunk| !chunk.loads.is_empty()).map(|chunk| (chunk, ()));
+    contacts: &Contacts,
+    problems: &[Problem<'_>],
+    (seeds, wanted): (&SeedSet, Wanted),
+) -> Vec<(Chunk, Plan)> {
+    let users = contacts.slots.iter().copied().zip((0..problems.len()).map(|index| vec![index]));
+    let users = users.filter(|(_, users)| !problems[users[0]].wrenches.is_empty());
+    let plans = plans(contacts, problems, users.collect(), (gpu.limits(), seeds.len()));
+    let mut maker = Maker::default();
+    let chunk =
+        |plan: Plan| (maker.chunk((contacts, problems), &plan, (seeds.len(), wanted)), plan);
+    plans.into_iter().map(chunk).collect()
+}
+
+/// What came of some chunks.
+fn answers(gpu: &Gpu, seeds: &SeedSet, chunks: &[(Chunk, Plan)]) -> Vec<Answer> {
+    let (mut all, mut next) = (Vec::new(), chunks.iter().cloned());
     gpu.run(
         seeds,
         || next.next(),
-        |records, ()| {
-            found.extend(records);
+        |answer, _| {
+            all.extend(answer);
             Ok(())
         },
     )
     .unwrap();
-    (found, expected)
+    all
 }
 
+/// Kernel and twin leave the same loads open, but for a hair, and give the others the same seeds.
 #[test]
 fn shaders_give_the_records_of_the_processor() {
     let Some(gpu) = gpu(true) else { return };
     let mut random = Random(7);
     for frequency in [1, 4, 8, 13] {
         let seeds = SeedSet::new(frequency).unwrap();
-        let grips: Vec<_> = (0..150)
-            .map(|_| {
-                let loads: Vec<Wrench> = (0..(random.within(0.0, 1.0) * 150.0) as usize)
-                    .map(|_| Wrench {
-                        force: random.vector() * 10.0,
-                        moment: random.vector() * 0.1 * random.within(0.0, 1.0),
-                    })
-                    .collect();
-                (random.two_stars(), random.within(0.0, 0.1), loads)
-            })
-            .collect();
-        let problems = grips
-            .iter()
-            .map(|(contact, distance, wrenches)| Problem {
-                contact,
-                distance: *distance,
-                force: 40.0,
-                wrenches,
-            })
-            .collect();
-        let (found, expected) = records(&gpu, problems, &seeds);
+        let grips = grips(&mut random, 150, 150.0);
+        let problems = problems(&grips);
+        let contacts = Contacts::new(&problems).unwrap();
+        let chunks = chunks(&gpu, &contacts, &problems, (&seeds, Wanted::All));
+        let (mut found, mut expected, mut changed, mut loads) = (vec![], vec![], 0, 0);
+        for (answer, (chunk, _)) in answers(&gpu, &seeds, &chunks).iter().zip(&chunks) {
+            let twins = twins(chunk, &seeds);
+            for (grip, number) in chunk.grips.iter().zip(0..) {
+                let [a, b] = [&answer.entries, &twins.entries].map(|all| by_load(all, number));
+                assert_eq!(a.len(), grip.count as usize);
+                assert!(a.keys().eq(b.keys()));
+                for (a, b) in a.into_values().zip(b.into_values()) {
+                    loads += 1;
+                    changed += usize::from(a.is_some() != b.is_some());
+                    if let (Some(a), Some(b)) = (a, b) {
+                        found.push(a);
+                        expected.push(b);
+                    }
+                }
+            }
+        }
         assert_same(&found, &expected);
-        let bounded = found.iter().filter(|r| r.status == BOUNDED).count();
-        let changed = found.iter().zip(&expected).filter(|(a, b)| a.status != b.status).count();
-        println!(
-            "{} twists: {} records, {bounded} bounded, {changed} with another status",
-            seeds.len(),
-            found.len()
-        );
-        assert!(bounded > found.len() / 10 && changed <= found.len() / 1000);
+        let count = |status: u32| found.iter().filter(|seed| seed.status == status).count();
+        let bounded = [count(BOUNDED), count(COUPLED)];
+        println!("{} twists, {loads} loads: {bounded:?} bounded, {changed} by one", seeds.len());
+        assert!(bounded[0] > loads / 10 && bounded[1] > loads / 100 && changed <= loads / 1000);
+        assert_eq!(bounded.iter().sum::<usize>(), found.len());
+    }
+}
+
+/// Of the loads of a grip the kernel keeps those that its twin keeps, but for loads whose upper bound
+/// is a hair from the best lower one, and the best lower bound is the same.
+#[test]
+fn the_same_loads_survive_on_both() {
+    let Some(gpu) = gpu(true) else { return };
+    let mut random = Random(17);
+    let seeds = SeedSet::default();
+    // More than a window of loads each, and more than one workgroup takes.
+    for (count, loads) in [(120, 500), (9, 4000), (3, 20_000)] {
+        let (grips, list) = ball_grips(&mut random, count, loads);
+        let problems = on_ball(&grips, &list).problems;
+        let contacts = Contacts::new(&problems).unwrap();
+        let chunks = chunks(&gpu, &contacts, &problems, (&seeds, Wanted::Worst));
+        let [mut kept, mut open, mut loads, mut apart] = [0; 4];
+        for (answer, (chunk, _)) in answers(&gpu, &seeds, &chunks).iter().zip(&chunks) {
+            let twins = twins(chunk, &seeds);
+            for (grip, number) in chunk.grips.iter().zip(0..) {
+                let [a, b] = [answer, &twins].map(|all| by_load(&all.entries, number));
+                let of = |all: &Answer| all.outcomes[number as usize];
+                let (outcome, floor) = (of(answer), of(&twins).floor);
+                assert!((outcome.floor - floor).abs() <= 1e-4 * floor, "{outcome:?} {floor}");
+                let entries = answer.entries.iter().filter(|entry| entry.grip == number).count();
+                assert_eq!(outcome.entries as usize, entries + 1);
+                for (one, other) in [(&a, &b), (&b, &a)] {
+                    for (load, seed) in one.iter().filter(|(load, _)| !other.contains_key(load)) {
+                        apart += 1;
+                        // In a window before the last the floor was lower.
+                        let near = seed.is_some_and(|seed| seed.upper <= floor * 1.0001);
+                        assert!(near, "load {load}: {seed:?}, floor {floor}");
+                    }
+                }
+                let bounded = a.values().flatten().count();
+                (kept, open) = (kept + bounded, open + a.len() - bounded);
+                loads += grip.count as usize;
+            }
+        }
+        println!("{kept} of {loads} loads kept, {open} open, {apart} by one only");
+        assert!(kept > 0 && kept < (loads - open) / 4 && apart <= kept / 50 + 1);
     }
 }
 
@@ -193,6 +300,7 @@ fn with_doomed_device<R>(mut gpu: Gpu, then: impl FnOnce(&Backend, &Batch<'_>) -
             distance: 0.03,
             force: 20.0,
             wrenches: &wrenches,
+            pose: None,
         }],
     };
     then(&Backend::Gpu(Box::new(gpu)), &batch)
@@ -206,9 +314,10 @@ fn a_lost_device_is_replaced_by_the_processor_under_auto() {
         let (found, expected) =
             (backend.seed(batch, &set).unwrap(), Backend::Cpu.seed(batch, &set).unwrap());
         assert_eq!(found.len(), expected.len());
+        let most = 2.0 * F32_TOLERANCE + LOAD_TOLERANCE;
         for (a, b) in found.iter().zip(&expected) {
             assert!(
-                a.status == b.status && (a.lower - b.lower).abs() <= 1e-4 * b.lower.max(1e-9),
+                a.status == b.status && (a.lower - b.lower).abs() <= most * b.lower.max(1e-9),
                 "{a:?} instead of {b:?}"
             );
         }
@@ -249,50 +358,6 @@ fn a_lost_device_is_an_error_under_gpu() {
     });
 }
 
-/// Outputs start as zeros, also in buffers used before: a record that no invocation wrote is found
-/// out.
-#[test]
-fn a_record_that_was_not_written_is_an_error() {
-    let Some(gpu) = gpu(true) else { return };
-    let set = SeedSet::default();
-    let mut random = Random(19);
-    let contact = random.two_stars();
-    let wrenches: Vec<Wrench> = (0..130)
-        .map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 })
-        .collect();
-    let batch = Batch {
-        problems: vec![Problem {
-            contact: &contact,
-            distance: 0.03,
-            force: 20.0,
-            wrenches: &wrenches,
-        }],
-    };
-    let contacts = Contacts::new(&batch.problems).unwrap();
-    let job = Job::new(&contacts, &batch, &set).unwrap();
-    let run = |forget: bool| {
-        let mut answers = vec![not_searched(SeedStatus::NoContact); job.loads];
-        let mut plans = job.plans(gpu.limits(), &mut answers).into_iter();
-        let next = || {
-            plans.next().map(|mut plan| {
-                let mut chunk = job.build(&mut plan);
-                if forget {
-                    chunk.groups.truncate(1);
-                }
-                (chunk, plan)
-            })
-        };
-        gpu.run(&set, next, |records, plan| job.scatter(&records, plan))
-    };
-    // Twice each, for both slots of buffers have been written by then.
-    for forget in [false, false, true, true] {
-        match run(forget) {
-            Ok(()) => assert!(!forget),
-            Err(error) => assert!(forget && error.to_string().contains("did not write"), "{error}"),
-        }
-    }
-}
-
 /// The tolerance that widens every bound covers what single precision does on this adapter, and the
 /// basis is as good as the processor's.
 #[test]
@@ -326,7 +391,8 @@ fn the_clock_shows_every_chunk_and_changes_nothing() {
     let wrenches: Vec<Wrench> = (0..9000)
         .map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 })
         .collect();
-    let problem = Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches };
+    let problem =
+        Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches, pose: None };
     let batch = Batch { problems: vec![problem] };
     let without = backend.seed(&batch, &set).unwrap();
     assert_eq!(gpu.stop_clock(), None);
@@ -338,7 +404,7 @@ fn the_clock_shows_every_chunk_and_changes_nothing() {
     assert_eq!(timeline.chunks.len(), 5);
     let forward = |span: Span| span.from <= span.to;
     for chunk in &timeline.chunks {
-        assert!(chunk.bytes_up > 0 && chunk.bytes_down == (chunk.loads * 32) as u64);
+        assert!(chunk.bytes_up > 0 && chunk.bytes_down as usize >= chunk.entries * 32);
         assert!(chunk.make.to <= chunk.send.from && chunk.send.to <= chunk.wait.from);
         assert!(chunk.wait.to <= chunk.fetch.from && chunk.fetch.to <= chunk.spread.from);
         assert_eq!(chunk.device.is_some(), gpu.has_timestamps());
@@ -376,7 +442,8 @@ fn exact_answers_overlap_the_kernels_of_the_next_block() {
     let wrenches: Vec<Wrench> = (0..3000)
         .map(|_| Wrench { force: random.vector(), moment: random.vector() * 0.01 })
         .collect();
-    let problem = Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches };
+    let problem =
+        Problem { contact: &contact, distance: 0.03, force: 20.0, wrenches: &wrenches, pose: None };
     let batch = Batch { problems: vec![problem; 4] };
     let expected = backend.seed(&Batch { problems: vec![problem] }, &set).unwrap();
     let mut order = Vec::new();
@@ -384,7 +451,7 @@ fn exact_answers_overlap_the_kernels_of_the_next_block() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
     gpu.start_clock().unwrap();
     pool.install(|| {
-        backend.by_blocks((3000, true), &batch, &set, |block| {
+        backend.by_blocks((3000, Wanted::All), &batch, &set, |block| {
             order.push(block.range);
             assert_eq!(block.survivors.seeds, expected);
             std::thread::sleep(std::time::Duration::from_millis(200));
