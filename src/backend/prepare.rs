@@ -252,8 +252,10 @@ impl Records {
         let numbers =
             [length / force, f.z / force, m1 / force, m2 / force, problem.distance / unit];
         let usable = numbers.iter().all(|x| x.abs() <= RANGE);
-        let [scale, f3, m1, m2, distance] = numbers.map(|x| x.clamp(-RANGE, RANGE) as f32);
-        let distance = if usable { distance } else { OUT_OF_RANGE };
+        let within = |x: f64| x.clamp(-RANGE, RANGE) as f32;
+        let [scale, f3, m1, m2, distance] = numbers;
+        let (scale, f3, m1, m2) = (within(scale), within(f3), within(m1), within(m2));
+        let distance = if usable { within(distance) } else { OUT_OF_RANGE };
         Ok((
             LoadRecord { wrench: direction.as_vec3().to_array(), scale, f3, m1, m2, distance },
             length / force,
@@ -275,7 +277,8 @@ impl Records {
                 )));
             }
         };
-        let [u1, u2, omega] = record.twist.map(f64::from);
+        let [u1, u2, omega] = record.twist;
+        let (u1, u2, omega) = (f64::from(u1), f64::from(u2), f64::from(omega));
         let omega = omega / self.unit;
         let (u1, u2) = (u1 + omega * self.origin.y, u2 - omega * self.origin.x);
         let twist = Twist { u1, u2, omega };
