@@ -52,13 +52,17 @@ impl Paraboloid {
 
     /// Its least and greatest bend [1/m], with the unit direction of the least.
     pub(crate) fn principal(&self) -> ([f64; 2], DVec2) {
-        let (a, b, c) = (self.bend.x_axis.x, self.bend.x_axis.y, self.bend.y_axis.y);
-        let (mean, half) = (0.5 * (a + c), 0.5 * (a - c));
-        let apart = half.hypot(b);
-        // The greatest lies at half the angle of (half, b).
-        let greatest = DVec2::from_angle(0.5 * b.atan2(half));
-        ([mean - apart, mean + apart], greatest.perp())
+        principal(self.bend)
     }
+}
+
+/// Least and greatest eigenvalue of a symmetric matrix, with the unit direction of the least.
+pub(crate) fn principal(matrix: DMat2) -> ([f64; 2], DVec2) {
+    let (a, b, c) = (matrix.x_axis.x, matrix.x_axis.y, matrix.y_axis.y);
+    let (mean, half) = (0.5 * (a + c), 0.5 * (a - c));
+    let apart = half.hypot(b);
+    // The greatest lies at half the angle of (half, b).
+    ([mean - apart, mean + apart], DVec2::from_angle(0.5 * b.atan2(half)).perp())
 }
 
 /// Coefficients of weighted least squares in `z` over places in units of the greatest distance from

@@ -15,7 +15,7 @@ use crate::part::{CurvedFace, Part, PlanarFace, Shape};
 use crate::propose::options::ProposeOptions;
 
 /// Surface that leans more against the pads' plane (cosine of the angle) is no place for a pad.
-const FACING: f64 = 0.85;
+pub(super) const FACING: f64 = 0.85;
 /// Slope below which a plane counts as the pads' own.
 const FLAT: f64 = 1e-7;
 /// Sine of the angle between a curved face's axis and the pads' plane up to which the face is taken
@@ -244,7 +244,8 @@ impl<'a> Survey<'a> {
             part,
             axes_from_part,
             planes: part.faces.iter().map(plane).collect(),
-            curved: part.curved.iter().map(curved).collect(),
+            // Free form is among the loose triangles.
+            curved: part.curved.iter().take_while(|face| !is_free(face)).map(curved).collect(),
             loose: loose.iter().map(|id| (Span::of(corners(id).into_iter()), *id)).collect(),
         }
     }
@@ -261,6 +262,27 @@ impl<'a> Survey<'a> {
             Look { survey: self, height, side, reach, above, region }.pieces()
         })
     }
+
+    /// The part of some triangles within a convex window, seen from a `side` as in [`Look`], as
+    /// pieces of a surface.
+    pub(super) fn outlined(
+        &self,
+        triangles: &[u32],
+        window: &[DVec2],
+        gap: Gap,
+        side: f64,
+    ) -> Vec<Piece> {
+        let region = Bounds2::of(window);
+        let look = Look { survey: self, height: 0.0, side, reach: 0.0, above: 0.0, region };
+        let mut pieces = Vec::new();
+        look.outline(triangles, window, gap, &mut pieces);
+        pieces
+    }
+}
+
+/// Whether a face is of free form: these come after all others.
+pub(super) fn is_free(face: &CurvedFace) -> bool {
+    face.shape == Shape::Freeform
 }
 
 /// Corners of a triangle in the axes.
@@ -403,7 +425,7 @@ impl Look<'_> {
                     .map(|(x, y)| corner(x, y));
                 let radius = if face.outside { radius } else { -radius };
                 let gap = Gap::Cylinder { radius, axis: direction, at, height };
-                self.outline(face, &window, gap, pieces);
+                self.outline(&face.triangles, &window, gap, pieces);
                 true
             }
             Shape::Cone { apex, axis, half_angle, along } => {
@@ -428,7 +450,7 @@ impl Look<'_> {
                         .map(|(x, y)| corner(x, y));
                     let (radius, slope) = (sense * radius, -sense * slope);
                     let gap = Gap::Cone { radius, slope, axis: direction, at, height };
-                    self.outline(face, &window, gap, pieces);
+                    self.outline(&face.triangles, &window, gap, pieces);
                 }
                 true
             }
@@ -438,7 +460,12 @@ impl Look<'_> {
                 if height < self.reach {
                     let at = centre.truncate();
                     let window = ellipse(at, DVec2::X, [half(radius, height); 2]);
-                    self.outline(face, &window, Gap::Sphere { radius, at, height }, pieces);
+                    self.outline(
+                        &face.triangles,
+                        &window,
+                        Gap::Sphere { radius, at, height },
+                        pieces,
+                    );
                 }
                 true
             }
@@ -452,7 +479,7 @@ impl Look<'_> {
                     let window =
                         ellipse(at, direction, [half(minor, height), half(radius, height)]);
                     let gap = Gap::Barrel { radius, meridian: minor, axis: direction, at, height };
-                    self.outline(face, &window, gap, pieces);
+                    self.outline(&face.triangles, &window, gap, pieces);
                 }
                 true
             }
@@ -460,14 +487,14 @@ impl Look<'_> {
         }
     }
 
-    /// The part of a face within a window.
-    fn outline(&self, face: &CurvedFace, window: &[DVec2], gap: Gap, pieces: &mut Vec<Piece>) {
+    /// The part of some triangles within a window.
+    fn outline(&self, triangles: &[u32], window: &[DVec2], gap: Gap, pieces: &mut Vec<Piece>) {
         let within = Bounds2::of(window);
         if !within.meets(self.region) {
             return;
         }
         let mut rings: Vec<Ring> = Vec::new();
-        for &triangle in &face.triangles {
+        for &triangle in triangles {
             let corners = corners(self.survey.part, &self.survey.axes_from_part, triangle);
             let [a, b, c] = corners;
             if (b - a).cross(c - a).z * self.side <= 0.0 {
@@ -499,7 +526,7 @@ fn largest(piece: &Piece) -> f64 {
 }
 
 /// A ring about an ellipse.
-fn ellipse(at: DVec2, axis: DVec2, half: [f64; 2]) -> Ring {
+pub(super) fn ellipse(at: DVec2, axis: DVec2, half: [f64; 2]) -> Ring {
     let step = std::f64::consts::TAU / WINDOW as f64;
     let corner = |index: usize| {
         let e = DVec2::from_angle(step * index as f64) / (0.5 * step).cos();
