@@ -55,6 +55,8 @@ pub(super) struct FreeCrest {
     /// greatest.
     pub(super) radii: [f64; 2],
     pub(super) axis: DVec2,
+    /// Compression of the layer there, about \[m\].
+    pub(super) delta: f64,
     pub(super) smooth: Option<Smooth>,
 }
 
@@ -78,7 +80,7 @@ impl FreeCrest {
 
 /// Compression of a layer by a crest of these radii under a pad \[m\]: a paraboloid of half the
 /// greatest compression on an ellipse, no larger than the pad.
-fn compression(radii: [f64; 2], pad: Pad) -> f64 {
+pub(super) fn compression(radii: [f64; 2], pad: Pad) -> f64 {
     let load = |delta: f64| {
         let [a, b] = radii.map(|radius| (2.0 * radius * delta).sqrt().min(pad.reach));
         0.5 * std::f64::consts::PI * a * b * pad.layer.stiffness * delta
@@ -168,6 +170,7 @@ impl Crests<'_> {
             ends: [at; 2],
             radii: [bends[1], bends[0]].map(f64::recip),
             axis: first,
+            delta,
             smooth: None,
         };
         let found = self.cover(face, (&place, side), (height, at), delta, &value)?;

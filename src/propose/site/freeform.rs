@@ -1,4 +1,4 @@
-//! Sites on faces of free form: closing directions along which a crest of one lies opposite a crest
+//! Sites on faces of free form, and on surfaces of revolution of any profile: closing directions along which a crest of one lies opposite a crest
 //! of another, of a round face, or a plane.
 //!
 //! Two places are opposite each other where the line between them is normal to both surfaces. From
@@ -8,7 +8,7 @@
 use glam::{DMat2, DVec2, DVec3};
 use rustc_hash::FxHashSet;
 
-use super::crest::{Crests, FreeCrest, Pad, half};
+use super::crest::{Crests, FreeCrest, Pad, compression, half};
 use super::net::{Facing, Net};
 use super::relief::{Survey, ellipse, is_free};
 use super::round::{Crest, MOST_PLANES, Outcomes, Round};
@@ -46,6 +46,9 @@ const CONSTANT: f64 = 0.05;
 const ASIDE: f64 = 0.03;
 /// Share of the width by which the radii of two crests may fall short of it: fits are no better.
 const ROLLS: f64 = 0.05;
+/// Compressions behind a crest up to which what lies beside it counts: a load presses one pad by half
+/// as much again, and tilts it by as much.
+const DEPTH: f64 = 4.0;
 /// Directions of one pair of faces, as a share of the step asked for, below which two are one.
 const SAME_STEP: f64 = 0.6;
 /// Pairs of crests looked at, at most, and triangles looked at for them.
@@ -83,17 +86,25 @@ struct Known {
     boxes: [Bounds2; 2],
 }
 
+/// Whether crests of a face are looked for here: it is of free form, or has a profile that is known
+/// by its triangles only.
+fn has_form(face: &CurvedFace) -> bool {
+    is_free(face) || face.outside && matches!(face.shape, Shape::Revolution { .. })
+}
+
 impl Finder<'_> {
     /// The sites on faces of free form.
     pub(super) fn free(&mut self, round: &mut Round) -> Result<Vec<Site>> {
         let wanted =
-            |face: &&CurvedFace| is_free(face) && face.reachable && self.may_touch(face.id);
+            |face: &&CurvedFace| has_form(face) && face.reachable && self.may_touch(face.id);
         if !self.options.outside || !self.part.curved.iter().any(|face| wanted(&face)) {
             return Ok(Vec::new());
         }
         let mut net = Net::new(&self.part.mesh, self.part.curved.iter().filter(wanted));
         let pairs = self.pairs(&mut net);
-        let loose = self.loose();
+        let mut loose = self.loose();
+        let of_revolution = self.part.curved.iter().filter(|face| has_form(face) && !is_free(face));
+        loose.extend(of_revolution.flat_map(|face| &face.triangles));
         let triangles = self.part.mesh.triangles.len().max(1);
         let most = (MOST_TRIANGLES / triangles).clamp(MOST_PAIRS / 16, MOST_PAIRS);
         let mut sites = Vec::new();
@@ -300,7 +311,12 @@ impl Finder<'_> {
 
     /// The direction near `closing` along which two ends are opposite each other.
     fn settle(&self, mut ends: [End; 2], mut closing: DVec3, net: &mut Net) -> Option<Pair> {
-        let mut width = self.size;
+        let mut width = match ends {
+            [End::Free(a), End::Free(b)] => {
+                (net.points[a as usize] - net.points[b as usize]).dot(closing)
+            }
+            _ => self.size,
+        };
         for step in 0..STEPS {
             let [one, two] = &mut ends;
             let places = [
@@ -365,13 +381,8 @@ impl Finder<'_> {
         pair: &Pair,
         net: &Net,
     ) -> std::result::Result<Option<[FreeCrest; 2]>, Rejection> {
-        let pad = Pad {
-            layer: self.gripper.layer(),
-            force: self.options.force_on(self.gripper),
-            reach: self.gripper.pad_reach(),
-        };
         let axes_from_part = axes(pair.closing);
-        let crests = Crests { mesh: &self.part.mesh, net, axes_from_part, pad };
+        let crests = Crests { mesh: &self.part.mesh, net, axes_from_part, pad: self.pad() };
         let mut found = Vec::new();
         for (index, side) in [1.0, -1.0].into_iter().enumerate() {
             let crest = match pair.ends[index] {
@@ -424,8 +435,17 @@ impl Finder<'_> {
             ends: crest.ends.map(DVec3::truncate),
             radii,
             axis,
+            delta: compression(radii, self.pad()),
             smooth: None,
         })
+    }
+
+    fn pad(&self) -> Pad {
+        Pad {
+            layer: self.gripper.layer(),
+            force: self.options.force_on(self.gripper),
+            reach: self.gripper.pad_reach(),
+        }
     }
 
     /// Adds the sites of two crests, as [`Finder::round_sites`].
@@ -467,9 +487,10 @@ impl Finder<'_> {
             .collect();
         let facets: Vec<u32> =
             loose.iter().copied().filter(|triangle| !taken.contains(triangle)).collect();
-        let survey = Survey::new(self.part, &facets, axes(self.directions[direction]));
-        let layer = self.gripper.layer().reach();
-        let found = survey.pieces(heights, [layer; 2], region);
+        let axes_from_part = axes(self.directions[direction]);
+        let survey = Survey::without(self.part, &facets, axes_from_part, has_form);
+        let depth = self.gripper.layer().reach().min(DEPTH * top.delta.max(bottom.delta));
+        let found = survey.pieces(heights, [depth; 2], region);
         let mut smooth = [(top, 1.0), (bottom, -1.0)].map(|(crest, side)| {
             crest.smooth.as_ref().map_or(Vec::new(), |smooth| {
                 let window = window(&smooth.gap, smooth.level, region);

@@ -10,6 +10,8 @@ use crate::part::{CurvedFace, Mesh};
 const AROUND: usize = 16;
 /// Radius of a bend over the width gripped beyond which the surface is straight along it.
 const STRAIGHT: f64 = 20.0;
+/// Radius of a hollow over the width below which there is no crest.
+const HOLLOW: f64 = 2.0;
 /// Cosine of the angle between a corner's normal and a direction beyond which its paraboloid says
 /// nothing of the crest: 20 degrees.
 const NEAR: f64 = 0.94;
@@ -199,12 +201,13 @@ impl Net {
         let mut radii = DMat3::ZERO;
         let mut straight = [None; 2];
         for (k, (bend, along)) in [(low, first), (high, first.perp())].into_iter().enumerate() {
-            if bend * STRAIGHT * width > 1.0 {
+            if bend * HOLLOW * width > 1.0 {
                 return None;
             }
             let of_part = axes.transpose() * along.extend(0.0);
             if -bend * STRAIGHT * width < 1.0 {
-                straight[k] = Some((of_part, along.dot(lacks)));
+                // Two rows of corners leave a slope along them open; the triangles' normals do not.
+                straight[k] = Some((of_part, -along.dot(towards.truncate())));
             } else {
                 step += along * (along.dot(lacks) / bend);
                 radii -=

@@ -209,6 +209,7 @@ pub(super) struct Survey<'a> {
     planes: Vec<Span>,
     curved: Vec<Span>,
     loose: Vec<(Span, u32)>,
+    is_left_out: fn(&CurvedFace) -> bool,
 }
 
 /// A box around a piece of surface: across the closing direction, and along it.
@@ -232,8 +233,18 @@ impl Span {
 }
 
 impl<'a> Survey<'a> {
-    /// `loose`: triangles of no face.
+    /// `loose`: triangles of no face, and of free form.
     pub(super) fn new(part: &'a Part, loose: &[u32], axes_from_part: DMat3) -> Self {
+        Self::without(part, loose, axes_from_part, is_free)
+    }
+
+    /// Without some curved faces, whose triangles are among the `loose` ones as far as they count.
+    pub(super) fn without(
+        part: &'a Part,
+        loose: &[u32],
+        axes_from_part: DMat3,
+        is_left_out: fn(&CurvedFace) -> bool,
+    ) -> Self {
         let corners = |&triangle: &u32| corners(part, &axes_from_part, triangle);
         let plane = |face: &PlanarFace| {
             let outlines = face.polygons.iter().flat_map(|polygon| &polygon.outer);
@@ -244,8 +255,8 @@ impl<'a> Survey<'a> {
             part,
             axes_from_part,
             planes: part.faces.iter().map(plane).collect(),
-            // Free form is among the loose triangles.
-            curved: part.curved.iter().take_while(|face| !is_free(face)).map(curved).collect(),
+            curved: part.curved.iter().filter(|face| !is_left_out(face)).map(curved).collect(),
+            is_left_out,
             loose: loose.iter().map(|id| (Span::of(corners(id).into_iter()), *id)).collect(),
         }
     }
@@ -280,7 +291,7 @@ impl<'a> Survey<'a> {
     }
 }
 
-/// Whether a face is of free form: these come after all others.
+/// Whether a face is of free form.
 pub(super) fn is_free(face: &CurvedFace) -> bool {
     face.shape == Shape::Freeform
 }
@@ -309,13 +320,14 @@ impl Look<'_> {
     /// All pieces.
     fn pieces(&self) -> Vec<Piece> {
         let mut pieces = Vec::new();
-        let Survey { part, planes, curved, loose, .. } = self.survey;
+        let Survey { part, planes, curved, loose, is_left_out, .. } = self.survey;
         for (index, _) in planes.iter().enumerate().filter(|(_, span)| self.meets(span)) {
             self.plane(index, &mut pieces);
         }
         let near = loose.iter().filter(|(span, _)| self.meets(span));
         let mut facets: Vec<u32> = near.map(|(_, id)| *id).collect();
-        for (face, _) in part.curved.iter().zip(curved).filter(|(_, span)| self.meets(span)) {
+        let faces = part.curved.iter().filter(|face| !is_left_out(face));
+        for (face, _) in faces.zip(curved).filter(|(_, span)| self.meets(span)) {
             if !self.curved(face, &mut pieces) {
                 facets.extend(&face.triangles);
             }

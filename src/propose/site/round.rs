@@ -218,7 +218,7 @@ impl Finder<'_> {
     pub(super) fn loose(&self) -> Vec<u32> {
         let mut taken = vec![false; self.part.mesh.triangles.len()];
         let plane = self.part.faces.iter().map(|face| &face.triangles);
-        let curved = self.part.curved.iter().take_while(|face| !is_free(face));
+        let curved = self.part.curved.iter().filter(|face| !is_free(face));
         let curved = curved.map(|face| &face.triangles);
         plane.chain(curved).flatten().for_each(|&triangle| taken[triangle as usize] = true);
         (0..taken.len() as u32).filter(|&triangle| !taken[triangle as usize]).collect()
@@ -230,7 +230,7 @@ impl Finder<'_> {
 
     /// Faces about an axis or point with a crest that pads may touch.
     pub(super) fn round_faces(&self) -> impl Iterator<Item = &CurvedFace> {
-        let faces = self.part.curved.iter().take_while(|face| !is_free(face));
+        let faces = self.part.curved.iter().filter(|face| !is_free(face));
         faces.filter(|face| face.outside && face.reachable && self.may_touch(face.id))
     }
 
