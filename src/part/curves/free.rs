@@ -22,9 +22,10 @@ const LEAST: f64 = 0.01;
 /// Cosine of the angle that some normal must differ by from the mean: 10 degrees. A plane that
 /// noise has broken up bends both ways and comes back.
 const BENT: f64 = 0.984_807_753_012_208;
-/// Places at which the surface is tried, and vertices about each.
+/// Places at which the surface is tried, and vertices about each at least: twice what makes a
+/// paraboloid.
 const PLACES: usize = 200;
-const AROUND: usize = 25;
+const AROUND: usize = 12;
 /// Distance of these vertices from a paraboloid as a share of that from a plane up to which they
 /// are smooth. Random ones: 0.9.
 const FORM: f64 = 0.35;
@@ -143,19 +144,23 @@ fn smooth(part: &Repaired, triangles: &[u32]) -> Option<bool> {
     let mut places: Vec<[f64; 3]> = Vec::new();
     for &vertex in vertices.iter().step_by(stride) {
         let mut near = vec![vertex];
-        let mut next = 0;
+        let mut inner = 0;
         let mut normal = DVec3::ZERO;
-        while next < near.len() && near.len() < AROUND {
-            for triangle in of(near[next]) {
-                let [a, b, c] = mesh.corners(triangle);
-                normal += (b - a).cross(c - a);
-                for corner in mesh.triangles[triangle as usize] {
-                    if !near.contains(&corner) {
-                        near.push(corner);
+        // Ring after ring, so that both sides count alike.
+        while inner < near.len() && near.len() < AROUND {
+            let ring = inner..near.len();
+            inner = near.len();
+            for index in ring {
+                for triangle in of(near[index]) {
+                    let [a, b, c] = mesh.corners(triangle);
+                    normal += (b - a).cross(c - a);
+                    for corner in mesh.triangles[triangle as usize] {
+                        if !near.contains(&corner) {
+                            near.push(corner);
+                        }
                     }
                 }
             }
-            next += 1;
         }
         let Some(normal) = normal.try_normalize() else { continue };
         let (x, y) = normal.any_orthonormal_pair();
