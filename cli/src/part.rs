@@ -278,7 +278,10 @@ fn curved_table(faces: &[CurvedFace], rows: usize) -> String {
             size(&face.shape),
             direction,
             triple(through * 1e3, 2),
-            format!("{:.2}", face.residual * 1e6),
+            match face.shape {
+                Shape::Freeform => String::new(),
+                _ => format!("{:.2}", face.residual * 1e6),
+            },
             face.facets.map_or(String::new(), |facets| format!("{facets:.0}")),
             note(face.source, face.fit, face.reachable, face.is_doubtful(), is_mixed),
         ]);

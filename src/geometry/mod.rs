@@ -9,6 +9,7 @@
 pub mod clip;
 pub mod hull;
 pub mod overlay;
+mod paraboloid;
 pub mod polygon;
 pub mod sphere;
 mod union_find;
@@ -19,6 +20,7 @@ pub use clip::{
 };
 pub use hull::{convex_hull, is_convex, support};
 pub use overlay::{even_odd, intersect, intersect_convex, union};
+pub(crate) use paraboloid::{Paraboloid, principal};
 pub use polygon::{
     Bounds2, Moments, area, bounds, contains, moments, normalise, patch_area, patch_moments,
     ring_area, transform,

@@ -26,7 +26,8 @@ const FLOOR: f64 = 5e-7;
 const NARROWEST: f64 = 5e-4;
 
 /// All planar faces of the part by falling area, and the curved ones: those that the file states
-/// ([`GivenFaces`]), and among the other triangles those that are recognised. There facets of curved
+/// ([`GivenFaces`]), among the other triangles those that are recognised, and last what is left and
+/// smooth (`free_faces`). There facets of curved
 /// surfaces ([`Facets`]) and regions narrower than 5e-4 of the part's diagonal are left out. Says so
 /// in the part's warnings when faces had to be found with wider tolerances, and when noise has broken
 /// planes up. `faceted`: no facet is that of a curved surface. `fit`: distance \[m\] within which
@@ -96,7 +97,13 @@ pub(super) fn faces(
     for flat in flats {
         facets.is_facet[flat as usize] = false;
     }
-    numbered(outline(part, &given, &regions, &facets), curved)
+    let planar = outline(part, &given, &regions, &facets);
+    let mut is_taken = vec![false; part.mesh.triangles.len()];
+    let triangles = planar.iter().map(|face| &face.triangles);
+    let triangles = triangles.chain(curved.iter().map(|face| &face.triangles)).flatten();
+    triangles.for_each(|&triangle| is_taken[triangle as usize] = true);
+    let free = curves::free_faces(part, &regions, &is_taken);
+    numbered(planar, curved.into_iter().chain(free).collect())
 }
 
 /// Curved faces have the numbers after those of the planar ones.

@@ -231,7 +231,8 @@ pub struct Part {
     pub health: Health,
     /// Planar faces by falling area.
     pub faces: Vec<PlanarFace>,
-    /// Curved faces by falling area; their numbers continue those of the planar faces.
+    /// Curved faces by falling area, those of free form after the others; their numbers continue
+    /// those of the planar faces.
     pub curved: Vec<CurvedFace>,
     /// Mass properties at a density of 1 kg/m^3.
     unit_mass: MassProperties,

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{Axis, CurvedFace, Part, Shape};
+use super::{Axis, Part, Shape};
 
 /// Faces across the axis may lean by this \[rad\].
 const LEVEL: f64 = 1e-3;
@@ -37,7 +37,7 @@ impl Part {
         let curved: f64 = self.curved.iter().map(|face| face.area).sum();
         if !self.health.watertight
             || (total - faces - curved).abs() > LOOSE * total
-            || self.curved.iter().any(CurvedFace::is_doubtful)
+            || self.curved.iter().any(|face| face.is_doubtful() || face.shape == Shape::Freeform)
         {
             return None;
         }

@@ -159,7 +159,7 @@ fn describe(face: &CurvedFace) -> Option<(String, f64)> {
             let across = 2.0 * (major + minor);
             (format!("ring of {}", mm(across)), across)
         }
-        Shape::Revolution { .. } => return None,
+        Shape::Revolution { .. } | Shape::Freeform => return None,
     })
 }
 

@@ -52,6 +52,8 @@ pub struct Proposer<'a> {
     pub(super) sites: Vec<Site>,
     /// Number of those on planes; the others come after them.
     pub(super) plane: usize,
+    /// Number of those before the ones on faces of free form.
+    known: usize,
     pub(super) directions: Vec<DVec3>,
     shape: Arc<Topology>,
     /// Contact of a pad that lies wholly on both faces.
@@ -82,6 +84,9 @@ struct Cursor {
     /// The same of the sites on curved faces, which are counted after all others.
     round_id: u64,
     round_special_id: u64,
+    /// The same of the sites on faces of free form, the last.
+    free_id: u64,
+    free_special_id: u64,
 }
 
 /// Positions `positions` of a site at one angle; the first has the number `id`.
@@ -169,7 +174,7 @@ impl<'a> Proposer<'a> {
         }
         let outside = choice.outside.take();
         let environment = Environment::new(options);
-        let Sites { sites, directions, plane, round } =
+        let Sites { sites, directions, plane, known, round } =
             site::sites(part, gripper, options, &environment, &pairs, chosen.as_deref())?;
         tally.pairs = pairs.len() as u64 + round.pairs;
         let outer = stroke(PairKind::External);
@@ -184,7 +189,10 @@ impl<'a> Proposer<'a> {
         let grid: usize = sites[..plane].iter().map(Site::grid).sum();
         let special: usize =
             sites[..plane].iter().flat_map(|site| &site.special).map(Vec::len).sum();
-        let round_grid: usize = sites[plane..].iter().map(Site::grid).sum();
+        let round_grid: usize = sites[plane..known].iter().map(Site::grid).sum();
+        let of_angles = sites[plane..known].iter().flat_map(|site| &site.special);
+        let before_free = grid + special + round_grid + of_angles.map(Vec::len).sum::<usize>();
+        let free_grid: usize = sites[known..].iter().map(Site::grid).sum();
         let pad = vec![Polygon { outer: gripper.pad.clone(), holes: Vec::new() }]; // of both
         Ok(Self {
             part,
@@ -199,10 +207,13 @@ impl<'a> Proposer<'a> {
             tally,
             outside,
             plane,
+            known,
             next: Cursor {
                 special_id: grid as u64 * stride,
                 round_id: (grid + special) as u64 * stride,
                 round_special_id: (grid + special + round_grid) as u64 * stride,
+                free_id: before_free as u64 * stride,
+                free_special_id: (before_free + free_grid) as u64 * stride,
                 ..Cursor::default()
             },
             share: None,
@@ -317,11 +328,15 @@ impl<'a> Proposer<'a> {
             let end = (self.next.position + ITEM).min(count);
             let positions = self.next.position..end;
             let stride = self.stride();
-            let next = match (self.next.site < self.plane, self.next.places) {
-                (true, Places::Grid) => &mut self.next.id,
-                (true, Places::Special) => &mut self.next.special_id,
-                (false, Places::Grid) => &mut self.next.round_id,
-                (false, Places::Special) => &mut self.next.round_special_id,
+            let site = self.next.site;
+            let of_grid = self.next.places == Places::Grid;
+            let next = match (site < self.plane, site < self.known, of_grid) {
+                (true, _, true) => &mut self.next.id,
+                (true, _, false) => &mut self.next.special_id,
+                (false, true, true) => &mut self.next.round_id,
+                (false, true, false) => &mut self.next.round_special_id,
+                (false, false, true) => &mut self.next.free_id,
+                (false, false, false) => &mut self.next.free_special_id,
             };
             let id = *next;
             *next += positions.len() as u64 * stride;

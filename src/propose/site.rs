@@ -4,6 +4,9 @@
 //! One pad may touch several faces that lie in one plane, so pairs whose planes coincide are joined
 //! first, and split again into stretches too far apart for one pad.
 
+mod crest;
+mod freeform;
+mod net;
 mod places;
 mod planes;
 mod relief;
@@ -112,12 +115,14 @@ pub(super) fn axes(direction: DVec3) -> DMat3 {
 /// Sites and their directions.
 #[derive(Default)]
 pub(super) struct Sites {
-    /// In a stable order: those on planes by falling overlap of their largest pair, then those on
-    /// curved and drafted faces.
+    /// In a stable order: those on planes by falling overlap of their largest pair, those on curved
+    /// and drafted faces, those on faces of free form.
     pub(super) sites: Vec<Site>,
     pub(super) directions: Vec<DVec3>,
     /// Number of those on planes.
     pub(super) plane: usize,
+    /// Number of those before the ones on faces of free form, which are the last.
+    pub(super) known: usize,
     /// What came of the pairs of curved and drafted faces.
     pub(super) round: Round,
 }
@@ -177,6 +182,7 @@ pub(super) fn sites(
         None if asked => Some(Budget::NONE),
         None => Some(Budget::FEW),
     };
+    let mut known = sites.len();
     if let Some(budget) = budget {
         let curved;
         finder.budget = budget;
@@ -184,8 +190,11 @@ pub(super) fn sites(
         sites.extend(curved);
         finder.budget = budget;
         sites.extend(finder.leaning(&mut round)?);
+        known = sites.len();
+        finder.budget = budget;
+        sites.extend(finder.free(&mut round)?);
     }
-    Ok(Sites { sites, directions: finder.directions, plane, round })
+    Ok(Sites { sites, directions: finder.directions, plane, known, round })
 }
 
 /// What a site is made of, in the axes of its direction.
@@ -205,9 +214,9 @@ struct Base<'a> {
     rise: f64,
 }
 
-/// Main direction of a stretch, and the middle of its bounds along it.
-fn lie(overlap: &[Polygon]) -> (f64, DVec2) {
-    let turn = main_direction(overlap);
+/// Main direction of a stretch, unless it is known, and the middle of its bounds along it.
+fn lie(overlap: &[Polygon], known: Option<f64>) -> (f64, DVec2) {
+    let turn = known.unwrap_or_else(|| main_direction(overlap));
     let points: Vec<DVec2> = overlap
         .iter()
         .flat_map(|polygon| &polygon.outer)
@@ -248,7 +257,7 @@ impl Finder<'_> {
         let reach = gripper.pad_reach();
         let mut found = Vec::new();
         for overlap in stretches(overlap, 2.0 * reach) {
-            let (turn, middle) = lie(&overlap);
+            let (turn, middle) = lie(&overlap, None);
             let heights = heights(face(sides[0][0]), face(sides[1][0]), &axes_from_part, middle);
             let rise =
                 rise(&sides, part, &axes_from_part, axis, &overlap, heights) + SAME_PLANE * size;

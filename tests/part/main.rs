@@ -6,6 +6,7 @@ mod curved;
 mod faceted;
 mod fit;
 mod formats;
+mod freeform;
 mod hostile;
 mod solids;
 #[cfg(feature = "step")]

@@ -4,6 +4,7 @@
 
 mod bodies;
 mod curved;
+mod freeform;
 mod interference;
 mod leaning;
 mod motion;

@@ -126,7 +126,7 @@ pub(in crate::part) fn given_faces(part: &Repaired, given: &GivenFaces) -> Vec<C
 }
 
 /// As planar faces: areas that agree to 1e-6 count as equal.
-fn sort(faces: &mut [CurvedFace], diagonal: f64) {
+pub(super) fn sort(faces: &mut [CurvedFace], diagonal: f64) {
     let key = |face: &CurvedFace| (face.area.log2() * 1e5).round() as i64;
     let step = (diagonal * 1e-6).max(f64::MIN_POSITIVE);
     let place = |face: &CurvedFace| {

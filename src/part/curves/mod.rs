@@ -1,8 +1,9 @@
 //! Curved faces: cylinders, cones, spheres, tori and other surfaces of revolution that a mesh
-//! stands for.
+//! stands for, and smooth surface of free form.
 //!
 //! The vertices of a tessellated surface lie on it, its facets inside of it: shapes are fitted to
-//! the vertices. All shapes have an axis of revolution; a sphere has any.
+//! the vertices. All these have an axis of revolution; a sphere has any. What is smooth and none of
+//! them is of free form ([`free`]).
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -12,6 +13,7 @@ use super::{FaceSource, Residual};
 mod describe;
 mod find;
 mod fit;
+mod free;
 mod grow;
 mod judge;
 mod net;
@@ -22,6 +24,7 @@ mod trim;
 pub(super) use describe::arcs;
 pub(super) use find::{Curves, curved_faces, given_faces};
 pub(super) use fit::{Kind, Profile, Surface};
+pub(super) use free::free_faces;
 pub(super) use seed::{cone_by_circles, cylinder_along, outer, smallest_direction, sphere_through};
 
 /// A line in the part frame.
@@ -101,17 +104,20 @@ pub enum Shape {
         /// Extent along the axis \[m\].
         along: [f64; 2],
     },
+    /// Smooth surface of any other form.
+    Freeform,
 }
 
 impl Shape {
-    /// The axis of revolution; `None` for a sphere, which has any through its centre.
+    /// The axis of revolution; `None` for a sphere, which has any through its centre, and for free
+    /// form, which has none.
     pub fn axis(&self) -> Option<Axis> {
         match *self {
             Shape::Cylinder { axis, .. }
             | Shape::Torus { axis, .. }
             | Shape::Revolution { axis, .. } => Some(axis),
             Shape::Cone { apex, axis, .. } => Some(Axis { origin: apex, direction: axis }),
-            Shape::Sphere { .. } => None,
+            Shape::Sphere { .. } | Shape::Freeform => None,
         }
     }
 
@@ -123,6 +129,7 @@ impl Shape {
             Shape::Sphere { .. } => "sphere",
             Shape::Torus { .. } => "torus",
             Shape::Revolution { .. } => "revolution",
+            Shape::Freeform => "freeform",
         }
     }
 }
@@ -137,9 +144,10 @@ pub struct CurvedFace {
     /// The surface that its vertices lie on.
     pub shape: Shape,
     /// Whether the material lies on the inner side, as in a shaft or ball; false for a bore or a
-    /// hollow. For a torus the inner side is that of the tube.
+    /// hollow. For a torus the inner side is that of the tube. Of free form: whether most of it bulges
+    /// outwards.
     pub outside: bool,
-    /// Greatest distance of its vertices in the mesh from the shape \[m\].
+    /// Greatest distance of its vertices in the mesh from the shape \[m\]; 0 for free form.
     pub residual: f64,
     /// Facets that a whole turn would have at the width of this face's facets. `None` where that is
     /// not known.
@@ -176,8 +184,11 @@ impl CurvedFace {
 
     /// Whether both are surfaces of revolution about one axis, within their residuals and a
     /// thousandth of the smaller radius: a jaw that turned the part about it would not notice. Two
-    /// spheres are only when they are concentric.
+    /// spheres are only when they are concentric; free form never.
     pub fn is_coaxial(&self, other: &CurvedFace) -> bool {
+        if [self, other].iter().any(|face| face.shape == Shape::Freeform) {
+            return false;
+        }
         let tolerance = self.residual
             + other.residual
             + SAME_AXIS * self.shape.radius().min(other.shape.radius());
@@ -217,12 +228,12 @@ impl CurvedFace {
 }
 
 impl Shape {
-    /// Kind and surface; the profile of a revolution is not known.
-    pub(super) fn surface(&self) -> (Kind, Surface) {
+    /// Kind and surface; the profile of a revolution is not known. `None` for free form.
+    pub(super) fn surface(&self) -> Option<(Kind, Surface)> {
         let line = |axis, radius, slope| Surface { axis, profile: Profile::Line { radius, slope } };
         let circle =
             |axis, major, minor| Surface { axis, profile: Profile::Circle { major, minor } };
-        match *self {
+        Some(match *self {
             Shape::Cylinder { axis, radius, .. } => (Kind::Cylinder, line(axis, radius, 0.0)),
             Shape::Cone { apex, axis, half_angle, along } => {
                 let middle = (along[0] + along[1]) / 2.0;
@@ -236,7 +247,8 @@ impl Shape {
             }
             Shape::Torus { axis, major, minor } => (Kind::Torus, circle(axis, major, minor)),
             Shape::Revolution { axis, .. } => (Kind::Revolution, line(axis, 0.0, 0.0)),
-        }
+            Shape::Freeform => return None,
+        })
     }
 
     /// The radius that lengths are compared with \[m\].
@@ -246,6 +258,7 @@ impl Shape {
             Shape::Torus { major, minor, .. } => major + minor,
             Shape::Cone { half_angle, along, .. } => along[1] * half_angle.tan(),
             Shape::Revolution { along, .. } => along[1] - along[0],
+            Shape::Freeform => 0.0,
         }
     }
 
@@ -256,7 +269,7 @@ impl Shape {
             | Shape::Cone { along, .. }
             | Shape::Revolution { along, .. } => along[1] - along[0],
             Shape::Torus { minor, .. } => minor,
-            Shape::Sphere { .. } => 0.0,
+            Shape::Sphere { .. } | Shape::Freeform => 0.0,
         }
     }
 
@@ -271,6 +284,7 @@ impl Shape {
             }
             Shape::Sphere { centre, .. } => vec![centre],
             Shape::Torus { axis, .. } => vec![axis.origin],
+            Shape::Freeform => Vec::new(),
         }
     }
 }

@@ -77,7 +77,7 @@ impl Fitting<'_> {
 
     /// A face that was recognised, with the triangles about it that the tolerance takes in.
     pub(super) fn known(&mut self, face: &CurvedFace) -> Option<Fitted> {
-        let (kind, surface) = face.shape.surface();
+        let (kind, surface) = face.shape.surface()?;
         let sign = if face.outside { 1.0 } else { -1.0 };
         let triangles = self.free(&face.triangles);
         if triangles.len() < face.triangles.len() {

@@ -15,7 +15,7 @@ use crate::part::{CurvedFace, Part, PlanarFace, Shape};
 use crate::propose::options::ProposeOptions;
 
 /// Surface that leans more against the pads' plane (cosine of the angle) is no place for a pad.
-const FACING: f64 = 0.85;
+pub(super) const FACING: f64 = 0.85;
 /// Slope below which a plane counts as the pads' own.
 const FLAT: f64 = 1e-7;
 /// Sine of the angle between a curved face's axis and the pads' plane up to which the face is taken
@@ -217,6 +217,7 @@ pub(super) struct Survey<'a> {
     planes: Vec<Span>,
     curved: Vec<Span>,
     loose: Vec<(Span, u32)>,
+    is_left_out: fn(&CurvedFace) -> bool,
 }
 
 /// A box around a piece of surface: across the closing direction, and along it.
@@ -240,8 +241,18 @@ impl Span {
 }
 
 impl<'a> Survey<'a> {
-    /// `loose`: triangles of no face.
+    /// `loose`: triangles of no face, and of free form.
     pub(super) fn new(part: &'a Part, loose: &[u32], axes_from_part: DMat3) -> Self {
+        Self::without(part, loose, axes_from_part, is_free)
+    }
+
+    /// Without some curved faces, whose triangles are among the `loose` ones as far as they count.
+    pub(super) fn without(
+        part: &'a Part,
+        loose: &[u32],
+        axes_from_part: DMat3,
+        is_left_out: fn(&CurvedFace) -> bool,
+    ) -> Self {
         let corners = |&triangle: &u32| corners(part, &axes_from_part, triangle);
         let plane = |face: &PlanarFace| {
             let outlines = face.polygons.iter().flat_map(|polygon| &polygon.outer);
@@ -252,7 +263,8 @@ impl<'a> Survey<'a> {
             part,
             axes_from_part,
             planes: part.faces.iter().map(plane).collect(),
-            curved: part.curved.iter().map(curved).collect(),
+            curved: part.curved.iter().filter(|face| !is_left_out(face)).map(curved).collect(),
+            is_left_out,
             loose: loose.iter().map(|id| (Span::of(corners(id).into_iter()), *id)).collect(),
         }
     }
@@ -269,6 +281,27 @@ impl<'a> Survey<'a> {
             Look { survey: self, height, side, reach, above, region }.pieces()
         })
     }
+
+    /// The part of some triangles within a convex window, seen from a `side` as in [`Look`], as
+    /// pieces of a surface.
+    pub(super) fn outlined(
+        &self,
+        triangles: &[u32],
+        window: &[DVec2],
+        gap: Gap,
+        side: f64,
+    ) -> Vec<Piece> {
+        let region = Bounds2::of(window);
+        let look = Look { survey: self, height: 0.0, side, reach: 0.0, above: 0.0, region };
+        let mut pieces = Vec::new();
+        look.outline(triangles, window, gap, &mut pieces);
+        pieces
+    }
+}
+
+/// Whether a face is of free form.
+pub(super) fn is_free(face: &CurvedFace) -> bool {
+    face.shape == Shape::Freeform
 }
 
 /// Corners of a triangle in the axes.
@@ -295,13 +328,14 @@ impl Look<'_> {
     /// All pieces.
     fn pieces(&self) -> Vec<Piece> {
         let mut pieces = Vec::new();
-        let Survey { part, planes, curved, loose, .. } = self.survey;
+        let Survey { part, planes, curved, loose, is_left_out, .. } = self.survey;
         for (index, _) in planes.iter().enumerate().filter(|(_, span)| self.meets(span)) {
             self.plane(index, &mut pieces);
         }
         let near = loose.iter().filter(|(span, _)| self.meets(span));
         let mut facets: Vec<u32> = near.map(|(_, id)| *id).collect();
-        for (face, _) in part.curved.iter().zip(curved).filter(|(_, span)| self.meets(span)) {
+        let faces = part.curved.iter().filter(|face| !is_left_out(face));
+        for (face, _) in faces.zip(curved).filter(|(_, span)| self.meets(span)) {
             if !self.curved(face, &mut pieces) {
                 facets.extend(&face.triangles);
             }
@@ -411,7 +445,7 @@ impl Look<'_> {
                     .map(|(x, y)| corner(x, y));
                 let radius = if face.outside { radius } else { -radius };
                 let gap = Gap::Cylinder { radius, axis: direction, at, height };
-                self.outline(face, &window, gap, pieces);
+                self.outline(&face.triangles, &window, gap, pieces);
                 true
             }
             Shape::Cone { apex, axis, half_angle, along } => {
@@ -436,7 +470,7 @@ impl Look<'_> {
                         .map(|(x, y)| corner(x, y));
                     let (radius, slope) = (sense * radius, -sense * slope);
                     let gap = Gap::Cone { radius, slope, axis: direction, at, height };
-                    self.outline(face, &window, gap, pieces);
+                    self.outline(&face.triangles, &window, gap, pieces);
                 }
                 true
             }
@@ -446,7 +480,12 @@ impl Look<'_> {
                 if height < self.reach {
                     let at = centre.truncate();
                     let window = ellipse(at, DVec2::X, [half(radius, height); 2]);
-                    self.outline(face, &window, Gap::Sphere { radius, at, height }, pieces);
+                    self.outline(
+                        &face.triangles,
+                        &window,
+                        Gap::Sphere { radius, at, height },
+                        pieces,
+                    );
                 }
                 true
             }
@@ -460,7 +499,7 @@ impl Look<'_> {
                     let window =
                         ellipse(at, direction, [half(minor, height), half(radius, height)]);
                     let gap = Gap::Barrel { radius, meridian: minor, axis: direction, at, height };
-                    self.outline(face, &window, gap, pieces);
+                    self.outline(&face.triangles, &window, gap, pieces);
                 }
                 true
             }
@@ -468,14 +507,14 @@ impl Look<'_> {
         }
     }
 
-    /// The part of a face within a window.
-    fn outline(&self, face: &CurvedFace, window: &[DVec2], gap: Gap, pieces: &mut Vec<Piece>) {
+    /// The part of some triangles within a window.
+    fn outline(&self, triangles: &[u32], window: &[DVec2], gap: Gap, pieces: &mut Vec<Piece>) {
         let within = Bounds2::of(window);
         if !within.meets(self.region) {
             return;
         }
         let mut rings: Vec<Ring> = Vec::new();
-        for &triangle in &face.triangles {
+        for &triangle in triangles {
             let corners = corners(self.survey.part, &self.survey.axes_from_part, triangle);
             let [a, b, c] = corners;
             if (b - a).cross(c - a).z * self.side <= 0.0 {
@@ -507,7 +546,7 @@ fn largest(piece: &Piece) -> f64 {
 }
 
 /// A ring about an ellipse.
-fn ellipse(at: DVec2, axis: DVec2, half: [f64; 2]) -> Ring {
+pub(super) fn ellipse(at: DVec2, axis: DVec2, half: [f64; 2]) -> Ring {
     let step = std::f64::consts::TAU / WINDOW as f64;
     let corner = |index: usize| {
         let e = DVec2::from_angle(step * index as f64) / (0.5 * step).cos();

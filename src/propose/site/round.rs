@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
 
-use super::relief::{LEVEL, Relief, Survey};
+use super::relief::{LEVEL, Relief, Survey, is_free};
 use super::shapes::{project, stretches};
 use super::skyline::Skyline;
 use super::tapers::upright;
@@ -18,6 +18,7 @@ use crate::error::Result;
 use crate::geometry::overlay;
 use crate::geometry::polygon::{self, Bounds2};
 use crate::geometry::sphere::directions;
+use crate::model::Piece;
 use crate::part::{CurvedFace, PairKind, Shape};
 use crate::propose::options::Rejection;
 use crate::propose::stroke::Stroke;
@@ -27,7 +28,7 @@ const SAME_AXIS: f64 = 3e-4;
 /// Closing directions that differ by less are one \[rad\].
 const SAME_CLOSING: f64 = 1e-3;
 /// At most this many planes across one axis give directions, the largest ones.
-const MOST_PLANES: usize = 24;
+pub(super) const MOST_PLANES: usize = 24;
 /// Edge of the icosahedron seen from its middle \[rad\].
 const ICOSAHEDRON: f64 = 1.1071;
 /// Divisions of its edge at most.
@@ -68,7 +69,7 @@ impl Budget {
     pub(super) const NONE: Self = Self { looks: usize::MAX, candidates: usize::MAX };
     pub(super) const FEW: Self = Self { looks: MOST_LOOKS, candidates: MOST_CANDIDATES };
 
-    fn look(&mut self) {
+    pub(super) fn look(&mut self) {
         self.looks = self.looks.saturating_sub(1);
     }
 
@@ -120,16 +121,16 @@ impl Round {
 
 /// A place where a flat pad touches the part first.
 #[derive(Debug, Clone, Copy)]
-struct Crest {
-    face: u32,
+pub(super) struct Crest {
+    pub(super) face: u32,
     /// Along the closing direction.
-    height: f64,
+    pub(super) height: f64,
     /// Across the crest; infinite on a plane.
-    radius: f64,
+    pub(super) radius: f64,
     /// Around it, in the direction's axes.
-    bounds: Bounds2,
+    pub(super) bounds: Bounds2,
     /// Its ends in the axes of the upright direction.
-    ends: [DVec3; 2],
+    pub(super) ends: [DVec3; 2],
 }
 
 impl Finder<'_> {
@@ -189,13 +190,18 @@ impl Finder<'_> {
     }
 
     /// Half of the shorter side of the pads where these are two rectangles alike \[m\].
-    fn half_pad(&self) -> Option<f64> {
+    pub(super) fn half_pad(&self) -> Option<f64> {
         let [one, two] = self.gripper.pads(self.gripper.stroke[1]);
         (one == two && one.len() == 4).then(|| 0.5 * self.gripper.pad_sizes()[0].min_element())
     }
 
     /// Whether the part stands in the pads' way wherever they cover a crest of two levels.
-    fn is_buried(&self, top: &[Crest], bottom: &[Crest], skyline: Option<&Skyline>) -> bool {
+    pub(super) fn is_buried(
+        &self,
+        top: &[Crest],
+        bottom: &[Crest],
+        skyline: Option<&Skyline>,
+    ) -> bool {
         let Some(skyline) = skyline else { return false };
         let slack = 2.0 * SAME_PLANE * self.size;
         let heights = [top[0].height + slack, -bottom[0].height - slack];
@@ -208,11 +214,12 @@ impl Finder<'_> {
             })
     }
 
-    /// Triangles of no face.
+    /// Triangles of no face, and of free form.
     pub(super) fn loose(&self) -> Vec<u32> {
         let mut taken = vec![false; self.part.mesh.triangles.len()];
         let plane = self.part.faces.iter().map(|face| &face.triangles);
-        let curved = self.part.curved.iter().map(|face| &face.triangles);
+        let curved = self.part.curved.iter().filter(|face| !is_free(face));
+        let curved = curved.map(|face| &face.triangles);
         plane.chain(curved).flatten().for_each(|&triangle| taken[triangle as usize] = true);
         (0..taken.len() as u32).filter(|&triangle| !taken[triangle as usize]).collect()
     }
@@ -221,9 +228,9 @@ impl Finder<'_> {
         self.chosen.is_none_or(|chosen| chosen.get(id as usize).is_some_and(|chosen| *chosen))
     }
 
-    /// Faces with a crest that pads may touch.
+    /// Faces about an axis or point with a crest that pads may touch.
     pub(super) fn round_faces(&self) -> impl Iterator<Item = &CurvedFace> {
-        let faces = self.part.curved.iter();
+        let faces = self.part.curved.iter().filter(|face| !is_free(face));
         faces.filter(|face| face.outside && face.reachable && self.may_touch(face.id))
     }
 
@@ -305,7 +312,7 @@ impl Finder<'_> {
     }
 
     /// The crests that face a direction.
-    fn crests(&self, closing: DVec3) -> Vec<Crest> {
+    pub(super) fn crests(&self, closing: DVec3) -> Vec<Crest> {
         let (axes_from_part, upright_axes) = (axes(closing), axes(upright(closing)));
         let place = |point: DVec3| (axes_from_part * point).truncate();
         let mut crests = Vec::new();
@@ -410,7 +417,7 @@ impl Finder<'_> {
         sites: &mut Vec<Site>,
     ) -> Result<Option<Option<Rejection>>> {
         let heights = [top[0].height, -bottom[0].height];
-        let (width, reach) = (heights[0] - heights[1], self.gripper.pad_reach());
+        let reach = self.gripper.pad_reach();
         let common =
             Bounds2 { min: boxes[0].min.max(boxes[1].min), max: boxes[0].max.min(boxes[1].max) };
         let region = Bounds2 {
@@ -419,31 +426,54 @@ impl Finder<'_> {
         };
         let layer = self.gripper.layer();
         let pieces = survey.pieces(heights, [layer.reach(); 2], region);
-        let force = self.options.force_on(self.gripper);
-        let place = common.centre();
-        let Some(relief) = Relief::new(pieces, layer, force, &self.gripper.pads(width), place)
-        else {
-            return Ok(None);
-        };
-        let overlap = overlay::intersect(&relief.pressed[0], &relief.pressed[1]);
         let sides = [top, bottom].map(|level| {
             let mut faces: Vec<u32> = level.iter().map(|crest| crest.face).collect();
             faces.sort_unstable();
             faces
         });
+        let rise = SAME_PLANE * self.size;
+        let any = self.pressed_sites(
+            direction,
+            sides,
+            (heights, common.centre()),
+            pieces,
+            (rise, None),
+            sites,
+        )?;
+        Ok(any.then_some(None))
+    }
+
+    /// Adds the sites of pieces of surface under pads over `place` with their planes at `heights`;
+    /// whether there are any. `rise`: see [`Site::rise`]; `main`: angle of the sites' `x`, by their
+    /// edges where there is none.
+    pub(super) fn pressed_sites(
+        &self,
+        direction: usize,
+        sides: [Vec<u32>; 2],
+        (heights, place): ([f64; 2], DVec2),
+        pieces: [Vec<Piece>; 2],
+        (rise, main): (f64, Option<f64>),
+        sites: &mut Vec<Site>,
+    ) -> Result<bool> {
+        let (layer, force) = (self.gripper.layer(), self.options.force_on(self.gripper));
+        let pads = self.gripper.pads(heights[0] - heights[1]);
+        let Some(relief) = Relief::new(pieces, layer, force, &pads, place) else {
+            return Ok(false);
+        };
+        let overlap = overlay::intersect(&relief.pressed[0], &relief.pressed[1]);
         let mut any = false;
-        for overlap in stretches(overlap, 2.0 * reach) {
-            let (turn, middle) = lie(&overlap);
-            let (kind, sides, rise) = (PairKind::External, &sides, SAME_PLANE * self.size);
+        for overlap in stretches(overlap, 2.0 * self.gripper.pad_reach()) {
+            let (turn, middle) = lie(&overlap, main);
+            let (kind, sides) = (PairKind::External, &sides);
             let base = Base { kind, direction, sides, overlap, turn, middle, heights, rise };
             sites.push(self.site(base, Some(relief.clone()))?);
             any = true;
         }
-        Ok(any.then_some(None))
+        Ok(any)
     }
 
     /// Bounds in the axes of the opposite direction as bounds in those of `closing`.
-    fn flipped(&self, bounds: Bounds2, closing: DVec3) -> Bounds2 {
+    pub(super) fn flipped(&self, bounds: Bounds2, closing: DVec3) -> Bounds2 {
         let map = axes(closing) * axes(-closing).transpose();
         let corners = [bounds.min, bounds.max, DVec2::new(bounds.min.x, bounds.max.y)];
         Bounds2::of(&corners.map(|corner| (map * corner.extend(0.0)).truncate()))

@@ -1,0 +1,313 @@
+//! Crests of free form: where a flat pad touches such a face first, and the paraboloid that stands
+//! for the face there.
+
+use glam::{DMat2, DMat3, DVec2, DVec3};
+use rustc_hash::FxHashSet;
+
+use super::net::{Facing, Net};
+use super::relief::FACING;
+use crate::geometry::Paraboloid;
+use crate::geometry::polygon::Bounds2;
+use crate::gripper::Layer;
+use crate::model::Gap;
+use crate::part::{CurvedFace, Mesh};
+
+/// What the pads bring.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pad {
+    pub(super) layer: Layer,
+    /// Of one jaw \[N\].
+    pub(super) force: f64,
+    /// Distance of its farthest corner from the middle \[m\].
+    pub(super) reach: f64,
+}
+
+/// Compressions up to which corners make the paraboloid.
+const FITTED: f64 = 3.0;
+/// Corners that make it at least, where there are as many.
+const FEWEST: usize = 12;
+/// Share of the compression, and of the gap besides, by which the paraboloid may miss a corner.
+const OFF: [f64; 2] = [0.2, 0.1];
+/// Compressions within which it may miss none.
+const HELD: f64 = 2.0;
+/// Share of the compression by which a crest may fall over the length of a pad and be straight.
+const STRAIGHT: f64 = 0.1;
+/// Share of the compression by which a straight one may lean over that length.
+const LEANS: f64 = 0.5;
+/// The part of a radius within which the parabola stands for the circle.
+const PARABOLA: f64 = 0.9;
+/// A crest may lie this far outside of a triangle, as a share of it.
+const RIM: f64 = 1e-3;
+
+/// A crest of a face of free form, in the axes of a closing direction.
+#[derive(Debug, Clone)]
+pub(super) struct FreeCrest {
+    pub(super) face: u32,
+    /// Of the pad's plane along the direction that the crest faces \[m\].
+    pub(super) height: f64,
+    /// How far corners of the face rise above it \[m\].
+    pub(super) above: f64,
+    /// Where pads touch first: a point, or the box of a line.
+    pub(super) bounds: Bounds2,
+    /// Of that line, or twice the point.
+    pub(super) ends: [DVec2; 2],
+    /// Least and greatest radius \[m\], infinite where it is straight, and the direction of the
+    /// greatest.
+    pub(super) radii: [f64; 2],
+    pub(super) axis: DVec2,
+    /// Compression of the layer there, about \[m\].
+    pub(super) delta: f64,
+    pub(super) smooth: Option<Smooth>,
+}
+
+/// What of a face a paraboloid stands for.
+#[derive(Debug, Clone)]
+pub(super) struct Smooth {
+    pub(super) gap: Gap,
+    pub(super) triangles: Vec<u32>,
+    /// Gap up to which it does \[m\].
+    pub(super) level: f64,
+}
+
+impl FreeCrest {
+    /// How the touched place moves with the direction \[m\]; no more than `most`.
+    pub(super) fn tensor(&self, most: f64) -> DMat2 {
+        let outer = |e: DVec2| DMat2::from_cols(e * e.x, e * e.y);
+        let [across, along] = self.radii.map(|radius| radius.min(most));
+        outer(self.axis) * along + outer(self.axis.perp()) * across
+    }
+}
+
+/// Compression of a layer by a crest of these radii under a pad \[m\]: a paraboloid of half the
+/// greatest compression on an ellipse, no larger than the pad.
+pub(super) fn compression(radii: [f64; 2], pad: Pad) -> f64 {
+    let load = |delta: f64| {
+        let [a, b] = radii.map(|radius| (2.0 * radius * delta).sqrt().min(pad.reach));
+        0.5 * std::f64::consts::PI * a * b * pad.layer.stiffness * delta
+    };
+    let (mut low, mut high) = (0.0, pad.layer.reach());
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        if load(middle) < pad.force { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// Finds crests in the axes of one closing direction.
+pub(super) struct Crests<'a> {
+    pub(super) mesh: &'a Mesh,
+    pub(super) net: &'a Net,
+    pub(super) axes_from_part: DMat3,
+    pub(super) pad: Pad,
+}
+
+impl Crests<'_> {
+    /// The crest of a face near a corner of its net, where it faces the closing direction (`side` 1)
+    /// or its opposite (-1); `None` where the face has none there: it rises on to an edge or about a
+    /// saddle.
+    pub(super) fn find(
+        &self,
+        face: &CurvedFace,
+        corner: u32,
+        facing: &Facing,
+        side: f64,
+    ) -> Option<FreeCrest> {
+        let place = |point: DVec3| {
+            let point = self.axes_from_part * point;
+            DVec3::new(point.x, point.y, side * point.z)
+        };
+        let start = place(facing.point);
+        let straight = facing.straight.map(|straight| straight.is_some());
+        let own = facing.radii.x_axis.x + facing.radii.y_axis.y + facing.radii.z_axis.z;
+        let rough = match straight {
+            [true, true] => [f64::INFINITY; 2],
+            [false, false] => [0.5 * own; 2],
+            _ => [own, f64::INFINITY],
+        };
+        let delta = compression(rough, self.pad);
+        let (form, above) = self.form(corner, &place, start, delta)?;
+        let length = self.pad.reach;
+        let ([low, high], first) = form.principal();
+        let fall = 0.5 * length * length;
+        if low * fall < -STRAIGHT * delta * FITTED {
+            return None;
+        }
+        let bends = [low, high].map(|bend| if bend * fall < STRAIGHT * delta { 0.0 } else { bend });
+        let mut step = DVec2::ZERO;
+        for (bend, along) in bends.into_iter().zip([first, first.perp()]) {
+            let slope = along.dot(form.slope);
+            if bend > 0.0 {
+                step -= along * (slope / bend);
+            } else if slope.abs() * length > LEANS * delta {
+                return None;
+            }
+        }
+        let at = start.truncate() + step;
+        let height = start.z - form.at(step);
+        let gap = match bends {
+            [low, high] if low > 0.0 => Gap::Barrel {
+                radius: high.recip(),
+                meridian: low.recip(),
+                axis: first,
+                at,
+                height: 0.0,
+            },
+            [_, high] if high > 0.0 => {
+                Gap::Cylinder { radius: high.recip(), axis: first, at, height: 0.0 }
+            }
+            _ => Gap::Plane { height: 0.0, slope: DVec2::ZERO },
+        };
+        let value = |x: DVec2| {
+            let x = x - at;
+            let [along, across] = [first.dot(x), first.perp_dot(x)];
+            0.5 * (bends[0] * along * along + bends[1] * across * across)
+        };
+        let mut crest = FreeCrest {
+            face: face.id,
+            height,
+            above: (above - height).max(0.0),
+            bounds: Bounds2 { min: at, max: at },
+            ends: [at; 2],
+            radii: [bends[1], bends[0]].map(f64::recip),
+            axis: first,
+            delta,
+            smooth: None,
+        };
+        let found = self.cover(face, (&place, side), (height, at), delta, &value)?;
+        let line = found.near.iter().map(|x| first.dot(*x - at));
+        if bends[0] == 0.0 && !found.near.is_empty() {
+            let [from, to] = [line.clone().fold(0.0, f64::min), line.fold(0.0, f64::max)];
+            crest.ends = [from, to].map(|along| at + first * along);
+            crest.bounds =
+                if bends[1] == 0.0 { Bounds2::of(&found.near) } else { Bounds2::of(&crest.ends) };
+        }
+        let Cover { triangles, level, .. } = found;
+        if level >= HELD * delta {
+            crest.smooth = Some(Smooth { gap, triangles, level });
+        } else {
+            (crest.height, crest.above) = (above, 0.0);
+        }
+        Some(crest)
+    }
+
+    /// The paraboloid of the gap about a place behind a plane there, and how high the face comes.
+    fn form(
+        &self,
+        corner: u32,
+        place: &impl Fn(DVec3) -> DVec3,
+        start: DVec3,
+        delta: f64,
+    ) -> Option<(Paraboloid, f64)> {
+        let behind = |corner: u32| {
+            let point = place(self.net.points[corner as usize]) - start;
+            DVec3::new(point.x, point.y, -point.z)
+        };
+        let mut window = (FITTED * delta).min(self.pad.layer.reach());
+        let mut points: Vec<DVec3> = Vec::new();
+        for _ in 0..8 {
+            let mut seen: FxHashSet<u32> = FxHashSet::from_iter([corner]);
+            let mut queue = vec![corner];
+            points.clear();
+            while let Some(next) = queue.pop() {
+                let point = behind(next);
+                if next != corner
+                    && (point.z > window || point.truncate().length() > 2.0 * self.pad.reach)
+                {
+                    continue;
+                }
+                points.push(point);
+                for &other in self.net.beside(next) {
+                    if seen.insert(other) {
+                        queue.push(other);
+                    }
+                }
+            }
+            if points.len() >= FEWEST {
+                break;
+            }
+            window *= 2.0;
+        }
+        // The order of the corners must not tell.
+        points.sort_by(|a, b| {
+            a.z.total_cmp(&b.z).then(a.x.total_cmp(&b.x)).then(a.y.total_cmp(&b.y))
+        });
+        // What is pressed most counts most.
+        let weight = |gap: f64| (1.0 + (2.0 * gap / delta).powi(2)).powi(-2);
+        let weighted = points.iter().map(|&point| (point, weight(point.z)));
+        let form = Paraboloid::fit(weighted)?;
+        let highest = points.iter().map(|point| -point.z).fold(f64::NEG_INFINITY, f64::max);
+        Some((form, start.z + highest))
+    }
+
+    /// What of the face a gap stands for; `None` where the crest is none of its places.
+    fn cover(
+        &self,
+        face: &CurvedFace,
+        (place, side): (&impl Fn(DVec3) -> DVec3, f64),
+        (height, at): (f64, DVec2),
+        delta: f64,
+        value: &impl Fn(DVec2) -> f64,
+    ) -> Option<Cover> {
+        let mut cover =
+            Cover { triangles: Vec::new(), near: Vec::new(), level: self.pad.layer.reach() };
+        let mut is_of_face = false;
+        let mut seen: Vec<(f64, u32)> = Vec::new();
+        for &triangle in &face.triangles {
+            let corners = self.mesh.corners(triangle).map(place);
+            let gaps = corners.map(|corner| height - corner.z);
+            let least = gaps.into_iter().fold(f64::INFINITY, f64::min);
+            let flat = corners.map(DVec3::truncate);
+            if least > cover.level {
+                continue;
+            }
+            let [a, b, c] = corners;
+            let normal = (b - a).cross(c - a);
+            // The mirror image of the other side has the corners the other way round.
+            let up = side * normal.z / normal.length();
+            // A needle of no area counts for nothing.
+            if up.is_nan() || up <= 0.0 {
+                continue;
+            }
+            is_of_face |= holds(flat, at);
+            let is_near = flat.iter().any(|x| (*x - at).length() < 2.0 * self.pad.reach);
+            if up < FACING && is_near {
+                cover.level = cover.level.min(least);
+            }
+            for (x, gap) in flat.into_iter().zip(gaps) {
+                let meant = value(x);
+                let is_met = (gap - meant).abs() <= OFF[0] * delta + OFF[1] * meant;
+                if is_met && gap <= delta {
+                    cover.near.push(x);
+                } else if !is_met && is_near {
+                    cover.level = cover.level.min(gap.min(meant).max(0.0));
+                }
+            }
+            if up >= FACING {
+                seen.push((least, triangle));
+            }
+        }
+        let within = seen.into_iter().filter(|(least, _)| *least < cover.level);
+        cover.triangles.extend(within.map(|(_, triangle)| triangle));
+        is_of_face.then_some(cover)
+    }
+}
+
+/// Triangles that a gap stands for, their corners near the crest, and the gap from which on others
+/// begin.
+struct Cover {
+    triangles: Vec<u32>,
+    near: Vec<DVec2>,
+    level: f64,
+}
+
+/// Half extents of what lies within `level` of a paraboloid's plane.
+pub(super) fn half(radius: f64, level: f64) -> f64 {
+    (2.0 * radius * level).sqrt().min(PARABOLA * radius)
+}
+
+/// Whether a triangle holds a point, or nearly.
+fn holds([a, b, c]: [DVec2; 3], point: DVec2) -> bool {
+    let area = (b - a).perp_dot(c - a);
+    let parts = [(a, b), (b, c), (c, a)].map(|(a, b)| (b - a).perp_dot(point - a) / area);
+    area != 0.0 && parts.iter().all(|part| *part > -RIM)
+}

@@ -1,0 +1,97 @@
+//! Which smooth surface is a face of free form.
+
+use std::path::Path;
+
+use glam::{DVec2, DVec3};
+use gripfast::part::{Part, ReadOptions, Shape};
+
+fn free(part: &Part) -> usize {
+    part.curved.iter().filter(|face| face.shape == Shape::Freeform).count()
+}
+
+/// A block of 60 x 40 x 20 mm whose top is the given height over a grid; its corners moved by noise
+/// \[m\].
+fn block(cells: u32, noise: f64, top: impl Fn(DVec2) -> f64) -> Part {
+    let mut vertices = Vec::new();
+    let mut state = 1_u64;
+    let mut random = || {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    for level in 0..2 {
+        for j in 0..=cells {
+            for i in 0..=cells {
+                let at = DVec2::new(f64::from(i), f64::from(j)) / f64::from(cells) - 0.5;
+                let at = at * DVec2::new(0.06, 0.04);
+                let z = if level == 0 { 0.0 } else { 0.02 + top(at) };
+                let moved = DVec3::new(random(), random(), random()) * noise;
+                vertices.push(at.extend(z) + moved);
+            }
+        }
+    }
+    let row = cells + 1;
+    let layer = row * row;
+    let at = |i: u32, j: u32| j * row + i;
+    let mut triangles: Vec<[u32; 3]> = Vec::new();
+    let mut quad = |a: u32, b: u32, c: u32, d: u32| triangles.extend([[a, b, c], [a, c, d]]);
+    for j in 0..cells {
+        for i in 0..cells {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            quad(a, d, c, b);
+            quad(a + layer, b + layer, c + layer, d + layer);
+        }
+        let [a, b, c, d] = [at(j, 0), at(j + 1, 0), at(j, cells), at(j + 1, cells)];
+        quad(a, b, b + layer, a + layer);
+        quad(d, c, c + layer, d + layer);
+        let [a, b, c, d] = [at(0, j), at(0, j + 1), at(cells, j), at(cells, j + 1)];
+        quad(b, a, a + layer, b + layer);
+        quad(c, d, d + layer, c + layer);
+    }
+    Part::from_triangles("block", &vertices, &triangles).unwrap()
+}
+
+fn bulge(at: DVec2) -> f64 {
+    let s = (1.0 - (at.x / 0.03).powi(2)) * (1.0 - (at.y / 0.02).powi(2));
+    0.008 * s * s
+}
+
+#[test]
+fn a_bulge_is_and_noise_is_not() {
+    let smooth = block(32, 0.0, bulge);
+    assert_eq!(free(&smooth), 1);
+    let face = smooth.curved.iter().find(|face| face.shape == Shape::Freeform).unwrap();
+    assert_eq!(face.id as usize, smooth.faces.len() + smooth.curved.len() - 1);
+    assert!(face.reachable && face.area > 2e-3 && face.area < 3e-3, "{}", face.area);
+    for noise in [1e-5, 3e-5, 1e-4, 3e-4, 1e-3] {
+        let noisy = block(32, noise, |_| 0.0);
+        assert_eq!(free(&noisy), 0, "{noise}");
+    }
+}
+
+#[test]
+fn faceted_parts_have_none() {
+    let flat = |at: DVec2| if (at.x * 100.0).round() as i64 % 2 == 0 { 0.002 } else { 0.0 };
+    assert_eq!(free(&block(32, 0.0, flat)), 0);
+    // Too few facets to show a form.
+    assert_eq!(free(&block(3, 0.0, bulge)), 0);
+}
+
+#[test]
+fn all_facets_are_planes_where_they_are_meant_so() {
+    let mesh = block(32, 0.0, bulge).mesh;
+    let options = ReadOptions::default().with_faceted(true);
+    let part =
+        Part::from_triangles_with("block", &mesh.vertices, &mesh.triangles, &options).unwrap();
+    assert!(part.curved.is_empty());
+}
+
+#[test]
+fn sample_parts_of_planes_and_round_faces_have_none() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/parts");
+    for name in ["l_bracket", "hex_nut", "pocket_plate", "t_slot_bar", "spur_gear", "shaft_key"] {
+        let part =
+            Part::read(&folder.join(format!("{name}.stl")), &ReadOptions::default()).unwrap();
+        assert_eq!(free(&part), 0, "{name}");
+    }
+}
