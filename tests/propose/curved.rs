@@ -228,7 +228,7 @@ fn a_shaft_is_gripped_on_its_barrel() {
 
 /// The worst loads of some curved grips of a part, from comparisons and from solving every load;
 /// how many loads were solved, and all.
-fn screened_as_solved(name: &str, part: &Part, count: usize) -> [usize; 2] {
+pub(crate) fn screened_as_solved(name: &str, part: &Part, count: usize) -> [usize; 2] {
     let gripper = gripper::find("robotiq-2f85").unwrap();
     let force = 40.0;
     let options = ProposeOptions::default()

@@ -324,3 +324,18 @@ fn an_egg_is_gripped_about_its_axis() {
         assert!(closing(grip).z.abs() < 1e-3 && (grip.width / 0.028 - 1.0).abs() < 2e-3);
     }
 }
+
+/// Lenses between the pads are held about both axes by their roundness alone: loads on them are compared
+/// as those on other contacts are.
+#[test]
+fn comparing_loads_on_lenses_gives_the_worst_one_that_solving_all_of_them_gives() {
+    let lens = part(&ellipsoid(DVec3::new(0.010, 0.015, 0.022), 48, 24));
+    let egg = part(&ellipsoid(DVec3::new(0.016, 0.022, 0.0225), 48, 24));
+    let mut sums = [0; 2];
+    for (name, part) in [("lens", &lens), ("nearly round", &egg)] {
+        let [solved, all] = crate::curved::screened_as_solved(name, part, 8);
+        sums = [sums[0] + solved, sums[1] + all];
+    }
+    let [solved, all] = sums;
+    assert!(2 * solved < all, "{solved} of {all}");
+}

@@ -32,6 +32,9 @@ pub struct Screen<'a> {
     force: f64,
     length: f64,
     give: f64,
+    /// Of the rotations held by the faces' roundness alone: which of the problem's held ones it is, its
+    /// stiffness over the force, and its change with the pull.
+    rolling: Vec<(usize, f64, f64)>,
     /// States found so far, with what tells how a load presses.
     known: Vec<([f64; 3], Place)>,
 }
@@ -42,6 +45,10 @@ const MOST: usize = 64;
 const WEAK: f64 = 0.8;
 /// Sine of the angle between two axes that are one.
 const SAME_AXIS: f64 = 1e-6;
+/// Share of a stiffness by which it may differ from a line in the pull.
+const LINEAR: f64 = 1e-7;
+/// Share of the layers' give, squeezed without a load, from which on a part may settle.
+const SETTLES: f64 = 0.4;
 /// Share of the limit of a strong coupling up to which friction hardly moves the pressure, and the
 /// growth of a bound that covers what it does: its lever moves the middle of pressure by less than a
 /// twentieth of the contact's width.
@@ -61,32 +68,57 @@ impl Pads {
         };
         let none = NO_LEVER * force * distance.abs();
         let free = |rotations: [Rotation; 2]| {
-            let free = rotations.map(|rotation| match rotation.kind {
-                Kind::Free | Kind::Facets(_) => Some(true),
-                Kind::Held => Some(false),
+            rotations.map(|rotation| match rotation.kind {
+                Kind::Free | Kind::Facets(_) => true,
+                Kind::Held => false,
                 // As good as one axis, or rolling out: free under any load.
-                Kind::Nearly(stiffness) => (stiffness <= none).then_some(true),
-            });
-            Some([free[0]?, free[1]?])
+                Kind::Nearly(stiffness) => stiffness <= none,
+            })
         };
         let pressed = squeeze(0.0)?;
         let rotations = self.rotations(&pressed, distance, force);
-        let is_free = free(rotations)?;
+        let is_free = free(rotations);
         // The same rotations are free however much one pad is pulled off.
         let pulls = wrenches.iter().map(|wrench| wrench.force.z).filter(|z| z.abs() < 2.0 * force);
         let (low, high) = pulls.fold((0.0, 0.0), |(a, b): (f64, f64), z| (a.min(z), b.max(z)));
         let on_axis = rotations.iter().any(|rotation| rotation.kind == Kind::Free);
         let nearly = rotations.iter().any(|rotation| matches!(rotation.kind, Kind::Nearly(_)));
         let always = on_axis && !nearly && self.plainly_round();
+        let mut stiffness = [Vec::new(), Vec::new()];
+        let mut others_looked_at = 0;
         for pull in [low, high].into_iter().filter(|pull| !always && pull.abs() > 1e-9 * force) {
+            others_looked_at += 1;
             let [one, two] = squeeze(pull)?;
             let others = space::rotations([&one, &two], distance);
-            let other_free = free(others)?;
+            let other_free = free(others);
             let same = (0..2).all(|i| {
                 let apart = rotations[i].axis.perp_dot(others[i].axis).abs();
-                is_free[i] == other_free[i] && (is_free[0] == is_free[1] || apart < SAME_AXIS)
+                let any_axis = is_free[0] == is_free[1] && (is_free[0] || !nearly);
+                is_free[i] == other_free[i] && (any_axis || apart < SAME_AXIS)
             });
             if !same {
+                return None;
+            }
+            for (i, along) in stiffness.iter_mut().enumerate() {
+                match others[i].kind {
+                    Kind::Nearly(there) if !is_free[i] => along.push((pull, there)),
+                    _ => {}
+                }
+            }
+        }
+        let mut rolling = Vec::new();
+        for (place, i) in (0..2).filter(|&i| !is_free[i]).enumerate() {
+            if let Kind::Nearly(here) = rotations[i].kind {
+                let changes = stiffness[i].iter().map(|(pull, there)| (there - here) / pull);
+                let slope = changes.clone().next().unwrap_or(0.0);
+                let known = stiffness[i].len() == others_looked_at;
+                // The same lever of each face under all forces.
+                if !known || changes.into_iter().any(|x| (x - slope).abs() > LINEAR * here / force)
+                {
+                    return None;
+                }
+                rolling.push((place, here / force, slope));
+            } else if !stiffness[i].is_empty() {
                 return None;
             }
         }
@@ -104,7 +136,7 @@ impl Pads {
         };
         let problem = case.problem(is_free);
         let give = pressed[0].compression().max(pressed[1].compression());
-        Some(Screen { problem, force, length, give, known: Vec::new(), pressed })
+        Some(Screen { problem, force, length, give, rolling, known: Vec::new(), pressed })
     }
 }
 
@@ -124,6 +156,9 @@ impl Pads {
     /// As [`Pads::screen`], for one load.
     pub(super) fn follow(&self, distance: f64, force: f64, wrench: &Wrench) -> Option<Follow<'_>> {
         let screen = self.screen(distance, force, std::slice::from_ref(wrench))?;
+        if !screen.rolling.is_empty() {
+            return None;
+        }
         Some(Follow { screen, wrench: *wrench, last: None, before: None })
     }
 }
@@ -180,14 +215,28 @@ impl Screen<'_> {
             return Compared::Open;
         }
         (self.problem.normal, self.problem.wrench) = (normal, *wrench);
+        for &(held, stiffness, by_pull) in &self.rolling {
+            self.problem.rolling[held] = stiffness * self.force + by_pull * wrench.force.z;
+        }
         let Some((compared, place, most)) = self.reach(value) else { return Compared::Open };
-        if strong(&self.problem, most / WEAK) {
+        if strong(&self.problem, most / WEAK) || self.may_settle(&place) {
             return Compared::Open;
         }
         if self.known.len() < MOST {
             self.known.push((self.presses(), place));
         }
         compared
+    }
+
+    /// Whether the part may turn by more than the layers give about an axis that the faces' roundness
+    /// alone holds: then it is free, which is for the solution to say.
+    fn may_settle(&self, place: &Place) -> bool {
+        let give = self.pressed.iter().map(|face| 0.5 * face.compression()).sum::<f64>();
+        let tilt = self.problem.tilt(&place.angles);
+        self.rolling.iter().any(|&(held, ..)| {
+            let angle = self.problem.held[held].dot(DVec2::new(tilt.y, -tilt.x)).abs();
+            0.5 * self.problem.distance.abs() * angle > SETTLES * give
+        })
     }
 
     /// What tells how a load presses.
