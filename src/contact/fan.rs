@@ -17,7 +17,7 @@
 use glam::DVec2;
 
 use super::field::Friction;
-use super::lanes::{Block, LANES, total, widest};
+use super::lanes::{Block, LANES, totals, widest};
 use super::loops::Loops;
 
 /// Below this distance of the line from the slip centre (in the pad's length scale) an edge
@@ -62,7 +62,7 @@ fn sums_of(edges: &[Block], Centre { c, p }: Centre) -> Sums {
             }
         }
     }
-    let [e1, e2, ye11, ye12, ye22, r, yr1, yr2, q11, q12, q22] = lanes.each_ref().map(total);
+    let [e1, e2, ye11, ye12, ye22, r, yr1, yr2, q11, q12, q22] = totals(&lanes);
     Sums { e: [e1, e2], ye: [ye11, ye12, ye22], r, yr: [yr1, yr2], q: [q11, q12, q22] }
 }
 
@@ -192,8 +192,8 @@ fn assemble(sums: &Sums, c: DVec2, omega: f64) -> Friction {
     let gy2 = row(sums.ye[1], sums.ye[2], sums.yr[1]);
     let g = [
         g0,
-        std::array::from_fn(|i| c.x * g0[i] + gy1[i]),
-        std::array::from_fn(|i| c.y * g0[i] + gy2[i]),
+        [c.x * g0[0] + gy1[0], c.x * g0[1] + gy1[1], c.x * g0[2] + gy1[2]],
+        [c.y * g0[0] + gy2[0], c.y * g0[1] + gy2[1], c.y * g0[2] + gy2[2]],
     ];
     let scale = 1.0 / omega.abs();
     let [h11, h12, h22] = [scale * sums.q[0], scale * sums.q[1], scale * sums.q[2]];

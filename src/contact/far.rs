@@ -15,7 +15,7 @@
 use std::sync::LazyLock;
 
 use super::field::Friction;
-use super::lanes::{Block, LANES, total, widest};
+use super::lanes::{Block, LANES, totals, widest};
 use super::loops::Loops;
 
 /// Most points of a rule.
@@ -174,7 +174,7 @@ fn sums_of(
             }
         }
     }
-    let n = lanes.each_ref().map(total);
+    let n = totals(&lanes);
     Sums {
         e: [n[0], n[1]],
         ze: n[2],

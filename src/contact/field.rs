@@ -113,6 +113,7 @@ impl Friction {
 
     /// `sum_m p_m g[m]`: gradient of `int p |v| dA`.
     pub fn gradient(&self, p: [f64; 3]) -> [f64; 3] {
-        std::array::from_fn(|i| p[0] * self.g[0][i] + p[1] * self.g[1][i] + p[2] * self.g[2][i])
+        let along = |i: usize| p[0] * self.g[0][i] + p[1] * self.g[1][i] + p[2] * self.g[2][i];
+        [along(0), along(1), along(2)]
     }
 }

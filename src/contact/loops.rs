@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::lanes::{Block, LANES, total, widest};
+use super::lanes::{Block, LANES, totals, widest};
 use crate::model::Polygon;
 
 /// The boundary loops of a contact area: outer loops counter-clockwise, holes clockwise. All
@@ -218,7 +218,7 @@ fn sums_of(edges: &mut [Block], o: DVec2) -> [f64; 6] {
     }
     // About a point of the area, then moved: a sliver far from the origin keeps its relative
     // accuracy.
-    let sums = lanes.each_ref().map(total);
+    let sums = totals(&lanes);
     let m = [
         sums[0] / 2.0,
         sums[1] / 6.0,

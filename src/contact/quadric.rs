@@ -16,7 +16,7 @@ use std::sync::LazyLock;
 use glam::DVec2;
 
 use super::far::RULES;
-use super::lanes::{LANES, Lane, total, widest};
+use super::lanes::{LANES, Lane, total, totals, widest};
 use crate::geometry::polygon::ring_contains;
 use crate::model::Ring;
 
@@ -565,7 +565,7 @@ fn moments_in(region: &Region, gap: &Quadratic) -> [[f64; 4]; 4] {
             }
         }
     }
-    lanes.map(|row| row.each_ref().map(total))
+    [totals(&lanes[0]), totals(&lanes[1]), totals(&lanes[2]), totals(&lanes[3])]
 }
 
 fn contains(rings: &[Ring], x: DVec2) -> bool {

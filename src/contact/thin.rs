@@ -14,7 +14,7 @@ use glam::DVec2;
 
 use super::far::{RULES, points};
 use super::field::Friction;
-use super::lanes::{LANES, total, widest};
+use super::lanes::{LANES, totals, widest};
 use super::loops::Loops;
 use super::{fan, far};
 
@@ -204,7 +204,7 @@ fn strips_of(
 }
 
 fn assemble(lanes: &[[f64; LANES]; 15]) -> Friction {
-    let n = lanes.each_ref().map(total);
+    let n = totals(lanes);
     let [h11, h12, h22, h13, h23, h33] = [n[9], n[10], n[11], n[12], n[13], n[14]];
     Friction {
         g: [[n[0], n[1], n[2]], [n[3], n[4], n[5]], [n[6], n[7], n[8]]],

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::{BLOCKS, Dissipation, Element, MORE, PANEL, POINTS, Region, enough};
 use crate::contact::far::RULES;
-use crate::contact::lanes::{LANES, Lane, total, widest};
+use crate::contact::lanes::{LANES, Lane, totals, widest};
 
 impl Region {
     /// Points between a part of an element and the line of [`Self::foot`], `range` of both
@@ -59,7 +59,7 @@ impl Region {
     ) {
         let rules = (&RULES[counts[0]][..], &BLOCKS[counts[1].div_ceil(LANES)][..]);
         let lanes = add_nodes(self, element, twist, range, rules, BY);
-        let s = lanes.each_ref().map(total);
+        let s = totals(&lanes);
         sum.value += s[0];
         for i in 0..3 {
             sum.gradient[i] += s[1 + i];

@@ -7,7 +7,7 @@
 use glam::DVec2;
 
 use super::{Arc, BLOCKS, Dissipation, Element, MORE, PANEL, POINTS, Region, enough};
-use crate::contact::lanes::{LANES, Lane, total, widest};
+use crate::contact::lanes::{LANES, Lane, totals, widest};
 
 /// `int u r`, `int u e` and `int u e e^T / r` about the slip centre, `e` the unit vector from it; the
 /// first two also for `1`, `y1`, `y2` in place of `u`, `y` the place as seen from the centre.
@@ -229,7 +229,7 @@ impl Panels {
 
     fn finish(mut self, region: &Region) -> EdgeSums {
         self.flush(region);
-        let s = self.lanes.each_ref().map(total);
+        let s = totals(&self.lanes);
         let mut sum = self.sum;
         sum.r += s[0];
         sum.e += DVec2::new(s[1], s[2]);
