@@ -286,11 +286,7 @@ impl Job<'_> {
     ) -> anyhow::Result<()> {
         let mut block = Block::default();
         let mut take = |entry: Entry, out: &mut dyn Write| -> anyhow::Result<()> {
-            block.loads += match &entry.wrenches {
-                Wrenches::Own(own) => own.len(),
-                Wrenches::OnPart(shared, _) => shared.len(),
-                Wrenches::Common => self.common.len(),
-            };
+            block.loads += self.wrenches(&entry).len();
             block.entries.push(entry);
             if block.entries.len() >= BLOCK_GRIPS || block.loads >= BLOCK_LOADS {
                 self.score(&mut block, out, counts)?;
@@ -458,11 +454,7 @@ impl Job<'_> {
             counts.grips += 1;
             counts.solved += solved as u64;
             counts.compared += compared as u64;
-            counts.loads += match &entry.wrenches {
-                Wrenches::Own(own) => own.len() as u64,
-                Wrenches::OnPart(shared, _) => shared.len() as u64,
-                Wrenches::Common => self.common.len() as u64,
-            };
+            counts.loads += self.wrenches(entry).len() as u64;
             let Some((load, score)) = worst else { continue };
             counts.held += u64::from(score.status.holds());
             let load_name =

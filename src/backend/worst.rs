@@ -34,6 +34,12 @@ struct Open {
 }
 
 impl Open {
+    /// A load whose `mu_s` is at least the one and at most the other is to be solved, perhaps.
+    fn keep(&mut self, load: usize, [least, most]: [f64; 2]) {
+        self.floor = self.floor.max(least);
+        self.loads.push((load, most));
+    }
+
     /// A load whose `mu_s` is less than this is not the worst, and does not tie with it.
     fn value(&self) -> f64 {
         self.floor.max(self.largest) * (1.0 - 2.0 * TIE)
@@ -118,6 +124,11 @@ impl Neighbours {
     fn nearest(&self, place: &[f32; 6]) -> Option<(f32, usize)> {
         let (apart, index) = nearest(&self.places, self.states.len(), place);
         (index < self.states.len()).then_some((apart, index))
+    }
+
+    /// Whether to keep a state whose nearest other one is so far, by the square of the distance.
+    fn lacks(&self, apart: f32) -> bool {
+        apart > UNLIKE && self.states.len() < MOST
     }
 
     fn add(&mut self, place: [f32; 6], state: Neighbour) {
@@ -312,16 +323,12 @@ impl Work<'_> {
             };
             self.compared += 1;
             if most >= question.value {
-                self.open.floor = self.open.floor.max(least);
-                self.open.loads.push((load, most));
+                self.open.keep(load, [least, most]);
             }
             // The states of those before it may be like it.
-            let unlike = |all: &Neighbours| {
-                all.states.len() < MOST
-                    && all.nearest(&here).is_none_or(|(apart, _)| apart > UNLIKE)
-            };
-            if apart > UNLIKE
-                && unlike(&self.neighbours)
+            let now = || self.neighbours.nearest(&here).map_or(f32::INFINITY, |(apart, _)| apart);
+            if self.neighbours.lacks(apart)
+                && self.neighbours.lacks(now())
                 && let Some(comparer) = &mut self.comparer
                 && let Some(state) = comparer.reached_by(i)
             {
@@ -362,8 +369,7 @@ impl Work<'_> {
         match self.compare(load, Question { value: self.open.value(), sharp: SHARP }) {
             Compared::Below => {}
             Compared::Between([least, most]) => {
-                self.open.floor = self.open.floor.max(least);
-                self.open.loads.push((load, most));
+                self.open.keep(load, [least, most]);
             }
             Compared::Solved(mu) => self.open.largest = self.open.largest.max(mu),
             Compared::Refused => return Err(Ended::Refused),
@@ -499,7 +505,7 @@ impl Work<'_> {
         let apart = nearest.map_or(f32::INFINITY, |(apart, _)| apart);
         let near =
             nearest.filter(|_| apart < LIKE).map(|(_, index)| &self.neighbours.states[index]);
-        let unlike = apart > UNLIKE && self.neighbours.states.len() < MOST;
+        let unlike = self.neighbours.lacks(apart);
         match comparer.compare(&scaled, &options, near, question) {
             Some(Comparison::Between(bounds)) => {
                 self.compared += 1;

@@ -130,7 +130,8 @@ pub fn rings_moments(rings: &[&[DVec2]]) -> Moments {
     Moments { area, centroid: centroid + base, second: second - outer(centroid, centroid) * area }
 }
 
-fn outer(a: DVec2, b: DVec2) -> DMat2 {
+/// `a b^T`.
+pub(crate) fn outer(a: DVec2, b: DVec2) -> DMat2 {
     DMat2::from_cols(a * b.x, a * b.y)
 }
 

@@ -7,6 +7,7 @@ use super::pads::{Load, Pads};
 use super::pressure::{self, face_pressure, separates};
 use super::slip;
 use crate::contact::{Field, Twist};
+use crate::geometry::principal;
 use crate::model::Wrench;
 use crate::request::Refiner;
 
@@ -450,10 +451,7 @@ pub(super) fn by_load(
 
 /// The unit vector that a linear map stretches least, and by how much.
 fn flattest(slope: DMat2) -> (DVec2, f64) {
-    let square = slope.transpose() * slope;
-    let (a, b, c) = (square.x_axis.x, square.x_axis.y, square.y_axis.y);
-    // Half a turn on from the direction of the greatest stretch.
-    let flat = DVec2::from_angle(0.5 * (2.0 * b).atan2(a - c)).perp();
+    let (_, flat) = principal(slope.transpose() * slope);
     (flat, (slope * flat).length())
 }
 

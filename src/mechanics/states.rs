@@ -199,8 +199,7 @@ impl<'s, 'a> Map<'s, 'a> {
     /// Adds the zeros beside those known on the other side of a fold.
     fn partners(&mut self, states: &mut Vec<State>) {
         for known in states.clone() {
-            let partner = self.solver.partner(&known);
-            states.extend(partner.filter(|found| !states.iter().any(|state| same(state, found))));
+            add(self.solver.partner(&known), states);
         }
     }
 
@@ -254,12 +253,7 @@ impl<'s, 'a> Map<'s, 'a> {
             return;
         }
         let direct = self.solver.newton(node.z, 1.0, 15);
-        let found = direct.or_else(|| self.solver.settle_at(*node));
-        if let Some(state) = found
-            && !states.iter().any(|known| same(known, &state))
-        {
-            states.push(state);
-        }
+        add(direct.or_else(|| self.solver.settle_at(*node)), states);
     }
 
     /// Newton's method from the points with the smallest values.
@@ -280,8 +274,7 @@ impl<'s, 'a> Map<'s, 'a> {
             self.start(&floor, states);
         }
         for known in states.clone() {
-            let other = self.solver.deflated(&known);
-            states.extend(other.filter(|found| !states.iter().any(|state| same(state, found))));
+            add(self.solver.deflated(&known), states);
         }
     }
 
@@ -491,6 +484,11 @@ impl<'s, 'a> Map<'s, 'a> {
             .flat_map(|rays| rings.iter().map(move |&rings| Cell { rays, rings }))
             .collect()
     }
+}
+
+/// Adds a state that is not among them.
+fn add(found: Option<State>, states: &mut Vec<State>) {
+    states.extend(found.filter(|found| !states.iter().any(|known| same(known, found))));
 }
 
 /// Distance from the rim of a ring in units of the finest mesh, as a share of the way to the middle.

@@ -5,6 +5,8 @@ use std::path::Path;
 use glam::{DVec2, DVec3};
 use gripfast::part::{Part, ReadOptions, Shape};
 
+use crate::support;
+
 fn free(part: &Part) -> usize {
     part.curved.iter().filter(|face| face.shape == Shape::Freeform).count()
 }
@@ -12,42 +14,17 @@ fn free(part: &Part) -> usize {
 /// A block of 60 x 40 x 20 mm whose top is the given height over a grid; its corners moved by noise
 /// \[m\].
 fn block(cells: u32, noise: f64, top: impl Fn(DVec2) -> f64) -> Part {
-    let mut vertices = Vec::new();
     let mut state = 1_u64;
     let mut random = || {
         state =
             state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
     };
-    for level in 0..2 {
-        for j in 0..=cells {
-            for i in 0..=cells {
-                let at = DVec2::new(f64::from(i), f64::from(j)) / f64::from(cells) - 0.5;
-                let at = at * DVec2::new(0.06, 0.04);
-                let z = if level == 0 { 0.0 } else { 0.02 + top(at) };
-                let moved = DVec3::new(random(), random(), random()) * noise;
-                vertices.push(at.extend(z) + moved);
-            }
-        }
-    }
-    let row = cells + 1;
-    let layer = row * row;
-    let at = |i: u32, j: u32| j * row + i;
-    let mut triangles: Vec<[u32; 3]> = Vec::new();
-    let mut quad = |a: u32, b: u32, c: u32, d: u32| triangles.extend([[a, b, c], [a, c, d]]);
-    for j in 0..cells {
-        for i in 0..cells {
-            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-            quad(a, d, c, b);
-            quad(a + layer, b + layer, c + layer, d + layer);
-        }
-        let [a, b, c, d] = [at(j, 0), at(j + 1, 0), at(j, cells), at(j + 1, cells)];
-        quad(a, b, b + layer, a + layer);
-        quad(d, c, c + layer, d + layer);
-        let [a, b, c, d] = [at(0, j), at(0, j + 1), at(cells, j), at(cells, j + 1)];
-        quad(b, a, a + layer, b + layer);
-        quad(c, d, d + layer, c + layer);
-    }
+    let (vertices, triangles) = support::block::block([cells; 2], |level, at| {
+        let at = at * DVec2::new(0.06, 0.04);
+        let z = if level == 0 { 0.0 } else { 0.02 + top(at) };
+        at.extend(z) + DVec3::new(random(), random(), random()) * noise
+    });
     Part::from_triangles("block", &vertices, &triangles).unwrap()
 }
 

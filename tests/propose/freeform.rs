@@ -259,43 +259,15 @@ fn an_oval_bottle_is_gripped_across_its_body() {
 fn a_bulge_is_gripped_against_the_plane_below_it() {
     // A block with a bulge on top, not quite in its middle.
     let size = DVec3::new(0.06, 0.04, 0.02);
-    let (nx, ny) = (36_u32, 24_u32);
     let top = |x: f64, y: f64| {
         let s = (1.0 - (2.0 * x / size.x).powi(2)) * (1.0 - (2.0 * y / size.y).powi(2));
         size.z + 0.008 * s * s * (1.0 + 0.2 * x / 0.03)
     };
-    let mut vertices = Vec::new();
-    for level in 0..2 {
-        for j in 0..=ny {
-            for i in 0..=nx {
-                let x = size.x * (f64::from(i) / f64::from(nx) - 0.5);
-                let y = size.y * (f64::from(j) / f64::from(ny) - 0.5);
-                vertices.push(DVec3::new(x, y, if level == 0 { 0.0 } else { top(x, y) }));
-            }
-        }
-    }
-    let layer = (nx + 1) * (ny + 1);
-    let at = |i: u32, j: u32| j * (nx + 1) + i;
-    let mut triangles: Vec<[u32; 3]> = Vec::new();
-    let mut quad = |a: u32, b: u32, c: u32, d: u32| triangles.extend([[a, b, c], [a, c, d]]);
-    for j in 0..ny {
-        for i in 0..nx {
-            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-            quad(a, d, c, b);
-            quad(a + layer, b + layer, c + layer, d + layer);
-        }
-    }
-    for i in 0..nx {
-        let [a, b, c, d] = [at(i, 0), at(i + 1, 0), at(i, ny), at(i + 1, ny)];
-        quad(a, b, b + layer, a + layer);
-        quad(d, c, c + layer, d + layer);
-    }
-    for j in 0..ny {
-        let [a, b, c, d] = [at(0, j), at(0, j + 1), at(nx, j), at(nx, j + 1)];
-        quad(b, a, a + layer, b + layer);
-        quad(c, d, d + layer, c + layer);
-    }
-    let part = part(&(vertices, triangles));
+    let mesh = crate::support::block::block([36, 24], |level, at| {
+        let DVec2 { x, y } = at * size.truncate();
+        DVec3::new(x, y, if level == 0 { 0.0 } else { top(x, y) })
+    });
+    let part = part(&mesh);
     assert!(part.health.watertight, "{:?}", part.health);
     let free = part.curved.iter().find(|face| face.shape == Shape::Freeform).unwrap().id;
     let (found, _) = grips(&part, &options());

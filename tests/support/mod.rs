@@ -4,6 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
+pub(crate) mod block;
 pub(crate) mod grips;
 pub(crate) mod random;
 pub(crate) mod report;

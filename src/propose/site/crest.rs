@@ -7,7 +7,7 @@ use rustc_hash::FxHashSet;
 use super::net::{Facing, Net};
 use super::relief::FACING;
 use crate::geometry::Paraboloid;
-use crate::geometry::polygon::Bounds2;
+use crate::geometry::polygon::{Bounds2, outer};
 use crate::gripper::Layer;
 use crate::model::Gap;
 use crate::part::{CurvedFace, Mesh};
@@ -72,9 +72,9 @@ pub(super) struct Smooth {
 impl FreeCrest {
     /// How the touched place moves with the direction \[m\]; no more than `most`.
     pub(super) fn tensor(&self, most: f64) -> DMat2 {
-        let outer = |e: DVec2| DMat2::from_cols(e * e.x, e * e.y);
         let [across, along] = self.radii.map(|radius| radius.min(most));
-        outer(self.axis) * along + outer(self.axis.perp()) * across
+        let perp = self.axis.perp();
+        outer(self.axis, self.axis) * along + outer(perp, perp) * across
     }
 }
 

@@ -1,22 +1,22 @@
-//! Sites on faces of free form, and on surfaces of revolution of any profile: closing directions along which a crest of one lies opposite a crest
-//! of another, of a round face, or a plane.
+//! Sites on faces of free form, and on surfaces of revolution of any profile: closing directions along
+//! which a crest of one lies opposite a crest of another, of a round face, or a plane.
 //!
 //! Two places are opposite each other where the line between them is normal to both surfaces. From
 //! pairs of corners that nearly are, Newton's method on the direction finds the pairs that are: the
 //! place at which a surface faces a direction moves by its radii as the direction turns.
 
-use glam::{DMat2, DVec2, DVec3};
+use glam::{DMat2, DMat3, DVec2, DVec3};
 use rustc_hash::FxHashSet;
 
 use super::crest::{Crests, FreeCrest, Pad, compression, half};
-use super::net::{Facing, Net};
+use super::net::{Facing, Net, square};
 use super::relief::{Survey, ellipse, is_free};
 use super::round::{Crest, MOST_PLANES, Outcomes, Round};
 use super::skyline::Skyline;
 use super::tapers::upright;
 use super::{Finder, SAME_PLANE, Site, axes};
 use crate::error::Result;
-use crate::geometry::polygon::Bounds2;
+use crate::geometry::polygon::{Bounds2, outer};
 use crate::geometry::principal;
 use crate::model::{Gap, Piece, Ring};
 use crate::part::{CurvedFace, PairKind, Shape};
@@ -269,14 +269,7 @@ impl Finder<'_> {
             let (u, v) = normal.any_orthonormal_pair();
             [u, v].map(|e| Some((e, e.dot(normal - direction))))
         };
-        let ball = |radius: f64| {
-            let square = glam::DMat3::from_cols(
-                direction * direction.x,
-                direction * direction.y,
-                direction * direction.z,
-            );
-            (glam::DMat3::IDENTITY - square) * radius
-        };
+        let ball = |radius: f64| (DMat3::IDENTITY - square(direction)) * radius;
         match end {
             End::Free(corner) => {
                 *corner = net.walk(*corner, direction);
@@ -285,17 +278,16 @@ impl Finder<'_> {
             End::Plane(face) => {
                 let face = &self.part.faces[*face as usize];
                 let straight = tangents(face.normal);
-                Some(Facing { point: face.centroid, radii: glam::DMat3::ZERO, straight })
+                Some(Facing { point: face.centroid, radii: DMat3::ZERO, straight })
             }
             End::Round(index) => match self.part.curved[*index].shape {
                 Shape::Cylinder { axis, radius, along, .. } => {
                     let a = axis.direction;
                     let outwards = direction.reject_from_normalized(a).try_normalize()?;
                     let middle = axis.origin + a * (0.5 * (along[0] + along[1]));
-                    let along = glam::DMat3::from_cols(a * a.x, a * a.y, a * a.z) * radius;
                     Some(Facing {
                         point: middle + outwards * radius,
-                        radii: ball(radius) - along,
+                        radii: ball(radius) - square(a) * radius,
                         straight: [Some((a, -a.dot(direction))), None],
                     })
                 }
@@ -335,7 +327,7 @@ impl Finder<'_> {
             for (place, sense) in places.iter().zip([1.0, -1.0]) {
                 for (along, lacks) in place.straight.iter().flatten() {
                     let e = flat(*along);
-                    held += DMat2::from_cols(e * e.x, e * e.y);
+                    held += outer(e, e);
                     pull += sense * e * *lacks;
                 }
             }

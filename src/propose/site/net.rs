@@ -53,6 +53,11 @@ pub(super) struct Facing {
     pub(super) straight: [Option<(DVec3, f64)>; 2],
 }
 
+/// `e e^T`.
+pub(super) fn square(e: DVec3) -> DMat3 {
+    DMat3::from_cols(e * e.x, e * e.y, e * e.z)
+}
+
 impl Net {
     pub(super) fn new<'a>(mesh: &Mesh, faces: impl Iterator<Item = &'a CurvedFace>) -> Self {
         let mut net = Self {
@@ -210,9 +215,7 @@ impl Net {
                 straight[k] = Some((of_part, -along.dot(towards.truncate())));
             } else {
                 step += along * (along.dot(lacks) / bend);
-                radii -=
-                    DMat3::from_cols(of_part * of_part.x, of_part * of_part.y, of_part * of_part.z)
-                        * bend.recip();
+                radii -= square(of_part) * bend.recip();
             }
         }
         step = step.clamp_length_max(size);
