@@ -1,6 +1,6 @@
 //! The mechanics on one thread: the slip problem alone, all seven equations in every kind of
-//! contact, and the methods side by side on the same cases. `cargo bench --bench mechanics`; names
-//! after `--` choose groups.
+//! contact, loads of a grip that lift its pads, and the methods side by side on the same cases.
+//! `cargo bench --bench mechanics`; names after `--` choose groups.
 
 #![allow(clippy::unwrap_used, reason = "a bench stops by panicking")]
 #![allow(missing_docs, reason = "criterion's macros make undocumented functions")]
@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DVec2, DVec3};
+use gripfast::backend::{Backend, Batch, Problem, ScoreOptions, SeedSet};
 use gripfast::contact::{Field, Loops};
 use gripfast::lab::{earlier, paper};
 use gripfast::mechanics::slip;
@@ -137,6 +138,17 @@ struct Kind {
     separated: usize,
 }
 
+impl Kind {
+    fn wrench(&self, random: &mut Random) -> Wrench {
+        let (force, moment) = (random.vector(1.0), random.vector(1.0));
+        let [in_plane, along, about, across] = self.load;
+        Wrench {
+            force: DVec3::new(force.x * in_plane, force.y * in_plane, force.z * along),
+            moment: DVec3::new(moment.x * across, moment.y * across, moment.z * about),
+        }
+    }
+}
+
 const KINDS: [Kind; 6] = [
     Kind {
         name: "full contact, congruent faces",
@@ -188,12 +200,7 @@ fn cases(kind: &Kind, count: usize) -> Vec<Case> {
     while cases.len() < count {
         let face_i = random.patch();
         let face_ii = if kind.congruent { face_i.clone() } else { random.patch() };
-        let (force, moment) = (random.vector(1.0), random.vector(1.0));
-        let [in_plane, along, about, across] = kind.load;
-        let wrench = Wrench {
-            force: DVec3::new(force.x * in_plane, force.y * in_plane, force.z * along),
-            moment: DVec3::new(moment.x * across, moment.y * across, moment.z * about),
-        };
+        let wrench = kind.wrench(&mut random);
         let case = Case::new(Contact { face_i, face_ii }, kind.distance, wrench);
         let score = case.solve(&Options::default());
         let coupling = score.mu_s.unwrap_or(0.0) * kind.distance / case.pads.length;
@@ -227,6 +234,45 @@ fn full(criterion: &mut Criterion) {
                     .map(|case| black_box(case).solve(&Options::default()).evaluations)
                     .sum::<u32>()
             })
+        });
+    }
+    group.finish();
+}
+
+/// Grips of 500 loads, each of which lifts one pad or both: the worst of them. Elements: loads.
+fn lifted(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("loads of a grip");
+    group.measurement_time(Duration::from_secs(3)).warm_up_time(Duration::from_secs(1));
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    for kind in KINDS.iter().filter(|kind| kind.separated > 0) {
+        let mut random = Random(4);
+        let grips: Vec<(Case, Vec<Wrench>)> = cases(kind, 8)
+            .into_iter()
+            .map(|mut case| {
+                let mut loads = Vec::with_capacity(500);
+                while loads.len() < 500 {
+                    case.wrench = kind.wrench(&mut random);
+                    let score = case.solve(&Options::default());
+                    if score.status.holds() && case.separated(&score) == kind.separated {
+                        loads.push(case.wrench);
+                    }
+                }
+                (case, loads)
+            })
+            .collect();
+        let problems = grips.iter().map(|(case, loads)| Problem {
+            contact: &case.contact,
+            distance: case.distance,
+            force: FORCE,
+            wrenches: loads,
+            pose: None,
+        });
+        let batch = Batch { problems: problems.collect() };
+        let seeds = SeedSet::default();
+        group.throughput(Throughput::Elements(500 * grips.len() as u64));
+        group.bench_function(kind.name, |bench| {
+            let score = || Backend::Cpu.score(&batch, &seeds, &ScoreOptions::default());
+            one.install(|| bench.iter(score));
         });
     }
     group.finish();
@@ -319,5 +365,5 @@ fn methods(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, slips, full, methods);
+criterion_group!(benches, slips, full, lifted, methods);
 criterion_main!(benches);

@@ -43,7 +43,7 @@ const WITHIN: u32 = RINGS - 1;
 /// A cell holds no zero when its corners' values stay this many times the bend away from zero.
 /// Inside a cell a quadratic map strays by at most half the bend from the values between its
 /// corners.
-const BEND: f64 = 0.75;
+pub(super) const BEND: f64 = 0.75;
 /// The same when the signs do not add up at first.
 const BEND_AGAIN: f64 = 3.0;
 /// Value on the outermost ring, in units of force times the pads' length, from which a zero beyond
@@ -497,7 +497,7 @@ pub(super) fn depth(ring: f64) -> f64 {
 }
 
 /// Distance of zero from the hull of the values.
-fn distance_from_zero(corners: &[Node]) -> f64 {
+pub(super) fn distance_from_zero(corners: &[Node]) -> f64 {
     let g: Vec<DVec2> = corners.iter().map(|corner| corner.g).collect();
     let mut least = f64::INFINITY;
     for i in 0..g.len() {

@@ -7,7 +7,7 @@
 //! found.
 
 use super::equilibrium::{Node, State};
-use super::states::{HALVINGS, Map, RINGS, depth};
+use super::states::{BEND, HALVINGS, Map, RINGS, depth, distance_from_zero};
 
 /// A point between those of the mesh: ray and ring in its units.
 type Spot = [f64; 2];
@@ -96,8 +96,9 @@ impl Map<'_, '_> {
             let bent = (two.g - one.g - one.slope * step)
                 .length()
                 .max((two.g - one.g - two.slope * step).length());
-            let short = turn.abs() < 1.0 || bent < 0.5 * one.g.length().min(two.g.length());
-            if short && turn.abs() < 3.0 {
+            // However little the ends differ, between them the map may have gone all round.
+            let away = distance_from_zero(&[one, two]);
+            if BEND * bent < away && turn.abs() < 3.0 {
                 turned += turn;
                 continue;
             }

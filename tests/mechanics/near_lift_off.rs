@@ -69,6 +69,18 @@ fn a_pair_just_born_is_seen() {
     assert!(found.len() == 2 && found.iter().zip(&expected).all(same), "{found:?}");
 }
 
+/// Found by [`many_other_kinds`]: between two points of the mesh the map turns once all round, so that
+/// its turns along the rim looked as if there were one state. The frictions are the scan's.
+#[test]
+fn a_turn_between_two_points_is_counted() {
+    let path = crate::support::root().join("tests/mechanics/cases/turn_between.json");
+    let case = case::read(&path).unwrap().remove(0);
+    let found = states_of_an_ambiguous_one(&case, "turn_between");
+    let expected = [5197.696103209445, 5210.018104448176];
+    let same = |(a, b): (&f64, &f64)| (a / b - 1.0).abs() < 1e-8;
+    assert!(found.len() == 2 && found.iter().zip(&expected).all(same), "{found:?}");
+}
+
 /// Found by [`many_other_kinds`]: on narrow contacts there are several states far from each other at
 /// couplings down to 0.03 of the width.
 #[test]
@@ -222,6 +234,8 @@ enum Kind {
     Bars,
 }
 
+const OTHERS: [Kind; 3] = [Kind::Inside, Kind::Coupled, Kind::Bars];
+
 fn case_of(kind: Kind, number: u64) -> Option<Case> {
     let mut case = cases::case(number);
     match kind {
@@ -275,17 +289,20 @@ fn look(kind: Kind, number: u64) -> (&'static str, Option<String>) {
     }
 }
 
-/// Looks at cases of a kind: counts by what was found, none of which may be wrong.
-fn look_at(kind: Kind, first: u64, cases: u64) {
-    let looked: Vec<_> =
-        (first..first + cases).into_par_iter().map(|number| look(kind, number)).collect();
-    let mut counts = BTreeMap::<_, u64>::new();
-    looked.iter().for_each(|(found, _)| *counts.entry(*found).or_default() += 1);
-    for (found, count) in &counts {
-        crate::support::say(&format!("  {count:8} {found}"));
+/// Looks at cases of some kinds: counts by what was found, none of which may be wrong.
+fn look_at(kinds: &[Kind], first: u64, cases: u64) {
+    let mut wrong = Vec::new();
+    for kind in kinds {
+        let looked: Vec<_> =
+            (first..first + cases).into_par_iter().map(|number| look(*kind, number)).collect();
+        let mut counts = BTreeMap::<_, u64>::new();
+        looked.iter().for_each(|(found, _)| *counts.entry(*found).or_default() += 1);
+        for (found, count) in &counts {
+            crate::support::say(&format!("  {count:8} {kind:?}: {found}"));
+        }
+        wrong.extend(looked.into_iter().filter_map(|(_, wrong)| wrong));
     }
-    let wrong: Vec<String> = looked.into_iter().filter_map(|(_, wrong)| wrong).collect();
-    assert!(wrong.is_empty(), "{} of {cases}:\n{}", wrong.len(), wrong.join("\n"));
+    assert!(wrong.is_empty(), "{} of {cases} each:\n{}", wrong.len(), wrong.join("\n"));
 }
 
 fn number(name: &str, default: u64) -> u64 {
@@ -295,20 +312,16 @@ fn number(name: &str, default: u64) -> u64 {
 #[test]
 #[ignore = "a quarter of an hour: GRIPFAST_CASES=10000 cargo test --release -p gripfast --test mechanics near_the_end -- --ignored"]
 fn many_cases_near_the_end() {
-    look_at(Kind::Any, number("GRIPFAST_FIRST", 0), number("GRIPFAST_CASES", 10_000));
+    look_at(&[Kind::Any], number("GRIPFAST_FIRST", 0), number("GRIPFAST_CASES", 10_000));
 }
 
 #[test]
 fn other_kinds_agree_with_the_scan() {
-    for kind in [Kind::Inside, Kind::Coupled, Kind::Bars] {
-        look_at(kind, 0, 24);
-    }
+    look_at(&OTHERS, 0, 24);
 }
 
 #[test]
 #[ignore = "minutes: GRIPFAST_CASES=1000 cargo test --release -p gripfast --test mechanics other_kinds -- --ignored"]
 fn many_other_kinds() {
-    for kind in [Kind::Inside, Kind::Coupled, Kind::Bars] {
-        look_at(kind, number("GRIPFAST_FIRST", 0), number("GRIPFAST_CASES", 1000));
-    }
+    look_at(&OTHERS, number("GRIPFAST_FIRST", 0), number("GRIPFAST_CASES", 1000));
 }
