@@ -2,6 +2,8 @@
 //!
 //! Half-edge `3 t + k` runs from corner `k` of triangle `t` to corner `k + 1`.
 
+use rustc_hash::FxHashSet;
+
 use super::Mesh;
 
 /// No half-edge: the edge is open or tangled.
@@ -33,6 +35,26 @@ pub(super) struct Edges {
     pub tangled: Vec<u32>,
     /// Half-edges of those edges where bodies could not be told apart: they have no neighbour.
     pub unpaired: Vec<u32>,
+}
+
+impl Edges {
+    /// Corners of some of the `triangles` that have others beside them.
+    pub(super) fn rim(
+        &self,
+        triangles: &[[u32; 3]],
+        some: impl Iterator<Item = u32>,
+        is_one: impl Fn(u32) -> bool,
+    ) -> FxHashSet<u32> {
+        let mut rim = FxHashSet::default();
+        for half in some.flat_map(|triangle| 3 * triangle..3 * triangle + 3) {
+            let twin = self.twin[half as usize];
+            if twin == NONE || !is_one(twin / 3) {
+                let (from, to) = ends(triangles, half);
+                rim.extend([from, to]);
+            }
+        }
+        rim
+    }
 }
 
 /// Finds the neighbours by sorting the half-edges by their lower vertex (counting sort), then

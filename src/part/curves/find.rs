@@ -38,6 +38,8 @@ const MANY_FACETS: usize = 60;
 const SAMPLE: usize = 300;
 /// Distance of vertices from a cylinder as a share of its radius up to which it is no cone.
 const STRAIGHT: f64 = 5e-4;
+/// Distance of vertices from a cylinder, as a multiple of that from a cone, up to which the same.
+const AS_NEAR: f64 = 1.1;
 /// Bent facets of a part from which on only whole groups of them are looked at for noise.
 const MANY_SEEDS: usize = 200_000;
 /// Patches that may then be looked at in vain.
@@ -266,7 +268,7 @@ impl Growth<'_> {
                 (Some(found), None) | (None, Some(found)) => Some(found),
                 (None, None) => {
                     let found = self.by_patch(seed);
-                    judged(self, found)
+                    judged(self, found).map(|found| self.straightened(found))
                 }
             };
             match found {
@@ -276,13 +278,14 @@ impl Growth<'_> {
         }
     }
 
-    /// A cone whose radius changes by less than vertices may lie off, as a cylinder.
+    /// A cone whose radius changes by less than vertices may lie off, or do, as a cylinder.
     fn straightened(&self, (mut found, cut): (Found, Cut)) -> (Found, Cut) {
         if found.kind == Kind::Cone
             && let Some(surface) = found.surface.as_cylinder(&found.points)
         {
             let residual = surface.residual(&found.points);
-            if residual <= self.net.floor + STRAIGHT * surface.radius() {
+            let near = self.net.floor + STRAIGHT * surface.radius();
+            if residual <= near.max(AS_NEAR * found.residual) {
                 (found.surface, found.kind, found.residual) = (surface, Kind::Cylinder, residual);
             }
         }
@@ -408,7 +411,7 @@ impl Growth<'_> {
         let found = attempts.iter().find_map(|attempt| {
             let found = attempt(self, facets, &points, Exactness::Noisy)?;
             let cut = self.judge(&found, Exactness::Noisy)?;
-            Some((found, cut))
+            Some(self.straightened((found, cut)))
         });
         let is_found = found.is_some();
         if let Some((found, cut)) = found {

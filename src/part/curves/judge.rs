@@ -7,7 +7,6 @@ use glam::DVec3;
 use super::Axis;
 use super::fit::{Kind, Profile};
 use super::grow::{Exactness, Found, Growth};
-use crate::part::topology::{NONE, ends};
 
 /// Facets to the turn of a cylinder or cone, at least.
 const FEWEST: f64 = 7.5;
@@ -25,13 +24,17 @@ const LEAST_TORUS: [f64; 2] = [0.3, 0.17];
 const SURE: [f64; 2] = [1.75, 1.05];
 /// Residual as a share of the sag below which even a short arc is one.
 const SURELY: f64 = 0.005;
+/// Distance from the best circle, as a share of the arc's height, at which the corners of a short arc
+/// of another curve lie (an involute's, over 26 degrees), and the logarithm of how unlikely it must be
+/// that all lie as near to it by chance as they do.
+const ELSEWHERE: f64 = 0.1;
+const UNLIKELY: f64 = 7.0;
 /// Points that show noise.
 const MANY: usize = 30;
 /// Share of the part's diagonal up to which flats of a bent sheet and facets of an arc look alike:
 /// sag.
 const ARC: f64 = 0.01;
-/// Sag as a multiple of that of a chord across a typical facet from which on a facet is too deep
-/// for a surface that is curved both ways.
+/// Sag as a multiple of that of a chord across a typical facet from which on a facet is too deep.
 const DEEP: f64 = 8.0;
 /// Side of a square as a share of the diagonal: three facets alone count when smaller.
 const SMALL: f64 = 0.02;
@@ -124,16 +127,9 @@ impl Growth<'_> {
     /// Number of corners that have marked facets on all sides.
     fn inner(&self, found: &Found) -> usize {
         let net = self.net;
-        let mut rim = rustc_hash::FxHashSet::default();
-        for &triangle in found.members.iter().flat_map(|&facet| net.triangles(facet)) {
-            for half in 3 * triangle..3 * triangle + 3 {
-                let twin = net.part.edges.twin[half as usize];
-                if twin == NONE || !self.is_marked(net.regions.of[(twin / 3) as usize]) {
-                    let (from, to) = ends(&net.part.mesh.triangles, half);
-                    rim.extend([from, to]);
-                }
-            }
-        }
+        let triangles = found.members.iter().flat_map(|&facet| net.triangles(facet)).copied();
+        let is_one = |triangle: u32| self.is_marked(net.regions.of[triangle as usize]);
+        let rim = net.part.edges.rim(&net.part.mesh.triangles, triangles, is_one);
         found.points.len() - rim.iter().filter(|&&vertex| net.is_corner(vertex)).count()
     }
 
@@ -164,7 +160,10 @@ impl Growth<'_> {
             Profile::Circle { .. } => true,
         };
         let chord = |radius: f64| radius * (1.0 - (step / 2.0).cos());
+        // Facets as long as a belt of a sphere is wide touch it at their ends only.
+        let is_deep = found.sag > DEEP * chord(found.surface.reach()) + self.net.floor;
         let is_sound = match found.kind {
+            Kind::Cylinder | Kind::Cone | Kind::Sphere | Kind::Torus if is_deep => false,
             Kind::Cylinder | Kind::Cone | Kind::Revolution => {
                 let strips = turn * facets / TAU;
                 let short = strips < 4.7 || turn < 2.09;
@@ -180,14 +179,9 @@ impl Growth<'_> {
                     && (strips > 3.5 || edge.tangent > 0.5 * mean || small())
                     && !(runs_on && turn < SURE[0])
                     && (turn > SURE[1]
-                        || found.residual < self.net.floor + SURELY * found.sag
-                        || self.is_random(found))
-            }
-            // Facets as long as a belt of a sphere is wide touch it at their ends only.
-            Kind::Sphere | Kind::Torus
-                if found.sag > DEEP * chord(found.surface.reach()) + self.net.floor =>
-            {
-                false
+                        || (found.residual < self.net.floor + SURELY * found.sag
+                            || self.is_random(found))
+                            && is_no_chance(found, turn, strips))
             }
             Kind::Sphere => {
                 let area: f64 = found.members.iter().map(|&facet| self.net.area(facet)).sum();
@@ -244,6 +238,14 @@ impl Growth<'_> {
         }
         found.points.len() >= MANY && products < 0.2 * squares
     }
+}
+
+/// Whether it is unlikely that the corners of a short arc lie so near to a circle by chance: three of
+/// them always do.
+fn is_no_chance(found: &Found, turn: f64, strips: f64) -> bool {
+    let height = found.surface.radius() * (1.0 - (turn / 2.0).cos());
+    let more = (strips.round() - 2.0).max(1.0);
+    more * (ELSEWHERE * height / found.residual).ln() > UNLIKELY
 }
 
 /// The arc that the face covers about its axis \[rad\].

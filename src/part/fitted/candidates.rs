@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use nalgebra::Matrix3;
+use rustc_hash::FxHashSet;
 
 use super::{FREE, Fitted, Fitting};
 use crate::part::CurvedFace;
@@ -41,6 +42,8 @@ const RANDOM_SURE: f64 = 0.6;
 const NOISE: f64 = 0.4;
 /// Corners that show it.
 const MANY: usize = 12;
+/// Corners of a sphere that have its triangles on all sides, at least.
+const INNER: usize = 2;
 /// How much more area a cone explains where it is no cylinder, and a sphere where it is neither.
 const MORE: f64 = 1.3;
 
@@ -300,6 +303,11 @@ impl Fitting<'_> {
             Profile::Line { .. } => arcs(self.part, &found.triangles, surface.axis).0,
             Profile::Circle { .. } => self.cap(&found.triangles, surface.axis.origin),
         };
+        // Two arcs always lie on a sphere.
+        if matches!(surface.profile, Profile::Circle { .. }) && self.inner(&found.triangles) < INNER
+        {
+            return false;
+        }
         let height = radius * (1.0 - (turn.min(PI) / 2.0).cos());
         if height.is_nan() || height < HEIGHT * self.tolerance {
             return false;
@@ -319,6 +327,16 @@ impl Fitting<'_> {
         let is_noise = |correlation: f64| products < correlation * squares;
         let sure = sure && rms < NOISE * self.tolerance && is_noise(RANDOM_SURE);
         sure || rms < EXACT * height || (count as usize >= MANY && is_noise(RANDOM))
+    }
+
+    /// Number of corners that have these triangles on all sides.
+    fn inner(&self, triangles: &[u32]) -> usize {
+        let own: FxHashSet<u32> = triangles.iter().copied().collect();
+        let mesh = &self.part.mesh.triangles;
+        let is_one = |triangle: u32| own.contains(&triangle);
+        let rim = self.part.edges.rim(mesh, triangles.iter().copied(), is_one);
+        let all: FxHashSet<u32> = triangles.iter().flat_map(|&t| mesh[t as usize]).collect();
+        all.difference(&rim).count()
     }
 
     /// The angle that triangles cover of a sphere about its centre \[rad\].
