@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
+use rustc_hash::FxHashMap;
 
 use super::{FacePair, Mesh, PairKind, PlanarFace};
 use crate::geometry::polygon::{self, Moments, patch_moments, rings_moments};
@@ -12,6 +13,9 @@ use crate::model::{Polygon, Ring};
 /// Angle between one face and the reverse of the other up to which they count as antiparallel: 0.5
 /// degrees, what the rubber of a pad takes up (0.2 mm over 20 mm).
 pub(crate) const ANTIPARALLEL: f64 = 0.5 * std::f64::consts::PI / 180.0;
+
+/// Share of all faces, one over this, up to which opposite ones are looked at one by one.
+const FEW: usize = 16;
 
 /// Overlaps smaller than this are rounding, not contact [m^2].
 pub(super) fn area_floor(mesh: &Mesh) -> f64 {
@@ -37,6 +41,7 @@ pub(super) fn pairs(
     if min_width > max_width {
         return Vec::new();
     }
+    let directions = Directions::new(faces);
     let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
     let convex: Vec<bool> = faces.iter().map(|face| matches!(face.polygons.as_slice(), [only] if only.holes.is_empty() && is_convex(&only.outer))).collect();
     let sign = if kind == PairKind::External { 1.0 } else { -1.0 };
@@ -50,7 +55,13 @@ pub(super) fn pairs(
             ANTIPARALLEL * (2.0 * own.half_extents().length() + max_width) + max_width * 1e-9;
         let (near, far) = (-sign * min_width * face.normal, -sign * max_width * face.normal);
         let reach = Aabb::new(own.mins + near.min(far) - slack, own.maxs + near.max(far) + slack);
-        for other in tree.intersect_aabb(&reach) {
+        let opposite = directions.near(-face.normal);
+        let within: Vec<u32> = if opposite.len() < faces.len() / FEW {
+            opposite.into_iter().filter(|&id| boxes[id as usize].intersects(&reach)).collect()
+        } else {
+            tree.intersect_aabb(&reach).collect()
+        };
+        for other in within {
             let other = &faces[other as usize];
             if other.id <= face.id
                 || !other.reachable
@@ -80,6 +91,30 @@ pub(super) fn pairs(
             .then((a.face_i, a.face_ii).cmp(&(b.face_i, b.face_ii)))
     });
     found
+}
+
+/// Faces by the cell of their normals: of a rough part no two of tens of thousands are opposite.
+struct Directions(FxHashMap<[i32; 3], Vec<u32>>);
+
+impl Directions {
+    fn new(faces: &[PlanarFace]) -> Self {
+        let mut cells = FxHashMap::<_, Vec<u32>>::default();
+        for face in faces {
+            cells.entry(Self::cell(face.normal)).or_default().push(face.id);
+        }
+        Self(cells)
+    }
+
+    fn cell(normal: DVec3) -> [i32; 3] {
+        (normal / (1.01 * ANTIPARALLEL)).floor().as_ivec3().to_array()
+    }
+
+    /// Faces of this normal to within [`ANTIPARALLEL`], and others.
+    fn near(&self, normal: DVec3) -> Vec<u32> {
+        let [x, y, z] = Self::cell(normal);
+        let around = (0..27).map(|k| [x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1]);
+        around.filter_map(|cell| self.0.get(&cell)).flatten().copied().collect()
+    }
 }
 
 fn bounding_box(face: &PlanarFace) -> Aabb {
