@@ -102,6 +102,30 @@ impl Taper {
     }
 }
 
+/// A disc about a face.
+struct Disc {
+    middle: DVec3,
+    radius: f64,
+}
+
+impl Disc {
+    fn about(face: &PlanarFace) -> Self {
+        let middle = face.centroid;
+        let corners = face.polygons.iter().flat_map(|polygon| &polygon.outer);
+        let radius = corners
+            .map(|corner| face.part_from_face.point(corner.extend(0.0)).distance(middle))
+            .fold(0.0, f64::max);
+        Self { middle, radius }
+    }
+
+    /// Whether both can meet when moved along `way`.
+    fn meets(&self, other: &Self, way: DVec3) -> bool {
+        let between = other.middle - self.middle;
+        let reach = self.radius + other.radius;
+        between.cross(way).length_squared() <= reach * reach * way.length_squared()
+    }
+}
+
 impl Finder<'_> {
     /// Pairs of planes that are opposite each other and not parallel; and how many were too small.
     pub(super) fn drafted(&mut self) -> (Vec<Taper>, u64) {
@@ -127,17 +151,33 @@ impl Finder<'_> {
             faces.into_iter().partition(is_large);
         let leans =
             |a: &PlanarFace, b: &PlanarFace| (least..most).contains(&-a.normal.dot(b.normal));
+        let planes = |[a, b]: [&PlanarFace; 2]| {
+            let [one, two] = [plane(a), plane(b)];
+            (one.min(two), one.max(two))
+        };
+        let large: Vec<(&PlanarFace, Disc)> =
+            large.into_iter().map(|face| (face, Disc::about(face))).collect();
+        let leaning = || {
+            large.iter().enumerate().flat_map(|(index, a)| {
+                large[index + 1..].iter().filter(|b| leans(a.0, b.0)).map(move |b| [a, b])
+            })
+        };
+        // Of tens of thousands of facets many millions lean, and hardly any two meet.
+        let meeting: FxHashSet<(usize, usize)> = leaning()
+            .filter(|[a, b]| a.1.meets(&b.1, a.0.normal - b.0.normal))
+            .map(|[a, b]| planes([a.0, b.0]))
+            .collect();
         let mut groups: BTreeMap<(usize, usize), Vec<[&PlanarFace; 2]>> = BTreeMap::new();
         let mut too_small = 0;
-        for (index, a) in large.iter().enumerate() {
-            for b in large[index + 1..].iter().filter(|b| leans(a, b)) {
-                let [one, two] = [plane(a), plane(b)];
-                groups.entry((one.min(two), one.max(two))).or_default().push([a, b]);
+        for [(a, _), (b, _)] in leaning() {
+            if meeting.contains(&planes([a, b])) {
+                groups.entry(planes([a, b])).or_default().push([a, b]);
             }
         }
         // Told as far as it can be counted in no time.
         for (index, a) in small.iter().enumerate().take(MOST_COUNTED) {
-            let others = large.iter().chain(&small[index + 1..]).take(MOST_COUNTED);
+            let others =
+                large.iter().map(|(face, _)| face).chain(&small[index + 1..]).take(MOST_COUNTED);
             too_small += others.filter(|b| leans(a, b)).count() as u64;
         }
         let mut found: Vec<(f64, Taper)> = Vec::new();
