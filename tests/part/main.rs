@@ -8,6 +8,7 @@ mod fit;
 mod formats;
 mod freeform;
 mod hostile;
+mod no_curve;
 mod solids;
 #[cfg(feature = "step")]
 mod step;
