@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::branch::{self, folded, hardly_touching, narrow, strong};
+use super::branch::{self, far_apart, folded, hardly_touching, narrow, strong};
 use super::equilibrium::{Solver, State, Vector7};
 use super::pads::{Load, Pads};
 use super::pressure::{self, face_pressure};
@@ -159,7 +159,9 @@ pub fn solve_pads(
     let (state, unique) = match solver.branch(seed) {
         Some(state) if !strong(&state, &load) => {
             let folded = folded(&state, pads, &load);
-            if narrow(&state, pads, &load) || folded && hardly_touching(&state, pads) {
+            if narrow(&state, pads, &load)
+                || folded && (hardly_touching(&state, pads) || far_apart(&state, pads, &load))
+            {
                 let found = solver.limit_states(&[state]);
                 match found.states.len() {
                     1 => (state, found.complete),
