@@ -187,6 +187,7 @@ impl Crests<'_> {
         } else {
             (crest.height, crest.above) = (above, 0.0);
         }
+        crest.delta = delta.max(compression(crest.radii, self.pad));
         Some(crest)
     }
 

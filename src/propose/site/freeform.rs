@@ -18,7 +18,8 @@ use super::{Finder, SAME_PLANE, Site, axes};
 use crate::error::Result;
 use crate::geometry::polygon::{Bounds2, outer};
 use crate::geometry::principal;
-use crate::model::{Gap, Piece, Ring};
+use crate::mechanics::curved::Pads;
+use crate::model::{Gap, Piece, Ring, Surfaces};
 use crate::part::{CurvedFace, PairKind, Shape};
 use crate::propose::options::Rejection;
 use crate::propose::stroke::Stroke;
@@ -427,9 +428,28 @@ impl Finder<'_> {
             ends: crest.ends.map(DVec3::truncate),
             radii,
             axis,
-            delta: compression(radii, self.pad()),
+            delta: compression(radii, self.pad()).max(self.flat_compression(end)),
             smooth: None,
         })
+    }
+
+    /// Compression of the layer by a plane alone \[m\], which may be smaller than a pad.
+    fn flat_compression(&self, end: End) -> f64 {
+        let End::Plane(index) = end else { return 0.0 };
+        let Pad { layer, force, .. } = self.pad();
+        (force / (layer.stiffness * self.part.faces[index as usize].area)).min(layer.reach())
+    }
+
+    /// Whether a squeeze on these surfaces turns the part out of the grip: radii of crests do not tell
+    /// where a flat is smaller than what is pressed.
+    fn rolls_apart(&self, pieces: &[Vec<Piece>; 2], width: f64) -> bool {
+        let [face_i, face_ii] = pieces.clone();
+        let stiffness = [self.gripper.layer().stiffness; 2];
+        let surfaces = Surfaces { face_i, face_ii, stiffness, layer: None };
+        let force = self.options.force_on(self.gripper);
+        let resists =
+            Pads::new(&surfaces).ok().and_then(|pads| pads.turning_stiffness(width, force));
+        resists.is_some_and(|stiffness| stiffness < -ROLLS * force * width)
     }
 
     fn pad(&self) -> Pad {
@@ -493,6 +513,9 @@ impl Finder<'_> {
             pieces.extend(others);
         }
         let pieces: [Vec<Piece>; 2] = smooth;
+        if self.rolls_apart(&pieces, heights[0] - heights[1]) {
+            return Ok(Some(Some(Rejection::RollsApart)));
+        }
         let sides = [vec![top.face], vec![bottom.face]];
         let rise = SAME_PLANE * self.size + top.above.max(bottom.above);
         let place = common.centre();
