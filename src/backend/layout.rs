@@ -107,6 +107,32 @@ pub const SWAY_CONGRUENT: f32 = 0.01;
 /// [`LEAST_VARIATION`].
 pub const SWAY_DIFFERENT: f32 = 2.5e-4;
 
+/// Slip centres farther than this many circumradii from the origin are integrated along the edges by
+/// Gauss points, nearer ones by the closed forms.
+pub const FAR_LIMIT: f32 = 2.0;
+/// Evaluations of the equations of a load at most, and those of the pressure without coupling.
+pub const CORRECTIONS: u32 = 12;
+pub const PRESSURE_STEPS: u32 = 14;
+/// What the pressure without coupling may leave over, of the gripping force: it is a start.
+pub const PRESSED: f32 = 1e-3;
+/// Share of what the equations left over that a step must not exceed, and what is left of one that does.
+pub const FALL: f32 = 0.9;
+pub const SHORTER: f32 = 0.3;
+/// As for the processor's comparison ([`crate::mechanics`]): ratio of two steps up to which Newton's
+/// method converges for certain, and growth of the last one that bounds the way to the solution ...
+pub const CONTRACTION: f32 = 0.25;
+pub const WITHIN: f32 = 2.0;
+/// ... which must be no longer than this share of the dissipation.
+pub const SHARP: f32 = 1e-4;
+/// Share of a pad's contact that must be left: with less there may be further limit states; and change
+/// of the pressure over the radius, in its mean on what is left, up to which it is resolved.
+pub const LEAST_LEFT: f32 = 0.1;
+pub const STEEPEST: f32 = 20.0;
+/// Rounding of an integral over what its terms are made of: some 30 roundings of `2^-24`.
+pub const ROUNDING: f32 = 2e-6;
+/// Estimates that may be off by more than this share are none.
+pub const ESTIMATE_MARGIN: f32 = 1e-2;
+
 /// [`LoadRecord::distance`] of a load whose numbers leave the range in which bounds are computed:
 /// above every distance within it.
 pub const OUT_OF_RANGE: f32 = 2e6;

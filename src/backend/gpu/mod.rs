@@ -11,6 +11,7 @@ mod buffers;
 mod check;
 mod chunk;
 mod clock;
+mod newton;
 mod shader;
 mod survivors;
 mod twin;

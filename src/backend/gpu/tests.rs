@@ -13,6 +13,7 @@ use super::*;
 use crate::model::{Contact, Patch, Polygon, Wrench};
 use glam::{DVec2, DVec3};
 
+mod newton;
 mod screen;
 
 /// Largest difference allowed between the processor's and the shader's records, relative to values
