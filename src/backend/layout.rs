@@ -77,8 +77,25 @@ pub const COUPLED: u32 = 3;
 
 /// [`FoundRecord::kind`]: not a seed, but up to 128 loads for the processor, a bit for each.
 pub const OPEN: u32 = 4;
+/// [`FoundRecord::kind`], [`SeedRecord::status`]: a twist from Newton's method, and bounds that allow
+/// for what single precision leaves of it.
+pub const ESTIMATED: u32 = 5;
 /// [`FoundRecord::kind`] is a status plus so many times the best twist.
 pub const KINDS: u32 = 8;
+
+/// [`GripRecord::wanted`]: the loads that can be the worst, by bounds alone ...
+pub const BOUNDS: u32 = 0;
+/// ... every load ...
+pub const EVERY: u32 = 1;
+/// ... the loads that can be the worst, by bounds and estimates.
+pub const ESTIMATES: u32 = 2;
+/// [`GripRecord::wanted`] is one of these plus so many times the first window.
+pub const MODES: u32 = 4;
+
+/// Loads that one entry has a bit for.
+pub const BITS: usize = 128;
+/// Loads of a grip that Newton's method looks at together: 24 bytes of workgroup memory for each.
+pub const PART: usize = 512;
 
 /// Scaled numbers beyond this are not computed with: the load gets no bounds.
 pub const RANGE: f32 = 1e6;
@@ -128,8 +145,8 @@ pub const SHARP: f32 = 1e-4;
 /// of the pressure over the radius, in its mean on what is left, up to which it is resolved.
 pub const LEAST_LEFT: f32 = 0.1;
 pub const STEEPEST: f32 = 20.0;
-/// Rounding of an integral over what its terms are made of: some 30 roundings of `2^-24`.
-pub const ROUNDING: f32 = 2e-6;
+/// Rounding of an integral over what its terms are made of: some 16 roundings of `2^-24`.
+pub const ROUNDING: f32 = 1e-6;
 /// Estimates that may be off by more than this share are none.
 pub const ESTIMATE_MARGIN: f32 = 1e-2;
 
@@ -253,8 +270,9 @@ pub struct GripRecord {
     pub first: u32,
     /// Number of loads.
     pub count: u32,
-    /// 1: all of them come back; 0: those that can be the worst.
-    pub every: u32,
+    /// [`BOUNDS`], [`EVERY`] or [`ESTIMATES`], and the place of the entry that says which of its first
+    /// [`BITS`] loads are open, those of the others behind it.
+    pub wanted: u32,
 }
 
 /// One load.
@@ -286,7 +304,7 @@ pub struct SeedRecord {
     pub lower: f32,
     /// Bound from the supports of the triangles at the best twist, for the unit wrench.
     pub upper: f32,
-    /// [`UNWRITTEN`], [`BOUNDED`], [`UNBOUNDED`] or [`COUPLED`].
+    /// [`UNWRITTEN`], [`BOUNDED`], [`UNBOUNDED`], [`COUPLED`] or [`ESTIMATED`].
     pub status: u32,
     /// Index of the best twist.
     pub best: u32,

@@ -7,8 +7,8 @@ use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 
 use super::super::lanes::Loads;
 use super::super::layout::{
-    CaseRecord, ContactHeader, EdgeRecord, FoundRecord, GripRecord, LEAST_DISSIPATION, LoadRecord,
-    OPEN, SeedRecord,
+    BITS, CaseRecord, ContactHeader, EdgeRecord, FoundRecord, GripRecord, LEAST_DISSIPATION,
+    LoadRecord, OPEN, OutcomeRecord, SeedRecord,
 };
 use super::super::prepare::{Contacts, Records};
 use super::super::screen::Wanted;
@@ -18,7 +18,7 @@ use super::super::table::{Table, contact_basis};
 use super::super::{Batch, Pose, Problem};
 use super::chunk::{Chunk, Maker, plans};
 use super::survivors::seed;
-use super::{Answer, ChunkSpans, Failure, Gpu, State, map, twin};
+use super::{Answer, ChunkSpans, Failure, Gpu, State, map, newton, twin};
 use crate::backend::{F32_TOLERANCE, SeedSet};
 use crate::contact::{Field, Loops, Twist, friction};
 use crate::error::{Error, Result};
@@ -271,8 +271,13 @@ pub(super) fn twins(chunk: &Chunk, seeds: &SeedSet) -> Answer {
         let edges = edges(chunk, header);
         let table = Table::new(header, edges, seeds);
         let field = SearchField { header, edges, table: &table, rings: seeds.rings() };
-        let grips = chunk.grips.iter().zip(0..).filter(|(grip, _)| grip.contact == index);
-        outcomes.extend(grips.map(|grip| twin::screen(&field, grip, &cases, &mut entries)));
+        for grip in chunk.grips.iter().zip(0..).filter(|(grip, _)| grip.contact == index) {
+            let mut windows = Vec::new();
+            let bounded = twin::screen(&field, grip, &cases, (&mut windows, &mut entries));
+            let open = (windows.as_slice(), bounded.floor);
+            let all = newton::newton(&field, grip, &cases, open, &mut entries);
+            outcomes.push(OutcomeRecord { entries: bounded.entries + all.entries, ..all });
+        }
     }
     Answer { outcomes, entries }
 }
@@ -297,7 +302,7 @@ pub(super) fn by_load(
     for entry in entries.iter().filter(|entry| entry.grip == grip) {
         if entry.kind == OPEN {
             let bit = |bit: &u32| entry.words[*bit as usize / 32] >> (bit % 32) & 1 == 1;
-            all.extend((0..128).filter(bit).map(|bit| (entry.load + bit, None)));
+            all.extend((0..BITS as u32).filter(bit).map(|bit| (entry.load + bit, None)));
         } else {
             all.insert(entry.load, Some(seed(entry)));
         }

@@ -77,6 +77,7 @@ pub struct Gpu {
     queue: wgpu::Queue,
     fan: Kernel,
     screen: Kernel,
+    newton: Kernel,
     gauss: wgpu::Buffer,
     limits: Limits,
     lost: Arc<AtomicBool>,
@@ -136,6 +137,8 @@ struct Ticket {
     grips: usize,
     /// Entries that there is room for, and those that are read back in any case.
     entries: [usize; 2],
+    /// Windows in front of them.
+    windows: usize,
     found: wgpu::Buffer,
     timed: bool,
     spans: ChunkSpans,
@@ -176,6 +179,7 @@ impl Gpu {
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let fan = Kernel::new(&device, "fill_basis", shader::FAN, &shader::FAN_BINDINGS);
         let screen = Kernel::new(&device, "screen", shader::SCREEN, &shader::SCREEN_BINDINGS);
+        let newton = Kernel::new(&device, "newton", shader::NEWTON, &shader::NEWTON_BINDINGS);
         let gauss = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("gauss"),
             size: size_of_val(&GAUSS) as u64,
@@ -208,6 +212,7 @@ impl Gpu {
             queue,
             fan,
             screen,
+            newton,
             gauss,
             limits,
             lost,
@@ -431,8 +436,8 @@ impl Gpu {
         let State { seeds: known, lists, cases: on_device, slots, .. } = state;
         let slot = &mut slots[slot];
         let tally_bytes = TALLY + (chunk.grips.len() * size_of::<OutcomeRecord>()) as u64;
-        let [found_bytes, back_bytes] =
-            [room, sure].map(|count| (count * size_of::<FoundRecord>()) as u64);
+        let [found_bytes, back_bytes, window_bytes] = [chunk.windows + room, sure, chunk.windows]
+            .map(|count| (count * size_of::<FoundRecord>()) as u64);
         let basis_bytes = (chunk.basis * size_of::<[f32; 4]>()) as u64;
         let input = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let output = input | wgpu::BufferUsages::COPY_SRC;
@@ -495,16 +500,15 @@ impl Gpu {
             let (tally, found) = ((&tally, tally_bytes), (&found, found_bytes));
             let bound = [contacts, edges, twists, basis, cases, grips, tally, found];
             let screen = self.screen.bind(device, &bound);
+            let bound = [contacts, edges, twists, basis, cases, grips, tally, found, gauss];
+            let newton = self.newton.bind(device, &bound);
             let twists = seeds.len().div_ceil(super::layout::BASIS_GROUP) as u32;
             let count = chunk.grips.len() as u32;
+            let grid = [count.min(shader::GRID), count.div_ceil(shader::GRID)];
             for (kernel, bound, place, [x, y]) in [
                 (&self.fan, fan, clock::BASIS, [twists, chunk.contacts.len() as u32]),
-                (
-                    &self.screen,
-                    screen,
-                    clock::SEARCH,
-                    [count.min(shader::GRID), count.div_ceil(shader::GRID)],
-                ),
+                (&self.screen, screen, clock::SEARCH, grid),
+                (&self.newton, newton, clock::NEWTON, grid),
             ] {
                 let mut pass = encoder.begin_compute_pass(&pass(place));
                 pass.set_pipeline(&kernel.pipeline);
@@ -513,7 +517,7 @@ impl Gpu {
             }
         }
         encoder.copy_buffer_to_buffer(&tally, 0, &readback, 0, tally_bytes);
-        encoder.copy_buffer_to_buffer(&found, 0, &readback, tally_bytes, back_bytes);
+        encoder.copy_buffer_to_buffer(&found, window_bytes, &readback, tally_bytes, back_bytes);
         stamp(&mut encoder, clock::READBACK);
         if let Some((set, resolved)) = queries {
             // Places that were not written are not read either.
@@ -533,8 +537,8 @@ impl Gpu {
             grips: chunk.grips.len(),
             ..ChunkSpans::default()
         };
-        let (grips, entries) = (chunk.grips.len(), [room, sure]);
-        Ok(Ticket { submission, mapped, readback, grips, entries, found, timed, spans })
+        let (grips, entries, windows) = (chunk.grips.len(), [room, sure], chunk.windows);
+        Ok(Ticket { submission, mapped, readback, grips, entries, windows, found, timed, spans })
     }
 }
 

@@ -15,10 +15,14 @@
 use super::super::fan::edge_log;
 use super::super::lanes::{dot, larger, smaller};
 use super::super::layout::{
-    CONTRACTION, CORRECTIONS, ContactHeader, EdgeRecord, ESTIMATE_MARGIN, FALL, FAR_LIMIT, GAUSS,
-    LEAST_LEFT, LEAST_LOAD, LoadRecord, MOST_PULL, ON_LINE, OUT_OF_RANGE, PRESSURE_STEPS, PRESSED,
-    RANGE, ROUNDING, SHARP, SHORTER, STEEPEST, WITHIN,
+    BITS, CONTRACTION, CORRECTIONS, CaseRecord, ContactHeader, ESTIMATE_MARGIN, ESTIMATED,
+    ESTIMATES, EdgeRecord, FALL, FAR_LIMIT, FoundRecord, GAUSS, GripRecord, LEAST_LEFT, LEAST_LOAD,
+    LoadRecord, MODES, MOST_PULL, ON_LINE, OPEN, OUT_OF_RANGE, OutcomeRecord, PART, PRESSED,
+    PRESSURE_STEPS, RANGE, ROUNDING, SHARP, SHORTER, STEEPEST, SeedRecord, WITHIN,
 };
+use super::super::problem::F32_TOLERANCE;
+use super::super::search::Field;
+use super::twin::{append, load_error, make_load};
 
 /// What the edges of what is left of a face add up to, seen from the slip centre (or, where that is far,
 /// from the origin): integrals of `e` (the direction of a point), `|y|` or its like, `y e`, `y |y|`, and
@@ -695,6 +699,56 @@ pub(crate) fn estimate(
             break;
         }
     }
-    let _ = larger;
     found
+}
+
+/// The open loads of the grip with this `number`, given by its `windows`, that can be its worst where
+/// another one's `mu_s` is at least `floor`: their estimates, or bits for those that have none. The
+/// entries are counted without one more.
+pub(crate) fn newton(
+    field: &Field<'_>,
+    (grip, number): (&GripRecord, u32),
+    cases: &[CaseRecord],
+    (windows, mut floor): (&[FoundRecord], f32),
+    found: &mut Vec<FoundRecord>,
+) -> OutcomeRecord {
+    let (before, tolerance) = (found.len(), F32_TOLERANCE as f32);
+    let open = |window: &FoundRecord, bit: &u32| window.words[*bit as usize / 32] >> (bit % 32) & 1;
+    for part in windows.chunks(PART / BITS) {
+        let mut estimates = Vec::new();
+        for window in part.iter().filter(|_| grip.wanted % MODES == ESTIMATES) {
+            for bit in (0..BITS as u32).filter(|bit| open(window, bit) == 1) {
+                let load = window.load + bit;
+                let listed = &cases[(grip.first + load) as usize];
+                let (made, error) = (make_load(grip, listed), load_error(grip, listed));
+                let mut seed = [SeedRecord::default()];
+                field.search(&[made], &mut seed);
+                let found = estimate(field.header, &field.edges, &made, error, seed[0].twist);
+                if found.lower <= found.upper {
+                    floor = larger(found.lower * (1.0 - tolerance), floor);
+                    estimates.push((load, found));
+                }
+            }
+        }
+        for window in part {
+            let mut words = window.words;
+            for (load, found_here) in &estimates {
+                let bit = load.wrapping_sub(window.load);
+                if bit >= BITS as u32 {
+                    continue;
+                }
+                words[bit as usize / 32] &= !(1 << (bit % 32));
+                let Estimate { twist: [x, y, z], lower, upper } = *found_here;
+                if upper * (1.0 + tolerance) >= floor {
+                    let words = [x, y, z, lower].map(f32::to_bits);
+                    let (kind, load) = (ESTIMATED, *load);
+                    append(found, FoundRecord { words, upper, kind, load, grip: number });
+                }
+            }
+            if words != [0; 4] {
+                append(found, FoundRecord { words, kind: OPEN, ..*window });
+            }
+        }
+    }
+    OutcomeRecord { entries: (found.len() - before) as u32, floor }
 }

@@ -1,6 +1,6 @@
 //! Estimates of loads without bounds: against double precision, and the kernel against its twin.
 
-use super::super::newton::{Estimate, estimate};
+use super::super::newton::estimate;
 use super::*;
 use crate::backend::cpu::Searched;
 use crate::backend::layout::UNBOUNDED;
