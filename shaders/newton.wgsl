@@ -565,7 +565,8 @@ fn rounding(at: Equations, load: LoadRecord, by: Step, error: f32) -> f32 {
 }
 
 fn estimate(header: ContactHeader, load: LoadRecord, error: f32, twist: vec3<f32>) -> Estimate {
-    var result = Estimate(twist, LARGEST, 0.0);
+    let none = Estimate(twist, LARGEST, 0.0);
+    var result = none;
     let ordinary = load.scale > LEAST_LOAD && load.scale <= RANGE && abs(load.f3) < MOST_PULL && abs(load.m1) <= RANGE && abs(load.m2) <= RANGE && load.distance < OUT_OF_RANGE && header.resolved != 0u;
     if !ordinary {
         return result;
@@ -575,9 +576,10 @@ fn estimate(header: ContactHeader, load: LoadRecord, error: f32, twist: vec3<f32
     var step = Step(vec3(0.0), vec4(0.0), vec3(0.0), vec4(0.0));
     var at: Equations;
     var left = LARGEST;
+    var share = 1.0;
     for (var k = 0u; k < CORRECTIONS; k++) {
-        at.v = v + step.v;
-        at.q = q + step.q;
+        at.v = v + share * step.v;
+        at.q = q + share * step.q;
         put(header, &at);
         if k == 0u {
             // To the minimum along the ray.
@@ -592,30 +594,43 @@ fn estimate(header: ContactHeader, load: LoadRecord, error: f32, twist: vec3<f32
         residuals(&at, load);
         let size = sqrt(dot(at.slip, at.slip) + dot(at.held, at.held));
         let pressed = at.good && at.moments_i.low.x > 0.0 && at.moments_ii.low.x > 0.0 && at.d > 0.0;
-        if !(pressed && size <= FALL * left) {
-            if k == 0u {
+        if !(pressed && size <= (1.0 - FALL * share) * left) {
+            // Rounding is all that is left, or there is nothing to begin with.
+            if k == 0u || left <= QUIET {
                 break;
             }
-            step.v *= SHORTER;
-            step.q *= SHORTER;
+            share *= SHORTER;
+            result = none;
             continue;
         }
         let next = newton_step(at, load);
-        let before = change(header, at, step);
+        let before = share * change(header, at, step);
         let after = change(header, at, next);
         v = at.v;
         q = at.q;
         left = size;
         step = next;
-        if k > 0u && after <= CONTRACTION * before && after <= SHARP * at.d {
-            let margin = WITHIN * after + rounding(at, load, step, error);
+        share = 1.0;
+        if k == 0u {
+            continue;
+        }
+        let round_ = rounding(at, load, step, error);
+        let contracts = after <= CONTRACTION * before;
+        if contracts || (left <= QUIET && after <= round_) {
+            result = none;
+            let margin = WITHIN * after + round_;
             let upper = load.scale * (at.d + margin);
             let half_area = 0.5 * (header.area_i + header.area_ii);
             let weak = upper * upper * load.distance * load.distance <= half_area;
-            if weak && margin <= ESTIMATE_MARGIN * at.d {
+            let touches = at.moments_i.low.x >= HARDLY * header.area_i && at.moments_ii.low.x >= HARDLY * header.area_ii;
+            if weak && touches && margin <= ESTIMATE_MARGIN * at.d {
                 result = Estimate(v / sqrt(dot(v, v)), load.scale * (at.d - margin), upper);
             }
-            break;
+            if after <= SHARP * at.d {
+                break;
+            }
+        } else if left > QUIET {
+            result = none;
         }
     }
     return result;
@@ -645,7 +660,7 @@ fn newton(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
                 word = found[first_window + lane / 4u].words[lane % 4u];
             }
             atomicStore(&left_open[lane], word);
-            if grip.wanted % MODES == ESTIMATES {
+            if (grip.wanted & ESTIMATES) != 0u {
                 var place = atomicAdd(&gathered, countOneBits(word));
                 while word != 0u {
                     places[place] = 32u * lane + firstTrailingBit(word);
@@ -686,7 +701,7 @@ fn newton(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
             let place = places[slot];
             if upper < LARGEST {
                 atomicAnd(&left_open[place / 32u], ~(1u << (place % 32u)));
-                if upper * (1.0 + F32_TOLERANCE) >= floor {
+                if (grip.wanted & EVERY) != 0u || upper * (1.0 + F32_TOLERANCE) >= floor {
                     append(FoundRecord(bitcast<vec4<u32>>(slips[slot]), upper, ESTIMATED, begin + place, number));
                 }
             }

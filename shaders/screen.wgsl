@@ -148,7 +148,7 @@ fn screen(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
         }
         // Only these loads are written: their seeds are made again, which costs less than keeping all.
         for (var slot = lane; slot < count; slot += GROUP) {
-            if grip.wanted % MODES != EVERY && ceilings[slot] < floor {
+            if (grip.wanted & EVERY) == 0u && ceilings[slot] < floor {
                 continue;
             }
             let listed = cases[grip.first + first + slot];

@@ -83,13 +83,11 @@ pub const ESTIMATED: u32 = 5;
 /// [`FoundRecord::kind`] is a status plus so many times the best twist.
 pub const KINDS: u32 = 8;
 
-/// [`GripRecord::wanted`]: the loads that can be the worst, by bounds alone ...
-pub const BOUNDS: u32 = 0;
-/// ... every load ...
+/// [`GripRecord::wanted`]: every load comes back, not only those that can be the worst.
 pub const EVERY: u32 = 1;
-/// ... the loads that can be the worst, by bounds and estimates.
+/// [`GripRecord::wanted`]: loads without bounds get estimates.
 pub const ESTIMATES: u32 = 2;
-/// [`GripRecord::wanted`] is one of these plus so many times the first window.
+/// [`GripRecord::wanted`] is a sum of these plus so many times the first window.
 pub const MODES: u32 = 4;
 
 /// Loads that one entry has a bit for.
@@ -132,19 +130,24 @@ pub const CORRECTIONS: u32 = 12;
 pub const PRESSURE_STEPS: u32 = 14;
 /// What the pressure without coupling may leave over, of the gripping force: it is a start.
 pub const PRESSED: f32 = 1e-3;
-/// Share of what the equations left over that a step must not exceed, and what is left of one that does.
-pub const FALL: f32 = 0.9;
-pub const SHORTER: f32 = 0.3;
+/// A step must make what the equations leave over less by this share of its own; what is left of one
+/// that does not; and what is left over that may be all rounding.
+pub const FALL: f32 = 0.1;
+pub const SHORTER: f32 = 0.4;
+pub const QUIET: f32 = 1e-5;
 /// As for the processor's comparison ([`crate::mechanics`]): ratio of two steps up to which Newton's
 /// method converges for certain, and growth of the last one that bounds the way to the solution ...
 pub const CONTRACTION: f32 = 0.25;
 pub const WITHIN: f32 = 2.0;
-/// ... which must be no longer than this share of the dissipation.
+/// ... which need be no shorter than this share of the dissipation.
 pub const SHARP: f32 = 1e-4;
-/// Share of a pad's contact that must be left: with less there may be further limit states; and change
-/// of the pressure over the radius, in its mean on what is left, up to which it is resolved.
-pub const LEAST_LEFT: f32 = 0.1;
-pub const STEEPEST: f32 = 20.0;
+/// Share of a pad's contact that must be left at an estimate: with less there may be further limit
+/// states.
+pub const HARDLY: f32 = 0.1;
+/// The same on the way there, and change of the pressure over the radius, in its mean on what is left, up
+/// to which it is resolved.
+pub const LEAST_LEFT: f32 = 0.02;
+pub const STEEPEST: f32 = 40.0;
 /// Rounding of an integral over what its terms are made of: some 16 roundings of `2^-24`.
 pub const ROUNDING: f32 = 1e-6;
 /// Estimates that may be off by more than this share are none.
@@ -270,7 +273,7 @@ pub struct GripRecord {
     pub first: u32,
     /// Number of loads.
     pub count: u32,
-    /// [`BOUNDS`], [`EVERY`] or [`ESTIMATES`], and the place of the entry that says which of its first
+    /// [`EVERY`], [`ESTIMATES`], and ([`MODES`]) the place of the entry that says which of its first
     /// [`BITS`] loads are open, those of the others behind it.
     pub wanted: u32,
 }

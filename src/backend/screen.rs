@@ -120,10 +120,8 @@ pub(super) fn without_contact(problem: &Problem<'_>, index: usize) -> Result<Fou
 /// Whether a seed is that of a load which can be the worst where another one's `mu_s` is at least
 /// `floor`.
 pub(super) fn can_be_worst(seed: &Seed, floor: f64) -> bool {
-    let bounded = matches!(
-        seed.status,
-        SeedStatus::Bounded | SeedStatus::Coupled | SeedStatus::Estimated
-    );
+    let bounded =
+        matches!(seed.status, SeedStatus::Bounded | SeedStatus::Coupled | SeedStatus::Estimated);
     !(bounded && seed.upper < floor)
 }
 

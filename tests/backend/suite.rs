@@ -22,7 +22,7 @@ use crate::support::random::Random;
 /// precision, and a graphics processor for its loads too.
 const TOLERANCE: f64 = 2.0 * F32_TOLERANCE + LOAD_TOLERANCE;
 
-fn gpu() -> Option<Backend> {
+pub(crate) fn gpu() -> Option<Backend> {
     #[cfg(feature = "gpu")]
     {
         use gripfast::backend::{ADAPTER_VARIABLE, Choice, list_adapters, select};

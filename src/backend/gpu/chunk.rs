@@ -6,8 +6,8 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::super::layout::{
-    BASIS, BITS, BOUNDS, CORRECTIONS, CaseRecord, ContactHeader, ESTIMATES, EVERY, EdgeRecord,
-    GROUP, GripRecord, MODES, OUT_OF_RANGE, PRESSURE_STEPS, WINDOW,
+    BASIS, BITS, CORRECTIONS, CaseRecord, ContactHeader, ESTIMATES, EVERY, EdgeRecord, GROUP,
+    GripRecord, MODES, OUT_OF_RANGE, PRESSURE_STEPS, WINDOW,
 };
 use super::super::prepare::{Contacts, RANGE, Records};
 use super::super::problem::Problem;
@@ -304,7 +304,7 @@ impl Maker {
         let mut chunk = Chunk { every: wanted == Wanted::All, ..Chunk::default() };
         let mode = match wanted {
             Wanted::All => EVERY,
-            Wanted::Worst => BOUNDS,
+            Wanted::Worst => 0,
             Wanted::Estimated => ESTIMATES,
         };
         let before = std::mem::take(&mut self.known);

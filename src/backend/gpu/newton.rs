@@ -16,9 +16,10 @@ use super::super::fan::edge_log;
 use super::super::lanes::{dot, larger, smaller};
 use super::super::layout::{
     BITS, CONTRACTION, CORRECTIONS, CaseRecord, ContactHeader, ESTIMATE_MARGIN, ESTIMATED,
-    ESTIMATES, EdgeRecord, FALL, FAR_LIMIT, FoundRecord, GAUSS, GripRecord, LEAST_LEFT, LEAST_LOAD,
-    LoadRecord, MODES, MOST_PULL, ON_LINE, OPEN, OUT_OF_RANGE, OutcomeRecord, PART, PRESSED,
-    PRESSURE_STEPS, RANGE, ROUNDING, SHARP, SHORTER, STEEPEST, SeedRecord, WITHIN,
+    ESTIMATES, EVERY, EdgeRecord, FALL, FAR_LIMIT, FoundRecord, GAUSS, GripRecord, HARDLY,
+    LEAST_LEFT, LEAST_LOAD, LoadRecord, MOST_PULL, ON_LINE, OPEN, OUT_OF_RANGE, OutcomeRecord,
+    PART, PRESSED, PRESSURE_STEPS, QUIET, RANGE, ROUNDING, SHARP, SHORTER, STEEPEST, SeedRecord,
+    WITHIN,
 };
 use super::super::problem::F32_TOLERANCE;
 use super::super::search::Field;
@@ -116,9 +117,7 @@ pub(crate) fn add_moments(m: &mut [f32; 6], a: [f32; 2], b: [f32; 2]) {
     m[1] += cross * (a[0] + b[0]) / 6.0;
     m[2] += cross * (a[1] + b[1]) / 6.0;
     m[3] += cross * (a[0] * a[0] + a[0] * b[0] + b[0] * b[0]) / 12.0;
-    m[4] += cross
-        * (2.0 * (a[0] * a[1] + b[0] * b[1]) + (a[0] * b[1] + b[0] * a[1]))
-        / 24.0;
+    m[4] += cross * (2.0 * (a[0] * a[1] + b[0] * b[1]) + (a[0] * b[1] + b[0] * a[1])) / 24.0;
     m[5] += cross * (a[1] * a[1] + a[1] * b[1] + b[1] * b[1]) / 12.0;
 }
 
@@ -174,8 +173,8 @@ pub(crate) fn add_far(s: &mut Sums, at: &Centre, z: [f32; 2], t: [f32; 2], weigh
     let r0 = (d[0] * d[0] + d[1] * d[1]).sqrt();
     let e = [y[0] / r, y[1] / r];
     // Beyond the arc through the origin, and where the ray crosses that.
-    let over = (2.0 * (d[0] * z[0] + d[1] * z[1]) + at.omega * (z[0] * z[0] + z[1] * z[1]))
-        / (r + r0);
+    let over =
+        (2.0 * (d[0] * z[0] + d[1] * z[1]) + at.omega * (z[0] * z[0] + z[1] * z[1])) / (r + r0);
     let q = [z[0] - over * e[0], z[1] - over * e[1]];
     let turn = (y[0] * t[1] - y[1] * t[0]) * weight / (r * r);
     let a0 = turn * over * (r0 + 0.5 * at.omega * over);
@@ -390,8 +389,8 @@ pub(crate) fn press(
         let b = pressed_moments(header, edges, 1, face_pressure(tried, 1));
         let held = carried(a, b, tried);
         let left = [0, 1, 2, 3].map(|m: usize| held[m] - wanted[m]);
-        let size = (left[0] * left[0] + left[1] * left[1] + left[2] * left[2] + left[3] * left[3])
-            .sqrt();
+        let size =
+            (left[0] * left[0] + left[1] * left[1] + left[2] * left[2] + left[3] * left[3]).sqrt();
         let energy = (0..4).map(|m| tried[m] * (0.5 * held[m] - wanted[m])).sum::<f32>();
         let pressed = a[0] > 0.0 && b[0] > 0.0;
         if !(pressed && (energy <= value + 1e-4 * share * slope || size < 0.5 * error)) {
@@ -576,9 +575,7 @@ pub(crate) fn newton_step(at: &Equations, load: &LoadRecord) -> Step {
     let back_1 = solve(&slip, row_v1);
     let back_2 = solve(&slip, row_v2);
     let by_offset = |j: usize| {
-        -(dd[j]
-            + l1 * (dot(c[j], back_1) + row_q1[j])
-            + l2 * (dot(c[j], back_2) + row_q2[j]))
+        -(dd[j] + l1 * (dot(c[j], back_1) + row_q1[j]) + l2 * (dot(c[j], back_2) + row_q2[j]))
     };
     Step {
         step: [dv[0], dv[1], dv[2], offset_i, offset_ii, tilt[0], tilt[1]],
@@ -601,8 +598,7 @@ pub(crate) fn change(header: &ContactHeader, at: &Equations, step: [f32; 7]) -> 
     let speed = (step[0] * step[0] + step[1] * step[1]).sqrt() + step[2].abs() * radius;
     let here = (at.v[0] * at.v[0] + at.v[1] * at.v[1]).sqrt() + at.v[2].abs() * radius;
     let tilt = (step[5] * step[5] + step[6] * step[6]).sqrt() * radius;
-    let pressure =
-        header.area_i * (step[3].abs() + tilt) + header.area_ii * (step[4].abs() + tilt);
+    let pressure = header.area_i * (step[3].abs() + tilt) + header.area_ii * (step[4].abs() + tilt);
     let held = carried(at.moments[0], at.moments[1], at.q);
     (held[0] + held[1]) * speed + pressure * (here + speed)
 }
@@ -654,10 +650,11 @@ pub(crate) fn estimate(
     let mut step = Step::default();
     let mut at = Equations::default();
     let mut left = f32::MAX;
+    let mut share = 1.0;
     let mut found = none;
     for k in 0..CORRECTIONS {
-        at.v = [0, 1, 2].map(|m: usize| v[m] + step.step[m]);
-        at.q = [0, 1, 2, 3].map(|m: usize| z[m] + step.step[3 + m]);
+        at.v = [0, 1, 2].map(|m: usize| v[m] + share * step.step[m]);
+        at.q = [0, 1, 2, 3].map(|m: usize| z[m] + share * step.step[3 + m]);
         put(header, edges, &mut at);
         if k == 0 {
             // To the minimum along the ray.
@@ -669,26 +666,34 @@ pub(crate) fn estimate(
         }
         residuals(&mut at, load);
         let size = at.residual.iter().map(|x| x * x).sum::<f32>().sqrt();
-        let pressed =
-            at.good && at.moments[0][0] > 0.0 && at.moments[1][0] > 0.0 && at.d > 0.0;
-        if !(pressed && size <= FALL * left) {
-            if k == 0 {
+        let pressed = at.good && at.moments[0][0] > 0.0 && at.moments[1][0] > 0.0 && at.d > 0.0;
+        if !(pressed && size <= (1.0 - FALL * share) * left) {
+            // Rounding is all that is left, or there is nothing to begin with.
+            if k == 0 || left <= QUIET {
                 break;
             }
-            step.step = step.step.map(|x| SHORTER * x);
+            share *= SHORTER;
+            found = none;
             continue;
         }
         let next = newton_step(&at, load);
-        let before = change(header, &at, step.step);
+        let before = share * change(header, &at, step.step);
         let after = change(header, &at, next.step);
-        (v, z, left) = (at.v, at.q, size);
-        step = next;
-        if k > 0 && after <= CONTRACTION * before && after <= SHARP * at.d {
-            let margin = WITHIN * after + rounding(&at, load, step.by, error);
+        (v, z, left, step, share) = (at.v, at.q, size, next, 1.0);
+        if k == 0 {
+            continue;
+        }
+        let round = rounding(&at, load, step.by, error);
+        let contracts = after <= CONTRACTION * before;
+        if contracts || (left <= QUIET && after <= round) {
+            found = none;
+            let margin = WITHIN * after + round;
             let upper = load.scale * (at.d + margin);
             let half_area = 0.5 * (header.area_i + header.area_ii);
             let weak = upper * upper * load.distance * load.distance <= half_area;
-            if weak && margin <= ESTIMATE_MARGIN * at.d {
+            let touches = at.moments[0][0] >= HARDLY * header.area_i
+                && at.moments[1][0] >= HARDLY * header.area_ii;
+            if weak && touches && margin <= ESTIMATE_MARGIN * at.d {
                 let length = dot(v, v).sqrt();
                 found = Estimate {
                     twist: v.map(|x| x / length),
@@ -696,14 +701,18 @@ pub(crate) fn estimate(
                     upper,
                 };
             }
-            break;
+            if after <= SHARP * at.d {
+                break;
+            }
+        } else if left > QUIET {
+            found = none;
         }
     }
     found
 }
 
 /// The open loads of the grip with this `number`, given by its `windows`, that can be its worst where
-/// another one's `mu_s` is at least `floor`: their estimates, or bits for those that have none. The
+/// another one's `mu_s` is at least `floor`, or every one: their estimates, or bits for those that have none. The
 /// entries are counted without one more.
 pub(crate) fn newton(
     field: &Field<'_>,
@@ -716,7 +725,7 @@ pub(crate) fn newton(
     let open = |window: &FoundRecord, bit: &u32| window.words[*bit as usize / 32] >> (bit % 32) & 1;
     for part in windows.chunks(PART / BITS) {
         let mut estimates = Vec::new();
-        for window in part.iter().filter(|_| grip.wanted % MODES == ESTIMATES) {
+        for window in part.iter().filter(|_| grip.wanted & ESTIMATES != 0) {
             for bit in (0..BITS as u32).filter(|bit| open(window, bit) == 1) {
                 let load = window.load + bit;
                 let listed = &cases[(grip.first + load) as usize];
@@ -739,7 +748,7 @@ pub(crate) fn newton(
                 }
                 words[bit as usize / 32] &= !(1 << (bit % 32));
                 let Estimate { twist: [x, y, z], lower, upper } = *found_here;
-                if upper * (1.0 + tolerance) >= floor {
+                if grip.wanted & EVERY != 0 || upper * (1.0 + tolerance) >= floor {
                     let words = [x, y, z, lower].map(f32::to_bits);
                     let (kind, load) = (ESTIMATED, *load);
                     append(found, FoundRecord { words, upper, kind, load, grip: number });

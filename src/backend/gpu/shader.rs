@@ -34,7 +34,7 @@ pub(crate) const NEWTON: &str = concat!(
 pub(crate) const GRID: u32 = 32_768;
 
 /// The constants that the shaders leave open, from [`layout`].
-pub(crate) fn constants() -> [(&'static str, f64); 44] {
+pub(crate) fn constants() -> [(&'static str, f64); 46] {
     [
         ("GROUP", layout::GROUP as f64),
         ("BASIS_GROUP", layout::BASIS_GROUP as f64),
@@ -75,6 +75,8 @@ pub(crate) fn constants() -> [(&'static str, f64); 44] {
         ("CONTRACTION", f64::from(layout::CONTRACTION)),
         ("WITHIN", f64::from(layout::WITHIN)),
         ("SHARP", f64::from(layout::SHARP)),
+        ("QUIET", f64::from(layout::QUIET)),
+        ("HARDLY", f64::from(layout::HARDLY)),
         ("LEAST_LEFT", f64::from(layout::LEAST_LEFT)),
         ("STEEPEST", f64::from(layout::STEEPEST)),
         ("ROUNDING", f64::from(layout::ROUNDING)),

@@ -8,9 +8,7 @@ use std::sync::atomic::Ordering;
 use rayon::prelude::*;
 
 use super::super::cpu::Found;
-use super::super::layout::{
-    BITS, FoundRecord, KINDS, OPEN, OutcomeRecord, SeedRecord, UNWRITTEN,
-};
+use super::super::layout::{BITS, FoundRecord, KINDS, OPEN, OutcomeRecord, SeedRecord, UNWRITTEN};
 use super::super::prepare::{Contacts, not_searched};
 use super::super::problem::{Batch, Problem, check_grip, check_load};
 use super::super::screen::{Screen, Wanted, can_be_worst, without_contact};

@@ -5,7 +5,7 @@
 use super::super::lanes::{LANES, Loads, cross, dot, larger, smaller};
 use super::super::layout::{
     BITS, CaseRecord, EVERY, FoundRecord, GripRecord, KINDS, LEAST_LOAD, LOAD_MARGIN,
-    LOAD_ROUNDING, LoadRecord, MODES, MOST_PULL, OPEN, OutcomeRecord, RANGE, SWAY_CONGRUENT,
+    LOAD_ROUNDING, LoadRecord, MOST_PULL, OPEN, OutcomeRecord, RANGE, SWAY_CONGRUENT,
     SWAY_DIFFERENT, SeedRecord, UNBOUNDED, WINDOW,
 };
 use super::super::problem::F32_TOLERANCE;
@@ -152,7 +152,7 @@ pub(crate) fn screen(
         let mut open = [[0_u32; 4]; WINDOW / BITS];
         for (slot, (seed, share)) in judged.iter().enumerate() {
             let bounded = *share < f32::MAX;
-            if grip.wanted % MODES != EVERY && bounded && seed.upper * (1.0 + tolerance) < floor {
+            if grip.wanted & EVERY == 0 && bounded && seed.upper * (1.0 + tolerance) < floor {
                 continue;
             }
             if *share <= LOAD_MARGIN {
