@@ -85,8 +85,9 @@ struct Scoring {
     compared: usize,
     /// Time beyond that of the seeds of the same batch.
     beyond_seeds: f64,
-    /// Time of the exact answers by the clock, where the adapter's clock ran.
+    /// Time of the exact answers and of Newton's method on the adapter, where its clock ran.
     polish: Option<f64>,
+    newton: Option<f64>,
 }
 
 /// How far the screen is from the adapter's limits.
@@ -469,7 +470,8 @@ impl Cell<'_> {
             solved = scored.iter().map(|scored| scored.solved).sum();
             compared = scored.iter().map(|scored| scored.compared).sum();
         }
-        let polish = self.stop_clock().map(|polish| polish / f64::from(runs));
+        let [polish, newton] =
+            self.stop_clock().map(|seconds| seconds.map(|all| all / f64::from(runs)));
         let each = spent / f64::from(runs);
         row.scoring = Some(Scoring {
             grips,
@@ -479,6 +481,7 @@ impl Cell<'_> {
             compared,
             beyond_seeds: each - seeds_only,
             polish,
+            newton,
         });
         Ok(one)
     }
@@ -491,11 +494,14 @@ impl Cell<'_> {
         Ok(())
     }
 
-    /// Seconds of exact answers since the clock was started.
+    /// Seconds of exact answers, and of Newton's method on the adapter, since the clock was started.
     #[cfg(feature = "gpu")]
-    fn stop_clock(&self) -> Option<f64> {
-        let Backend::Gpu(gpu) = &self.place.backend else { return None };
-        Some(gpu.stop_clock()?.polish.iter().map(|span| span.seconds()).sum())
+    fn stop_clock(&self) -> [Option<f64>; 2] {
+        let Backend::Gpu(gpu) = &self.place.backend else { return [None; 2] };
+        let Some(timeline) = gpu.stop_clock() else { return [None; 2] };
+        let polish = timeline.polish.iter().map(|span| span.seconds()).sum();
+        let newton = timeline.chunks.iter().map(|chunk| Some(chunk.device?.newton.seconds()));
+        [Some(polish), newton.sum()]
     }
 
     #[cfg(not(feature = "gpu"))]
@@ -504,7 +510,7 @@ impl Cell<'_> {
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn stop_clock(&self) -> Option<f64> {
-        None
+    fn stop_clock(&self) -> [Option<f64>; 2] {
+        [None; 2]
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Report, Row};
+use super::{Report, Row, Scoring};
 
 impl Report {
     pub(super) fn markdown(&self) -> String {
@@ -77,11 +77,11 @@ over all cores | bounds, answers apart |\n|---|---|---|---|---|---|---|---|---|-
         let _ = write!(
             text,
             "\nSteps of a batch on the adapter, nanoseconds a load. {clock}; make, send, wait, \
-fetch and spread by the processor's clock; polish: exact answers, nanoseconds a load of the grips \
-scored. Arithmetic and memory: share of the adapter's limit while the kernels run{}.\n\n\
+fetch and spread by the processor's clock; newton (on the adapter) and polish: loads without bounds \
+and exact answers, nanoseconds a load of the grips scored. Arithmetic and memory: share of the adapter's limit while the kernels run{}.\n\n\
 | twists | loads | contacts | loads a run | chunks | bytes a grip up | down | entries a grip | make | send | upload | basis | search | \
-readback | wait | fetch | spread | whole | polish | kernels of whole | arithmetic | memory |\n\
-|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+readback | wait | fetch | spread | whole | newton | polish | kernels of whole | arithmetic | memory |\n\
+|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
             if self.limits.is_some() { "" } else { " (unknown for this one)" }
         );
         for row in &self.rows {
@@ -92,13 +92,16 @@ readback | wait | fetch | spread | whole | polish | kernels of whole | arithmeti
             let percent = |share: Option<f64>| {
                 share.map_or_else(String::new, |share| format!("{:.1} %", share * 100.0))
             };
-            let polish = row.scoring.as_ref().and_then(|scoring| {
-                Some(scoring.polish? / (scoring.grips * row.loads) as f64 * loads)
-            });
+            let scored = |seconds: &dyn Fn(&Scoring) -> Option<f64>| {
+                let scoring = row.scoring.as_ref()?;
+                Some(seconds(scoring)? / (scoring.grips * row.loads) as f64 * loads)
+            };
+            let newton = scored(&|scoring| scoring.newton);
+            let polish = scored(&|scoring| scoring.polish);
             let _ = writeln!(
                 text,
                 "| {} | {} | {} | {loads} | {} | {:.0} | {:.0} | {:.1} | {} | {} | {} | {} | {} | {} | \
-{} | {} | {} | {} | {} | {} | {} | {} |",
+{} | {} | {} | {} | {} | {} | {} | {} | {} |",
                 row.twists,
                 row.loads,
                 row.contacts,
@@ -116,6 +119,7 @@ readback | wait | fetch | spread | whole | polish | kernels of whole | arithmeti
                 each(steps.fetch),
                 each(steps.spread),
                 each(steps.whole),
+                maybe(newton),
                 maybe(polish),
                 percent(row.share.as_ref().map(|share| share.kernels)),
                 percent(row.share.as_ref().and_then(|share| share.arithmetic)),

@@ -2,6 +2,10 @@
 
 use super::super::check::estimates::{self, Estimates, LiftingGrip};
 use super::*;
+use crate::backend::layout::{ESTIMATED, KINDS, OPEN};
+use crate::load::{LoadSet, LoadSource};
+use crate::part::{Part, ReadOptions};
+use crate::propose::{ProposeOptions, Proposer};
 
 /// Limits of no device.
 const LIMITS: Limits = Limits {
@@ -42,4 +46,75 @@ fn estimates_are_within_their_margin() {
     assert!(all.estimated * 10 > (all.open - all.refused - all.hard) * 9, "{all:?}");
     assert!(all.lifted * 2 > all.estimated && all.open > 10_000, "{all:?}");
     assert!(half < 1e-3, "{half}");
+}
+
+/// Loads of some grips of a part that are open before Newton's method and after it, and those that come
+/// back with an estimate.
+fn open_loads(part: &Part, gripper: &str, force: f64, loads: &LoadSet) -> [usize; 4] {
+    let gripper = crate::gripper::find(gripper).unwrap();
+    let options = ProposeOptions::default().with_spacing(Some(0.006));
+    let all: Vec<_> =
+        Proposer::new(part, &gripper, &options).unwrap().flat_map(|chunk| chunk.grips).collect();
+    let step = (all.len() / 25).max(1);
+    let mass = part.mass_properties(7850.0);
+    let list: Vec<Wrench> = loads.cases(&mass).unwrap().iter().map(|load| load.wrench).collect();
+    let problem = |grip| {
+        let grip: &crate::model::Grip = grip;
+        let centre_of_mass = mass.centre_of_mass;
+        Problem {
+            contact: &grip.contact,
+            distance: grip.distance(),
+            force: force * 9.81 * mass.mass,
+            wrenches: &list,
+            pose: Some(Pose { centre_of_mass, part_from_grip: grip.part_from_grip }),
+        }
+    };
+    let problems: Vec<Problem<'_>> = all.iter().step_by(step).map(problem).collect();
+    let made = Contacts::new(&problems).unwrap();
+    let seeds = SeedSet::default();
+    let users = (0..problems.len()).map(|index| (made.slots[index], vec![index])).collect();
+    let mut count = [problems.len() * list.len(), 0, 0, 0];
+    for plan in plans(&made, &problems, users, (LIMITS, seeds.len())) {
+        for (wanted, at) in [(Wanted::Worst, 1), (Wanted::Estimated, 2)] {
+            let with = (seeds.len(), wanted);
+            let chunk = Maker::default().chunk((&made, &problems), &plan, with);
+            for entry in twins(&chunk, &seeds).entries {
+                if entry.kind == OPEN {
+                    count[at] += entry.words.map(u32::count_ones).iter().sum::<u32>() as usize;
+                } else if entry.kind % KINDS == ESTIMATED {
+                    count[3] += 1;
+                }
+            }
+        }
+    }
+    count
+}
+
+/// On grips of parts, from pads pressed all over to pads about to be torn off: loads that the device
+/// leaves to the processor are few where they can be held.
+#[test]
+fn few_loads_of_a_part_are_left_open() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("data/parts");
+    let mut sums = [[0; 4]; 4];
+    for (name, gripper) in [
+        ("l_bracket.stl", "robotiq-2f85"),
+        ("pocket_plate.stl", "generic"),
+        ("spur_gear.stl", "robotiq-hande"),
+        ("t_slot_bar.stl", "wsg50-110"),
+    ] {
+        let part = Part::read(&folder.join(name), &ReadOptions::default()).unwrap();
+        let weight = 9.81 * part.mass_properties(7850.0).mass;
+        let ball = LoadSource::Ball { directions: 300, force: 2.0 * weight, moment: None };
+        let loads = LoadSet::new(vec![ball]);
+        for (force, sum) in [200.0, 50.0, 12.0, 4.0].into_iter().zip(&mut sums) {
+            let count = open_loads(&part, gripper, force, &loads);
+            println!("{name}, {force} times the weight: {count:?} of loads, open, left, estimated");
+            sum.iter_mut().zip(count).for_each(|(sum, count)| *sum += count);
+        }
+    }
+    println!("{sums:?}");
+    for [loads, open, left, estimated] in &sums[..3] {
+        assert!(left * 10 <= *open && estimated * 20 <= *loads, "{sums:?}");
+    }
+    assert!(sums[2][1] * 4 > sums[2][0], "{sums:?}");
 }
