@@ -2,9 +2,10 @@
 //! computes, the next is uploaded and the one before read back.
 //!
 //! Up go contacts and grips, each grip a pose of some 80 bytes, and the list of loads unless it lies
-//! there already. The loads of a grip are made where they are searched. Back come eight bytes for
-//! each grip, and 32 for each load that can be its worst; loads without bounds come back as bits. No
-//! memory, there or here, grows with grips times loads.
+//! there already. The loads of a grip are made where they are searched; those without bounds get
+//! estimates from Newton's method. Back come eight bytes for each grip, and 32 for each load that can
+//! be its worst; loads with neither come back as bits. Of grips times loads grows only what says which
+//! are open, a bit for each load of a chunk.
 
 mod adapter;
 mod buffers;
