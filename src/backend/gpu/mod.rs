@@ -12,6 +12,7 @@ mod buffers;
 mod check;
 mod chunk;
 mod clock;
+mod cut;
 mod newton;
 mod shader;
 mod survivors;

@@ -26,6 +26,8 @@ pub(crate) const NEWTON: &str = concat!(
     "\n",
     include_str!("../../../shaders/edge.wgsl"),
     "\n",
+    include_str!("../../../shaders/cut.wgsl"),
+    "\n",
     include_str!("../../../shaders/newton.wgsl")
 );
 
