@@ -61,6 +61,7 @@ const PART = 512u;
 const PART_WORDS = 16u;
 const BITS = 128u;
 const LARGEST = 3.4028234e38;
+const INFINITE = 0x7f800000u;
 
 struct ContactHeader {
     edges_i: u32,

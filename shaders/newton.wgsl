@@ -371,6 +371,11 @@ fn estimate(header: ContactHeader, load: LoadRecord, error: f32, twist: vec3<f32
     return result;
 }
 
+// By its bits: what a comparison says of what is no number is the driver's choice.
+fn is_positive(x: f32) -> bool {
+    return bitcast<u32>(x) - 1u < INFINITE - 1u;
+}
+
 @compute @workgroup_size(GROUP)
 fn newton(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let number = workgroup.x + GRID * workgroup.y;
@@ -418,7 +423,7 @@ fn newton(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
             let seed = finish(header, load, p, best.twist, best.value);
             let estimated = estimate(header, load, load_error(grip, listed), seed.twist);
             if slot < count {
-                let known = estimated.lower <= estimated.upper;
+                let known = is_positive(estimated.lower) && is_positive(estimated.upper) && estimated.lower <= estimated.upper;
                 if known {
                     floor = max(floor, estimated.lower * (1.0 - F32_TOLERANCE));
                 }

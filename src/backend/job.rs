@@ -65,7 +65,8 @@ impl Backend {
     /// whatever the number of threads, and however the batch is cut or permuted.
     ///
     /// On a graphics processor loads are made in single precision and their bounds widened for that,
-    /// by a share of at most 5e-4; the seeds of loads without bounds are the processor's.
+    /// by a share of at most 5e-4; the seeds of loads without bounds are the processor's: estimates are
+    /// for [`Backend::score`] alone.
     ///
     /// # Errors
     /// A bad value for numbers that are not finite or a gripping force that is not positive;

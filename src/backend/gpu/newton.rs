@@ -419,6 +419,12 @@ pub(crate) fn estimate(
     found
 }
 
+/// Whether a number is one, and above zero: by its bits, for what a shader's comparison says of what is
+/// no number is the driver's choice.
+pub(crate) fn is_positive(x: f32) -> bool {
+    x.to_bits().wrapping_sub(1) < f32::INFINITY.to_bits() - 1
+}
+
 /// The open loads of the grip with this `number`, given by its `windows`, that can be its worst where
 /// another one's `mu_s` is at least `floor`, or every one: their estimates, or bits for those that have none. The
 /// entries are counted without one more.
@@ -441,7 +447,8 @@ pub(crate) fn newton(
                 let mut seed = [SeedRecord::default()];
                 field.search(&[made], &mut seed);
                 let found = estimate(field.header, &field.edges, &made, error, seed[0].twist);
-                if found.lower <= found.upper {
+                let known = is_positive(found.lower) && is_positive(found.upper);
+                if known && found.lower <= found.upper {
                     floor = larger(found.lower * (1.0 - tolerance), floor);
                     estimates.push((load, found));
                 }

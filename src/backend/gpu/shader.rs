@@ -276,6 +276,7 @@ mod tests {
         assert_eq!(fixed("BITS"), layout::BITS.to_string());
         assert_eq!(fixed("PART"), layout::PART.to_string());
         assert_eq!(fixed("PART_WORDS"), (layout::PART / 32).to_string());
+        assert_eq!(fixed("INFINITE"), format!("{:#x}", f32::INFINITY.to_bits()));
         assert_eq!(fixed("LARGEST").parse::<f32>().unwrap(), f32::MAX);
     }
 

@@ -386,6 +386,29 @@ fn the_tolerance_of_the_bounds_holds_on_this_adapter() {
     }
 }
 
+/// The kernels ask for no more than every implementation has.
+#[test]
+fn the_least_limits_are_enough_for_the_kernels() {
+    if gpu(true).is_none() {
+        return;
+    }
+    let adapter = adapter::choose(None).or_else(|_| adapter::choose(Some("0"))).unwrap();
+    let descriptor =
+        wgpu::DeviceDescriptor { required_limits: wgpu::Limits::default(), ..Default::default() };
+    let (device, _) = pollster::block_on(adapter.request_device(&descriptor)).unwrap();
+    let kernels: [(&str, &str, &[shader::Access]); 3] = [
+        ("fill_basis", shader::FAN, &shader::FAN_BINDINGS),
+        ("screen", shader::SCREEN, &shader::SCREEN_BINDINGS),
+        ("newton", shader::NEWTON, &shader::NEWTON_BINDINGS),
+    ];
+    for (name, text, bindings) in kernels {
+        let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        Kernel::new(&device, name, text, bindings);
+        let error = pollster::block_on(scope.pop());
+        assert!(error.is_none(), "{name}: {error:?}");
+    }
+}
+
 /// The clock changes no answer; its steps follow one another, and the device works on a chunk while
 /// the processor makes the next.
 #[test]
