@@ -88,6 +88,8 @@ struct Scoring {
     /// Time of the exact answers and of Newton's method on the adapter, where its clock ran.
     polish: Option<f64>,
     newton: Option<f64>,
+    /// Share of the kernels' time in which the processor worked on exact answers of a block before.
+    hidden: Option<f64>,
 }
 
 /// How far the screen is from the adapter's limits.
@@ -153,7 +155,7 @@ impl Place {
 
     /// What scoring takes of the seeds.
     fn survivors(&self, batch: &Batch<'_>, set: &SeedSet) -> anyhow::Result<()> {
-        let run = || self.backend.survivors(batch, set);
+        let run = || self.backend.survivors_for(batch, set, &ScoreOptions::default());
         std::hint::black_box(self.pool.as_ref().map_or_else(run, |pool| pool.install(run))?);
         Ok(())
     }
@@ -470,8 +472,8 @@ impl Cell<'_> {
             solved = scored.iter().map(|scored| scored.solved).sum();
             compared = scored.iter().map(|scored| scored.compared).sum();
         }
-        let [polish, newton] =
-            self.stop_clock().map(|seconds| seconds.map(|all| all / f64::from(runs)));
+        let [polish, newton, hidden] = self.stop_clock();
+        let [polish, newton] = [polish, newton].map(|all| Some(all? / f64::from(runs)));
         let each = spent / f64::from(runs);
         row.scoring = Some(Scoring {
             grips,
@@ -482,6 +484,7 @@ impl Cell<'_> {
             beyond_seeds: each - seeds_only,
             polish,
             newton,
+            hidden,
         });
         Ok(one)
     }
@@ -494,14 +497,21 @@ impl Cell<'_> {
         Ok(())
     }
 
-    /// Seconds of exact answers, and of Newton's method on the adapter, since the clock was started.
+    /// Seconds of exact answers and of Newton's method on the adapter since the clock was started, and
+    /// the share of the kernels' time that both have in common.
     #[cfg(feature = "gpu")]
-    fn stop_clock(&self) -> [Option<f64>; 2] {
-        let Backend::Gpu(gpu) = &self.place.backend else { return [None; 2] };
-        let Some(timeline) = gpu.stop_clock() else { return [None; 2] };
+    fn stop_clock(&self) -> [Option<f64>; 3] {
+        let Backend::Gpu(gpu) = &self.place.backend else { return [None; 3] };
+        let Some(timeline) = gpu.stop_clock() else { return [None; 3] };
         let polish = timeline.polish.iter().map(|span| span.seconds()).sum();
         let newton = timeline.chunks.iter().map(|chunk| Some(chunk.device?.newton.seconds()));
-        [Some(polish), newton.sum()]
+        let kernels = timeline.chunks.iter().filter_map(|chunk| chunk.device);
+        let (mut whole, mut common) = (0.0, 0.0);
+        for span in kernels.flat_map(|device| [device.basis, device.search, device.newton]) {
+            whole += span.seconds();
+            common += timeline.polish.iter().map(|polish| span.common(*polish)).sum::<f64>();
+        }
+        [Some(polish), newton.sum(), (whole > 0.0).then(|| common / whole)]
     }
 
     #[cfg(not(feature = "gpu"))]
@@ -510,7 +520,7 @@ impl Cell<'_> {
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn stop_clock(&self) -> [Option<f64>; 2] {
-        [None; 2]
+    fn stop_clock(&self) -> [Option<f64>; 3] {
+        [None; 3]
     }
 }

@@ -78,10 +78,11 @@ over all cores | bounds, answers apart |\n|---|---|---|---|---|---|---|---|---|-
             text,
             "\nSteps of a batch on the adapter, nanoseconds a load. {clock}; make, send, wait, \
 fetch and spread by the processor's clock; newton (on the adapter) and polish: loads without bounds \
-and exact answers, nanoseconds a load of the grips scored. Arithmetic and memory: share of the adapter's limit while the kernels run{}.\n\n\
+and exact answers, nanoseconds a load of the grips scored; hidden: share of the kernels' time there in \
+which exact answers of the block before were computed. Arithmetic and memory: share of the adapter's limit while the kernels run{}.\n\n\
 | twists | loads | contacts | loads a run | chunks | bytes a grip up | down | entries a grip | make | send | upload | basis | search | \
-readback | wait | fetch | spread | whole | newton | polish | kernels of whole | arithmetic | memory |\n\
-|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+readback | wait | fetch | spread | whole | newton | polish | hidden | kernels of whole | arithmetic | memory |\n\
+|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
             if self.limits.is_some() { "" } else { " (unknown for this one)" }
         );
         for row in &self.rows {
@@ -101,7 +102,7 @@ readback | wait | fetch | spread | whole | newton | polish | kernels of whole | 
             let _ = writeln!(
                 text,
                 "| {} | {} | {} | {loads} | {} | {:.0} | {:.0} | {:.1} | {} | {} | {} | {} | {} | {} | \
-{} | {} | {} | {} | {} | {} | {} | {} | {} |",
+{} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
                 row.twists,
                 row.loads,
                 row.contacts,
@@ -121,6 +122,7 @@ readback | wait | fetch | spread | whole | newton | polish | kernels of whole | 
                 each(steps.whole),
                 maybe(newton),
                 maybe(polish),
+                percent(row.scoring.as_ref().and_then(|scoring| scoring.hidden)),
                 percent(row.share.as_ref().map(|share| share.kernels)),
                 percent(row.share.as_ref().and_then(|share| share.arithmetic)),
                 percent(row.share.as_ref().and_then(|share| share.memory)),
