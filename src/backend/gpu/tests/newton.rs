@@ -2,8 +2,9 @@
 
 use super::super::check::estimates::{self, Estimates, LiftingGrip};
 use super::*;
-use crate::backend::layout::{ESTIMATED, KINDS, OPEN};
+use crate::backend::layout::{BITS, ESTIMATED, KINDS, OPEN};
 use crate::load::{LoadSet, LoadSource};
+use crate::mechanics::{Options, Search, solve_pads};
 use crate::part::{Part, ReadOptions};
 use crate::propose::{ProposeOptions, Proposer};
 
@@ -48,9 +49,9 @@ fn estimates_are_within_their_margin() {
     assert!(half < 1e-3, "{half}");
 }
 
-/// Loads of some grips of a part that are open before Newton's method and after it, and those that come
-/// back with an estimate.
-fn open_loads(part: &Part, gripper: &str, force: f64, loads: &LoadSet) -> [usize; 4] {
+/// Loads of some grips of a part, those that are open before Newton's method and after it, those that come
+/// back with an estimate, and of the ones still open those that have a limit state.
+fn open_loads(part: &Part, gripper: &str, force: f64, loads: &LoadSet) -> [usize; 5] {
     let gripper = crate::gripper::find(gripper).unwrap();
     let options = ProposeOptions::default().with_spacing(Some(0.006));
     let all: Vec<_> =
@@ -73,16 +74,26 @@ fn open_loads(part: &Part, gripper: &str, force: f64, loads: &LoadSet) -> [usize
     let made = Contacts::new(&problems).unwrap();
     let seeds = SeedSet::default();
     let users = (0..problems.len()).map(|index| (made.slots[index], vec![index])).collect();
-    let mut count = [problems.len() * list.len(), 0, 0, 0];
+    let mut count = [problems.len() * list.len(), 0, 0, 0, 0];
+    let options = Options { search: Search::Off, ..Options::default() };
     for plan in plans(&made, &problems, users, (LIMITS, seeds.len())) {
         for (wanted, at) in [(Wanted::Worst, 1), (Wanted::Estimated, 2)] {
             let with = (seeds.len(), wanted);
             let chunk = Maker::default().chunk((&made, &problems), &plan, with);
+            let pieces: Vec<_> = plan.iter().flat_map(|(_, pieces)| pieces).collect();
             for entry in twins(&chunk, &seeds).entries {
-                if entry.kind == OPEN {
-                    count[at] += entry.words.map(u32::count_ones).iter().sum::<u32>() as usize;
-                } else if entry.kind % KINDS == ESTIMATED {
-                    count[3] += 1;
+                count[3] += usize::from(entry.kind % KINDS == ESTIMATED);
+                let (index, problem) = (pieces[entry.grip as usize].problem, &problems);
+                let (problem, pads) = (&problem[index], &made.ready[made.slots[index]].pads);
+                let bit = |bit: &usize| entry.words[bit / 32] >> (bit % 32) & 1 == 1;
+                for load in (0..BITS).filter(|at| entry.kind == OPEN && bit(at)) {
+                    count[at] += 1;
+                    let wrench = problem.wrench(entry.load as usize + load);
+                    let pads = pads.as_ref().unwrap();
+                    let (distance, force) = (problem.distance, problem.force);
+                    let held = at == 2
+                        && solve_pads(pads, distance, force, &wrench, &options).mu_s.is_some();
+                    count[4] += usize::from(held);
                 }
             }
         }
@@ -95,7 +106,7 @@ fn open_loads(part: &Part, gripper: &str, force: f64, loads: &LoadSet) -> [usize
 #[test]
 fn few_loads_of_a_part_are_left_open() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("data/parts");
-    let mut sums = [[0; 4]; 4];
+    let mut sums = [[0; 5]; 4];
     for (name, gripper) in [
         ("l_bracket.stl", "robotiq-2f85"),
         ("pocket_plate.stl", "generic"),
@@ -108,12 +119,14 @@ fn few_loads_of_a_part_are_left_open() {
         let loads = LoadSet::new(vec![ball]);
         for (force, sum) in [200.0, 50.0, 12.0, 4.0].into_iter().zip(&mut sums) {
             let count = open_loads(&part, gripper, force, &loads);
-            println!("{name}, {force} times the weight: {count:?} of loads, open, left, estimated");
+            println!(
+                "{name}, {force} times the weight: {count:?} of loads, open, left, estimated, held"
+            );
             sum.iter_mut().zip(count).for_each(|(sum, count)| *sum += count);
         }
     }
     println!("{sums:?}");
-    for [loads, open, left, estimated] in &sums[..3] {
+    for [loads, open, left, estimated, _] in &sums[..3] {
         assert!(left * 10 <= *open && estimated * 20 <= *loads, "{sums:?}");
     }
     assert!(sums[2][1] * 4 > sums[2][0], "{sums:?}");
