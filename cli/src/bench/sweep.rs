@@ -68,6 +68,7 @@ struct Steps {
     upload: Option<f64>,
     basis: Option<f64>,
     search: Option<f64>,
+    newton: Option<f64>,
     readback: Option<f64>,
     wait: f64,
     fetch: f64,
@@ -85,9 +86,8 @@ struct Scoring {
     compared: usize,
     /// Time beyond that of the seeds of the same batch.
     beyond_seeds: f64,
-    /// Time of the exact answers and of Newton's method on the adapter, where its clock ran.
+    /// Time of the exact answers, where the adapter's clock ran.
     polish: Option<f64>,
-    newton: Option<f64>,
     /// Share of the kernels' time in which the processor worked on exact answers of a block before.
     hidden: Option<f64>,
 }
@@ -408,6 +408,7 @@ impl Cell<'_> {
             upload: device(&|device| device.upload),
             basis: device(&|device| Some(device.basis)),
             search: device(&|device| Some(device.search)),
+            newton: device(&|device| Some(device.newton)),
             readback: device(&|device| device.readback),
             wait: sum(&|chunk| chunk.wait),
             fetch: sum(&|chunk| chunk.fetch),
@@ -425,7 +426,7 @@ impl Cell<'_> {
             let edges = (distinct * faces * self.contacts.edges()) as f64;
             let work = evaluation * loads + known::BASIS_EDGE * edges * twists;
             row.share = Some(Share {
-                kernels: (basis + search) / whole,
+                kernels: (basis + search + steps.newton.unwrap_or(0.0)) / whole,
                 arithmetic: self.limits.map(|most| work / (basis + search) / most.lanes),
                 memory: self.limits.map(|most| bytes / search / most.memory),
             });
@@ -472,8 +473,8 @@ impl Cell<'_> {
             solved = scored.iter().map(|scored| scored.solved).sum();
             compared = scored.iter().map(|scored| scored.compared).sum();
         }
-        let [polish, newton, hidden] = self.stop_clock();
-        let [polish, newton] = [polish, newton].map(|all| Some(all? / f64::from(runs)));
+        let [polish, hidden] = self.stop_clock();
+        let polish = polish.map(|polish| polish / f64::from(runs));
         let each = spent / f64::from(runs);
         row.scoring = Some(Scoring {
             grips,
@@ -483,7 +484,6 @@ impl Cell<'_> {
             compared,
             beyond_seeds: each - seeds_only,
             polish,
-            newton,
             hidden,
         });
         Ok(one)
@@ -497,21 +497,20 @@ impl Cell<'_> {
         Ok(())
     }
 
-    /// Seconds of exact answers and of Newton's method on the adapter since the clock was started, and
-    /// the share of the kernels' time that both have in common.
+    /// Seconds of exact answers since the clock was started, and the share of the kernels' time that both
+    /// have in common.
     #[cfg(feature = "gpu")]
-    fn stop_clock(&self) -> [Option<f64>; 3] {
-        let Backend::Gpu(gpu) = &self.place.backend else { return [None; 3] };
-        let Some(timeline) = gpu.stop_clock() else { return [None; 3] };
+    fn stop_clock(&self) -> [Option<f64>; 2] {
+        let Backend::Gpu(gpu) = &self.place.backend else { return [None; 2] };
+        let Some(timeline) = gpu.stop_clock() else { return [None; 2] };
         let polish = timeline.polish.iter().map(|span| span.seconds()).sum();
-        let newton = timeline.chunks.iter().map(|chunk| Some(chunk.device?.newton.seconds()));
         let kernels = timeline.chunks.iter().filter_map(|chunk| chunk.device);
         let (mut whole, mut common) = (0.0, 0.0);
         for span in kernels.flat_map(|device| [device.basis, device.search, device.newton]) {
             whole += span.seconds();
             common += timeline.polish.iter().map(|polish| span.common(*polish)).sum::<f64>();
         }
-        [Some(polish), newton.sum(), (whole > 0.0).then(|| common / whole)]
+        [Some(polish), (whole > 0.0).then(|| common / whole)]
     }
 
     #[cfg(not(feature = "gpu"))]
@@ -520,7 +519,7 @@ impl Cell<'_> {
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn stop_clock(&self) -> [Option<f64>; 3] {
-        [None; 3]
+    fn stop_clock(&self) -> [Option<f64>; 2] {
+        [None; 2]
     }
 }

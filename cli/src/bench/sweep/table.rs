@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Report, Row, Scoring};
+use super::{Report, Row};
 
 impl Report {
     pub(super) fn markdown(&self) -> String {
@@ -70,18 +70,18 @@ over all cores | bounds, answers apart |\n|---|---|---|---|---|---|---|---|---|-
 
     fn step_table(&self, text: &mut String) {
         let clock = if self.timestamps {
-            "Upload, basis, search and readback by the device's timestamps"
+            "Upload, basis, search, newton and readback by the device's timestamps"
         } else {
             "The adapter has no timestamps: its steps are in `wait`"
         };
         let _ = write!(
             text,
             "\nSteps of a batch on the adapter, nanoseconds a load. {clock}; make, send, wait, \
-fetch and spread by the processor's clock; newton (on the adapter) and polish: loads without bounds \
-and exact answers, nanoseconds a load of the grips scored; hidden: share of the kernels' time there in \
+fetch and spread by the processor's clock; polish: exact answers, nanoseconds a load of the grips \
+scored; hidden: share of the kernels' time there in \
 which exact answers of the block before were computed. Arithmetic and memory: share of the adapter's limit while the kernels run{}.\n\n\
-| twists | loads | contacts | loads a run | chunks | bytes a grip up | down | entries a grip | make | send | upload | basis | search | \
-readback | wait | fetch | spread | whole | newton | polish | hidden | kernels of whole | arithmetic | memory |\n\
+| twists | loads | contacts | loads a run | chunks | bytes a grip up | down | entries a grip | make | send | upload | basis | search | newton | \
+readback | wait | fetch | spread | whole | polish | hidden | kernels of whole | arithmetic | memory |\n\
 |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
             if self.limits.is_some() { "" } else { " (unknown for this one)" }
         );
@@ -93,12 +93,9 @@ readback | wait | fetch | spread | whole | newton | polish | hidden | kernels of
             let percent = |share: Option<f64>| {
                 share.map_or_else(String::new, |share| format!("{:.1} %", share * 100.0))
             };
-            let scored = |seconds: &dyn Fn(&Scoring) -> Option<f64>| {
-                let scoring = row.scoring.as_ref()?;
-                Some(seconds(scoring)? / (scoring.grips * row.loads) as f64 * loads)
-            };
-            let newton = scored(&|scoring| scoring.newton);
-            let polish = scored(&|scoring| scoring.polish);
+            let polish = row.scoring.as_ref().and_then(|scoring| {
+                Some(scoring.polish? / (scoring.grips * row.loads) as f64 * loads)
+            });
             let _ = writeln!(
                 text,
                 "| {} | {} | {} | {loads} | {} | {:.0} | {:.0} | {:.1} | {} | {} | {} | {} | {} | {} | \
@@ -115,12 +112,12 @@ readback | wait | fetch | spread | whole | newton | polish | hidden | kernels of
                 maybe(steps.upload),
                 maybe(steps.basis),
                 maybe(steps.search),
+                maybe(steps.newton),
                 maybe(steps.readback),
                 each(steps.wait),
                 each(steps.fetch),
                 each(steps.spread),
                 each(steps.whole),
-                maybe(newton),
                 maybe(polish),
                 percent(row.scoring.as_ref().and_then(|scoring| scoring.hidden)),
                 percent(row.share.as_ref().map(|share| share.kernels)),
