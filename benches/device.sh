@@ -10,7 +10,7 @@
 # entry for benches/RESULTS.md.
 #
 #   1 devices   adapter, driver, limits, subgroups, period of the timestamps
-#   2 check     both kernels against the processor's and against double precision; sizes, order,
+#   2 check     the kernels against the processor's and against double precision; sizes, order,
 #               loss of the device
 #     suite     the test suite of both backends, with the reference cases where they lie beside it
 #   3 sweep     rates by twists, loads and contacts; one core, all cores, adapter; every step and

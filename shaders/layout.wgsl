@@ -18,7 +18,11 @@ override BOUNDED: u32;
 override UNBOUNDED: u32;
 override COUPLED: u32;
 override OPEN: u32;
+override ESTIMATED: u32;
 override KINDS: u32;
+override EVERY: u32;
+override ESTIMATES: u32;
+override MODES: u32;
 override F32_TOLERANCE: f32;
 override RANGE: f32;
 override LEAST_LOAD: f32;
@@ -27,6 +31,21 @@ override LOAD_ROUNDING: f32;
 override LOAD_MARGIN: f32;
 override SWAY_CONGRUENT: f32;
 override SWAY_DIFFERENT: f32;
+override FAR_LIMIT: f32;
+override CORRECTIONS: u32;
+override PRESSURE_STEPS: u32;
+override PRESSED: f32;
+override FALL: f32;
+override SHORTER: f32;
+override QUIET: f32;
+override CONTRACTION: f32;
+override WITHIN: f32;
+override SHARP: f32;
+override HARDLY: f32;
+override LEAST_LEFT: f32;
+override STEEPEST: f32;
+override ROUNDING: f32;
+override ESTIMATE_MARGIN: f32;
 // Dispatches are two-dimensional: a workgroup's number is x + GRID y.
 override GRID: u32;
 
@@ -37,7 +56,12 @@ const NEGATED = 0x80000000u;
 // Loads of a grip that are compared at a time, and the words that hold a bit of each.
 const WINDOW = 1024u;
 const WORDS = 32u;
+// The same for Newton's method, and the loads that one entry has a bit for.
+const PART = 512u;
+const PART_WORDS = 16u;
+const BITS = 128u;
 const LARGEST = 3.4028234e38;
+const INFINITE = 0x7f800000u;
 
 struct ContactHeader {
     edges_i: u32,
@@ -88,7 +112,7 @@ struct GripRecord {
     contact: u32,
     first: u32,
     count: u32,
-    every: u32,
+    wanted: u32,
 }
 
 struct LoadRecord {

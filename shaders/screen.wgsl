@@ -95,8 +95,11 @@ fn judge(header: ContactHeader, load: LoadRecord, p: Planes, error: f32, best: B
     return Judged(seed, share);
 }
 
+// Entries lie behind the windows of all grips.
 fn append(entry: FoundRecord) {
-    let place = atomicAdd(&tally.entries, 1u);
+    let last = grips[arrayLength(&grips) - 1u];
+    let windows = last.wanted / MODES + (last.count + BITS - 1u) / BITS;
+    let place = windows + atomicAdd(&tally.entries, 1u);
     atomicAdd(&entries, 1u);
     if place < arrayLength(&found) {
         found[place] = entry;
@@ -145,7 +148,7 @@ fn screen(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
         }
         // Only these loads are written: their seeds are made again, which costs less than keeping all.
         for (var slot = lane; slot < count; slot += GROUP) {
-            if grip.every == 0u && ceilings[slot] < floor {
+            if (grip.wanted & EVERY) == 0u && ceilings[slot] < floor {
                 continue;
             }
             let listed = cases[grip.first + first + slot];
@@ -161,16 +164,16 @@ fn screen(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
             }
         }
         workgroupBarrier();
-        if lane < WORDS / 4u {
+        // What is left open is for Newton's method.
+        if lane < (count + BITS - 1u) / BITS {
             let words = vec4(
                 atomicLoad(&open[4u * lane]),
                 atomicLoad(&open[4u * lane + 1u]),
                 atomicLoad(&open[4u * lane + 2u]),
                 atomicLoad(&open[4u * lane + 3u]),
             );
-            if any(words != vec4(0u)) {
-                append(FoundRecord(words, 0.0, OPEN, first + 128u * lane, number));
-            }
+            let window = grip.wanted / MODES + first / BITS + lane;
+            found[window] = FoundRecord(words, 0.0, OPEN, first + BITS * lane, number);
         }
         workgroupBarrier();
     }

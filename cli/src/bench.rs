@@ -321,7 +321,7 @@ fn measure(
     while runs == 0 || started.elapsed() < least {
         if row.task == Task::Seed {
             // What scoring takes of the seeds; all of them, above, are compared.
-            std::hint::black_box(backend.survivors(&batch, set)?);
+            std::hint::black_box(backend.survivors_for(&batch, set, &ScoreOptions::default())?);
         } else {
             std::hint::black_box(once()?);
         }
@@ -341,7 +341,7 @@ fn traffic(backend: &Backend, row: &Row, set: &SeedSet) -> anyhow::Result<Option
         return Ok(None);
     }
     gpu.start_clock()?;
-    backend.survivors(&row.workload.batch(), set)?;
+    backend.survivors_for(&row.workload.batch(), set, &ScoreOptions::default())?;
     let chunks = gpu.stop_clock().unwrap_or_default().chunks;
     let grips = row.workload.contacts.len().max(1) as f64;
     // Not what sending takes: a software adapter holds it up.

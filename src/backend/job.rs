@@ -4,6 +4,7 @@
 use super::gpu::Gpu;
 use super::prepare::Contacts;
 use super::problem::{Batch, Seed};
+use super::score::ScoreOptions;
 use super::screen::{self, Wanted};
 use super::seeds::SeedSet;
 use crate::error::Result;
@@ -65,7 +66,8 @@ impl Backend {
     /// whatever the number of threads, and however the batch is cut or permuted.
     ///
     /// On a graphics processor loads are made in single precision and their bounds widened for that,
-    /// by a share of at most 5e-4; the seeds of loads without bounds are the processor's.
+    /// by a share of at most 5e-4; the seeds of loads without bounds are the processor's: estimates are
+    /// for [`Backend::score`] alone.
     ///
     /// # Errors
     /// A bad value for numbers that are not finite or a gripping force that is not positive;
@@ -81,8 +83,32 @@ impl Backend {
     /// # Errors
     /// As [`Backend::seed`].
     pub fn survivors(&self, batch: &Batch<'_>, seeds: &SeedSet) -> Result<Vec<Vec<(usize, Seed)>>> {
+        self.survivors_wanted(batch, seeds, Wanted::Worst)
+    }
+
+    /// The loads among which [`Backend::score`] looks for the worst one of each grip, where not all are
+    /// solved: as [`Backend::survivors`], and on a graphics processor without those that an estimate
+    /// leaves out, the others with theirs ([`super::SeedStatus::Estimated`]).
+    ///
+    /// # Errors
+    /// As [`Backend::seed`].
+    pub fn survivors_for(
+        &self,
+        batch: &Batch<'_>,
+        seeds: &SeedSet,
+        options: &ScoreOptions,
+    ) -> Result<Vec<Vec<(usize, Seed)>>> {
+        self.survivors_wanted(batch, seeds, options.wanted())
+    }
+
+    fn survivors_wanted(
+        &self,
+        batch: &Batch<'_>,
+        seeds: &SeedSet,
+        wanted: Wanted,
+    ) -> Result<Vec<Vec<(usize, Seed)>>> {
         let contacts = Contacts::new(&batch.problems)?;
-        let found = self.survivors_on(&contacts, batch, seeds, Wanted::Worst)?;
+        let found = self.survivors_on(&contacts, batch, seeds, wanted)?;
         let pairs = |(loads, seeds): (&[u32], &[Seed])| {
             loads.iter().map(|&load| load as usize).zip(seeds.iter().copied()).collect()
         };

@@ -77,8 +77,23 @@ pub const COUPLED: u32 = 3;
 
 /// [`FoundRecord::kind`]: not a seed, but up to 128 loads for the processor, a bit for each.
 pub const OPEN: u32 = 4;
+/// [`FoundRecord::kind`], [`SeedRecord::status`]: a twist from Newton's method, and bounds that allow
+/// for what single precision leaves of it.
+pub const ESTIMATED: u32 = 5;
 /// [`FoundRecord::kind`] is a status plus so many times the best twist.
 pub const KINDS: u32 = 8;
+
+/// [`GripRecord::wanted`]: every load comes back, not only those that can be the worst.
+pub const EVERY: u32 = 1;
+/// [`GripRecord::wanted`]: loads without bounds get estimates.
+pub const ESTIMATES: u32 = 2;
+/// [`GripRecord::wanted`] is a sum of these plus so many times the first window.
+pub const MODES: u32 = 4;
+
+/// Loads that one entry has a bit for.
+pub const BITS: usize = 128;
+/// Loads of a grip that Newton's method looks at together: 24 bytes of workgroup memory for each.
+pub const PART: usize = 512;
 
 /// Scaled numbers beyond this are not computed with: the load gets no bounds.
 pub const RANGE: f32 = 1e6;
@@ -106,6 +121,37 @@ pub const SWAY_CONGRUENT: f32 = 0.01;
 /// ... and for different faces such that the integral of the change over both is an eighth of
 /// [`LEAST_VARIATION`].
 pub const SWAY_DIFFERENT: f32 = 2.5e-4;
+
+/// Slip centres farther than this many circumradii from the origin are integrated along the edges by
+/// Gauss points, nearer ones by the closed forms.
+pub const FAR_LIMIT: f32 = 2.0;
+/// Evaluations of the equations of a load at most, and those of the pressure without coupling.
+pub const CORRECTIONS: u32 = 12;
+pub const PRESSURE_STEPS: u32 = 14;
+/// What the pressure without coupling may leave over, of the gripping force: it is a start.
+pub const PRESSED: f32 = 1e-3;
+/// A step must make what the equations leave over less by this share of its own; what is left of one
+/// that does not; and what is left over that may be all rounding.
+pub const FALL: f32 = 0.1;
+pub const SHORTER: f32 = 0.4;
+pub const QUIET: f32 = 1e-5;
+/// As for the processor's comparison ([`crate::mechanics`]): ratio of two steps up to which Newton's
+/// method converges for certain, and growth of the last one that bounds the way to the solution ...
+pub const CONTRACTION: f32 = 0.25;
+pub const WITHIN: f32 = 2.0;
+/// ... which need be no shorter than this share of the dissipation.
+pub const SHARP: f32 = 1e-4;
+/// Share of a pad's contact that must be left at an estimate: with less there may be further limit
+/// states.
+pub const HARDLY: f32 = 0.1;
+/// The same on the way there, and change of the pressure over the radius, in its mean on what is left, up
+/// to which it is resolved.
+pub const LEAST_LEFT: f32 = 0.02;
+pub const STEEPEST: f32 = 40.0;
+/// Rounding of an integral over what its terms are made of: some 16 roundings of `2^-24`.
+pub const ROUNDING: f32 = 1e-6;
+/// Estimates that may be off by more than this share are none.
+pub const ESTIMATE_MARGIN: f32 = 1e-2;
 
 /// [`LoadRecord::distance`] of a load whose numbers leave the range in which bounds are computed:
 /// above every distance within it.
@@ -227,8 +273,9 @@ pub struct GripRecord {
     pub first: u32,
     /// Number of loads.
     pub count: u32,
-    /// 1: all of them come back; 0: those that can be the worst.
-    pub every: u32,
+    /// [`EVERY`], [`ESTIMATES`], and ([`MODES`]) the place of the entry that says which of its first
+    /// [`BITS`] loads are open, those of the others behind it.
+    pub wanted: u32,
 }
 
 /// One load.
@@ -260,7 +307,7 @@ pub struct SeedRecord {
     pub lower: f32,
     /// Bound from the supports of the triangles at the best twist, for the unit wrench.
     pub upper: f32,
-    /// [`UNWRITTEN`], [`BOUNDED`], [`UNBOUNDED`] or [`COUPLED`].
+    /// [`UNWRITTEN`], [`BOUNDED`], [`UNBOUNDED`], [`COUPLED`] or [`ESTIMATED`].
     pub status: u32,
     /// Index of the best twist.
     pub best: u32,

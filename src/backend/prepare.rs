@@ -9,7 +9,8 @@ use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
 use super::layout::{
-    BOUNDED, COUPLED, ContactHeader, EdgeRecord, LoadRecord, OUT_OF_RANGE, SeedRecord, UNBOUNDED,
+    BOUNDED, COUPLED, ContactHeader, ESTIMATED, EdgeRecord, LoadRecord, OUT_OF_RANGE, SeedRecord,
+    UNBOUNDED,
 };
 use super::problem::{F32_TOLERANCE, Problem, Seed, SeedStatus};
 use crate::contact::{Loops, Twist};
@@ -270,6 +271,7 @@ impl Records {
         let status = match record.status {
             BOUNDED => SeedStatus::Bounded,
             COUPLED => SeedStatus::Coupled,
+            ESTIMATED => SeedStatus::Estimated,
             UNBOUNDED => SeedStatus::Unbounded,
             other => {
                 return Err(Error::device(format!(

@@ -81,6 +81,9 @@ pub enum SeedStatus {
     Coupled,
     /// A twist; no bounds.
     Unbounded,
+    /// Coupled or separated contact: a twist, and what `mu_s` lies between by an estimate in single
+    /// precision and all that it can be off.
+    Estimated,
     /// No force in the pad plane and no moment about the closing axis.
     NoLoad,
     /// A contact area is empty.

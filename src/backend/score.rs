@@ -38,6 +38,17 @@ pub struct ScoreOptions {
     pub refiner: Refiner,
 }
 
+impl ScoreOptions {
+    /// Loads that the exact answers are found among. Estimates are Newton's; and where a pad that lifts
+    /// ends a grip, each such load is to be seen.
+    pub(super) fn wanted(&self) -> Wanted {
+        match (self.separation, self.refiner) {
+            (Separation::Solve, Refiner::Newton) => Wanted::Estimated,
+            _ => Wanted::Worst,
+        }
+    }
+}
+
 /// The answer for one grip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scored {
@@ -69,7 +80,7 @@ impl Backend {
         seeds: &SeedSet,
         options: &ScoreOptions,
     ) -> Result<Vec<Scored>> {
-        let wanted = if options.polish == Polish::All { Wanted::All } else { Wanted::Worst };
+        let wanted = if options.polish == Polish::All { Wanted::All } else { options.wanted() };
         self.by_blocks((BLOCK, wanted), batch, seeds, |Block { range, contacts, survivors }| {
             cases(&contacts, &batch.problems[range], &survivors, options)
                 .into_par_iter()
@@ -215,7 +226,10 @@ impl Case<'_> {
             return work.outranked();
         }
         let has_bounds = |load: &usize| {
-            matches!(self.seeds[*load].status, SeedStatus::Bounded | SeedStatus::Coupled)
+            matches!(
+                self.seeds[*load].status,
+                SeedStatus::Bounded | SeedStatus::Coupled | SeedStatus::Estimated
+            )
         };
         let (bounded, open): (Vec<usize>, Vec<usize>) = (0..self.seeds.len()).partition(has_bounds);
         let open = self.in_turn(open, beaten.is_some());
@@ -269,7 +283,10 @@ impl Case<'_> {
         let seed = &self.seeds[load];
         let searched = matches!(
             seed.status,
-            SeedStatus::Bounded | SeedStatus::Coupled | SeedStatus::Unbounded
+            SeedStatus::Bounded
+                | SeedStatus::Coupled
+                | SeedStatus::Unbounded
+                | SeedStatus::Estimated
         );
         Options {
             separation: self.options.separation,

@@ -42,8 +42,10 @@ const TASK: usize = 1 << 11;
 pub(super) enum Wanted {
     /// All.
     All,
-    /// Those that can be the worst.
+    /// Those that can be the worst, by bounds.
     Worst,
+    /// The same, by bounds and estimates: where those of loads without bounds cost the processor no time.
+    Estimated,
 }
 
 /// The loads of each problem that are wanted, with their seeds.
@@ -69,7 +71,7 @@ pub(super) fn survivors(
         let loads = users.iter().map(|&index| batch.problems[index].wrenches.len()).sum();
         let least = (users.len() * TASK).div_ceil(usize::max(loads, 1));
         let users = users.par_iter().with_min_len(least);
-        if wanted == Wanted::Worst {
+        if wanted != Wanted::All {
             let screen = Screen::new(records, seeds);
             let one = |&index: &usize| {
                 let problem = &batch.problems[index];
@@ -118,7 +120,8 @@ pub(super) fn without_contact(problem: &Problem<'_>, index: usize) -> Result<Fou
 /// Whether a seed is that of a load which can be the worst where another one's `mu_s` is at least
 /// `floor`.
 pub(super) fn can_be_worst(seed: &Seed, floor: f64) -> bool {
-    let bounded = matches!(seed.status, SeedStatus::Bounded | SeedStatus::Coupled);
+    let bounded =
+        matches!(seed.status, SeedStatus::Bounded | SeedStatus::Coupled | SeedStatus::Estimated);
     !(bounded && seed.upper < floor)
 }
 

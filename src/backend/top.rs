@@ -6,7 +6,6 @@ use rayon::prelude::*;
 use super::job::Backend;
 use super::problem::Batch;
 use super::score::{BLOCK, Block, Case, ScoreOptions, Scored, cases, usable};
-use super::screen::Wanted;
 use super::seeds::SeedSet;
 use crate::error::Result;
 
@@ -66,7 +65,7 @@ impl Backend {
         merit: &(dyn Fn(usize, f64) -> f64 + Sync),
     ) -> Result<Vec<Scored>> {
         self.by_blocks(
-            (BLOCK, Wanted::Worst),
+            (BLOCK, options.wanted()),
             batch,
             seeds,
             |Block { range, contacts, survivors }| {

@@ -18,13 +18,19 @@ fn names(text: &str, keyword: &str) -> Vec<String> {
 
 #[test]
 fn shaders_and_their_twins_have_the_same_functions_in_the_same_order() {
-    let fan = names(include_str!("../../shaders/fan.wgsl"), "fn");
+    let mut fan = names(include_str!("../../shaders/edge.wgsl"), "fn");
+    fan.extend(names(include_str!("../../shaders/fan.wgsl"), "fn"));
     assert_eq!(fan, names(include_str!("fan.rs"), "fn"));
     let search = names(include_str!("../../shaders/search.wgsl"), "fn");
     assert_eq!(search, names(include_str!("search.rs"), "fn"));
     let screen = names(include_str!("../../shaders/screen.wgsl"), "fn");
     assert_eq!(screen, names(include_str!("gpu/twin.rs"), "fn"));
-    assert!(screen.contains(&"doubt".to_owned()));
+    let cut = names(include_str!("../../shaders/cut.wgsl"), "fn");
+    assert_eq!(cut, names(include_str!("gpu/cut.rs"), "fn"));
+    let newton = names(include_str!("../../shaders/newton.wgsl"), "fn");
+    assert_eq!(newton, names(include_str!("gpu/newton.rs"), "fn"));
+    assert!(screen.contains(&"doubt".to_owned()) && cut.contains(&"integrate".to_owned()));
+    assert!(newton.contains(&"estimate".to_owned()));
     assert!(fan.contains(&"fill_basis".to_owned()) && search.contains(&"support".to_owned()));
 }
 

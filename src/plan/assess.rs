@@ -149,6 +149,9 @@ pub struct Assessor<'a> {
 const LOADS_AT_ONCE: usize = 1 << 20;
 /// The same where the answer of every load is kept for a while, some 250 bytes each.
 const ANSWERS_AT_ONCE: usize = 1 << 17;
+/// The same of grips on planes, whose loads are not copied: so many that a graphics processor seldom
+/// waits while the last block of a call is solved.
+const PLANE_LOADS_AT_ONCE: usize = 1 << 23;
 
 impl Assessor<'_> {
     /// The grips without those under a load that the gripper may not carry, and how many fell to
@@ -198,12 +201,13 @@ impl Assessor<'_> {
         grips: Vec<Grip>,
         mut best: Option<&mut Best>,
     ) -> Result<Vec<RankedGrip>> {
-        let most = (LOADS_AT_ONCE / self.loads.len().max(1)).max(1);
+        let most = |loads: usize| (loads / self.loads.len().max(1)).max(1);
         let mut ranked = Vec::with_capacity(grips.len());
         let mut grips = grips.into_iter().peekable();
         while let Some(first) = grips.peek() {
             // Those on planes and the others by turns: mostly all of one kind.
             let curved = first.surfaces.is_some();
+            let most = most(if curved { LOADS_AT_ONCE } else { PLANE_LOADS_AT_ONCE });
             let mut block = Vec::new();
             while block.len() < most
                 && let Some(grip) = grips.next_if(|grip| grip.surfaces.is_some() == curved)

@@ -12,6 +12,7 @@ use gripfast::backend::{
     Scored, Seed, SeedSet, SeedStatus,
 };
 use gripfast::contact::{Field, Loops};
+use gripfast::geometry::patch_area;
 use gripfast::load::wrench_in_grip;
 use gripfast::mechanics::{self, Options, slip};
 use gripfast::model::{Contact, Frame, Patch, Polygon, Wrench};
@@ -22,7 +23,7 @@ use crate::support::random::Random;
 /// precision, and a graphics processor for its loads too.
 const TOLERANCE: f64 = 2.0 * F32_TOLERANCE + LOAD_TOLERANCE;
 
-fn gpu() -> Option<Backend> {
+pub(crate) fn gpu() -> Option<Backend> {
     #[cfg(feature = "gpu")]
     {
         use gripfast::backend::{ADAPTER_VARIABLE, Choice, list_adapters, select};
@@ -276,6 +277,66 @@ fn survivors_are_the_loads_that_can_be_the_worst(backend: &Backend) {
     }
     println!("left out: {left_out:?} of {loads}");
     assert!(left_out[0] > loads / 8 && left_out[1] > loads / 50, "{left_out:?}");
+}
+
+/// Where loads lift a pad: an estimate encloses the answer, and a load that is left out has one, below
+/// that of a load that is not.
+fn survivors_of_loads_that_lift_a_pad(backend: &Backend) {
+    let mut random = Random::new(53);
+    let (set, options) = (SeedSet::default(), ScoreOptions::default());
+    let [mut estimated, mut lifted, mut left_out, mut loads] = [0; 4];
+    for index in 0..60 {
+        let size = 10_f64.powf(random.range(-2.0, 0.0));
+        let contact = match index % 3 {
+            0 => random.similar(size),
+            1 => random.congruent(size),
+            _ => Arc::new(Contact { face_i: random.patch(size), face_ii: random.patch(size) }),
+        };
+        let force = 10_f64.powf(random.range(0.0, 3.0));
+        let strength = force * random.range(0.05, 0.4);
+        let point = random.vector() * size * random.range(0.3, 1.5);
+        let mut wrenches = ball(80, point);
+        for wrench in &mut wrenches {
+            *wrench = Wrench { force: wrench.force * strength, moment: wrench.moment * strength };
+        }
+        let distance = size * random.range(-1.0, 2.0);
+        let problem =
+            Problem { contact: &contact, distance, force, wrenches: &wrenches, pose: None };
+        let batch = Batch { problems: vec![problem] };
+        let found = backend.survivors_for(&batch, &set, &options).unwrap().remove(0);
+        let areas = [&contact.face_i, &contact.face_ii].map(|face| patch_area(face));
+        let scores: Vec<_> = wrenches
+            .iter()
+            .map(|wrench| {
+                mechanics::solve(&contact, distance, force, wrench, &Options::default()).unwrap()
+            })
+            .collect();
+        let mu = |load: usize| scores[load].mu_s.filter(|_| scores[load].status.holds());
+        for (load, seed) in found.iter().filter(|(_, seed)| seed.status == SeedStatus::Estimated) {
+            let known = mu(*load).is_some_and(|mu| seed.lower <= mu && mu <= seed.upper);
+            assert!(known && seed.upper <= seed.lower * 1.03, "{seed:?} {:?}", scores[*load]);
+            estimated += 1;
+        }
+        let largest = found.iter().filter_map(|&(load, _)| mu(load)).fold(0.0, f64::max);
+        for load in 0..wrenches.len() {
+            let score = &scores[load];
+            let lifts =
+                score.contact_area_i < 0.999 * areas[0] || score.contact_area_ii < 0.999 * areas[1];
+            lifted += usize::from(lifts && score.mu_s.is_some());
+            if found.iter().all(|&(other, _)| other != load) {
+                assert!(mu(load).is_some_and(|mu| mu < largest), "{load}: {score:?} {largest}");
+                left_out += usize::from(lifts);
+            }
+        }
+        loads += wrenches.len();
+    }
+    println!("{estimated} estimates; {left_out} of {lifted} lifting loads left out, {loads} loads");
+    assert!(lifted > loads / 4);
+    match backend {
+        Backend::Cpu => assert!(estimated == 0),
+        #[cfg(feature = "gpu")]
+        Backend::Gpu(_) => assert!(estimated > 40 && left_out * 2 > lifted),
+    }
 }
 
 fn seeds_start_the_solver_close(backend: &Backend) {
@@ -871,6 +932,7 @@ macro_rules! suite {
 suite!(
     bounds_enclose_the_answer,
     survivors_are_the_loads_that_can_be_the_worst,
+    survivors_of_loads_that_lift_a_pad,
     seeds_start_the_solver_close,
     few_loads_of_a_ball_are_solved,
     few_loads_of_a_ball_are_solved_on_different_faces,

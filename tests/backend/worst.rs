@@ -2,6 +2,7 @@
 //! loads solved: grips on the parts that are shipped, under loads of every kind.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use glam::DVec3;
 use gripfast::backend::{Backend, Batch, Polish, Problem, ScoreOptions, Scored, SeedSet};
@@ -10,6 +11,8 @@ use gripfast::load::{LoadSet, LoadSource, wrench_in_grip};
 use gripfast::model::{Grip, Wrench};
 use gripfast::part::{MassProperties, Part, ReadOptions};
 use gripfast::propose::{ProposeOptions, Proposer};
+
+use crate::suite;
 
 /// About this many grips of a part, evenly taken from all.
 const GRIPS: usize = 12;
@@ -45,7 +48,13 @@ impl Case {
         self.grips.iter().map(seen).collect()
     }
 
-    fn score(&self, wrenches: &[Vec<Wrench>], force: f64, polish: Polish) -> Vec<Scored> {
+    fn score(
+        &self,
+        backend: &Backend,
+        wrenches: &[Vec<Wrench>],
+        force: f64,
+        polish: Polish,
+    ) -> Vec<Scored> {
         let problems = self.grips.iter().zip(wrenches).map(|(grip, wrenches)| Problem {
             contact: &grip.contact,
             distance: grip.distance(),
@@ -55,38 +64,50 @@ impl Case {
         });
         let options = ScoreOptions { polish, ..Default::default() };
         let batch = Batch { problems: problems.collect() };
-        Backend::Cpu.score(&batch, &SeedSet::default(), &options).unwrap()
+        backend.score(&batch, &SeedSet::default(), &options).unwrap()
     }
 
-    /// Loads solved in full per grip that is held, and grips held.
+    /// Loads solved in full per grip that is held, and grips held: on the processor, and (where there
+    /// is one) on a graphics processor.
     fn compare(&self, name: &str, loads: &LoadSet, force: f64) -> (f64, usize) {
         let wrenches = self.wrenches(loads);
-        let found = self.score(&wrenches, force, Polish::Worst);
-        let expected = self.score(&wrenches, force, Polish::All);
-        let (mut held, mut solved, mut compared) = (0, 0, 0);
-        for (index, (a, b)) in found.iter().zip(&expected).enumerate() {
-            let ((load, one), (expected, all)) = (a.worst.unwrap(), b.worst.unwrap());
-            assert!(
-                load == expected && one.status == all.status,
-                "{name}, grip {index}: load {load} {one:?} instead of {expected} {all:?}"
-            );
-            assert_eq!(one.mu_s.is_some(), all.mu_s.is_some());
-            if let (Some(one), Some(all)) = (one.mu_s, all.mu_s) {
-                assert!((one / all - 1.0).abs() < 1e-9, "{name}, grip {index}: {one} {all}");
-                held += 1;
-                (solved, compared) = (solved + a.solved, compared + a.compared);
-            }
+        let expected = self.score(&Backend::Cpu, &wrenches, force, Polish::All);
+        static GPU: OnceLock<Option<Backend>> = OnceLock::new();
+        if let Some(gpu) = GPU.get_or_init(suite::gpu) {
+            let found = self.score(gpu, &wrenches, force, Polish::Worst);
+            assert_same(&format!("{name}, {force} N, graphics processor"), &found, &expected);
         }
-        let per = |count: usize| count as f64 / held.max(1) as f64;
-        println!(
-            "{name}, {force} N: {held} of {} grips held; of {} loads {:.1} solved, {:.1} compared",
-            found.len(),
-            wrenches[0].len(),
-            per(solved),
-            per(compared)
-        );
-        (per(solved), held)
+        let found = self.score(&Backend::Cpu, &wrenches, force, Polish::Worst);
+        assert_same(&format!("{name}, {force} N, processor"), &found, &expected)
     }
+}
+
+/// Loads solved in full per grip that is held, and grips held; the answers are those where all loads
+/// were.
+fn assert_same(name: &str, found: &[Scored], expected: &[Scored]) -> (f64, usize) {
+    let (mut held, mut solved, mut compared) = (0, 0, 0);
+    for (index, (a, b)) in found.iter().zip(expected).enumerate() {
+        let ((load, one), (expected, all)) = (a.worst.unwrap(), b.worst.unwrap());
+        assert!(
+            load == expected && one.status == all.status,
+            "{name}, grip {index}: load {load} {one:?} instead of {expected} {all:?}"
+        );
+        assert_eq!(one.mu_s.is_some(), all.mu_s.is_some());
+        if let (Some(one), Some(all)) = (one.mu_s, all.mu_s) {
+            assert!((one / all - 1.0).abs() < 1e-9, "{name}, grip {index}: {one} {all}");
+            held += 1;
+            (solved, compared) = (solved + a.solved, compared + a.compared);
+        }
+    }
+    let per = |count: usize| count as f64 / held.max(1) as f64;
+    println!(
+        "{name}: {held} of {} grips held; of {} loads {:.1} solved, {:.1} compared",
+        found.len(),
+        expected[0].all.len(),
+        per(solved),
+        per(compared)
+    );
+    (per(solved), held)
 }
 
 /// Loads of four kinds on a part of this mass.

@@ -179,7 +179,9 @@ fn arrows() -> Arrows {
         if parts.last().unwrap() == "mod" {
             parts.pop();
         }
-        if parts[0] == "lib" || tests.contains(&path) {
+        // And the modules within those.
+        let within = |test: &PathBuf| path == *test || path.starts_with(test.with_extension(""));
+        if parts[0] == "lib" || tests.iter().any(within) {
             continue;
         }
         let room = parts[0].clone();

@@ -10,7 +10,7 @@ use clap::Args as ClapArgs;
 
 use super::Output;
 
-/// Checks an adapter: both kernels number by number against the processor's and against double
+/// Checks an adapter: its kernels number by number against the processor's and against double
 /// precision, batches of 0 to 100,000 loads, repeated and permuted, and the loss of the device.
 #[derive(Debug, ClapArgs)]
 #[command(
@@ -71,14 +71,20 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
             if check.tolerance_holds() && check.bounded > 0 {
                 Ok(format!(
                     "bounds {:.1e} from double precision at most; tolerance {:.0e}; loads off by \
-{:.2} of the stated error at most",
-                    check.largest, check.tolerance, check.load_error
+{:.2} of the stated error at most, {} estimates of {} loads without bounds by {:.2} of theirs",
+                    check.largest,
+                    check.tolerance,
+                    check.load_error,
+                    check.estimated,
+                    check.open,
+                    check.estimate_error
                 ))
             } else {
                 Err(format!(
                     "bounds {:.1e} from double precision, tolerance {:.0e}; loads off by {:.2} of \
-the stated error: F32_TOLERANCE or LOAD_ROUNDING is too small for this adapter",
-                    check.largest, check.tolerance, check.load_error
+the stated error, estimates by {:.2} of theirs: F32_TOLERANCE, LOAD_ROUNDING or ROUNDING is too \
+small for this adapter",
+                    check.largest, check.tolerance, check.load_error, check.estimate_error
                 ))
             },
         );
@@ -149,6 +155,11 @@ the processor's from it |\n|---|---|---|---|---|---|\n";
                 "| screen, {twists} twists | another twist of equal value; another status | {}; {} \
 of {} | | | |",
                 check.other_twist, check.other_status, check.loads
+            );
+            let _ = writeln!(
+                text,
+                "| newton, {twists} twists | an estimate on one of both only | {} of {} | | | |",
+                check.other_estimate, check.open
             );
         }
         if !self.complete {

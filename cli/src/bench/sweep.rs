@@ -68,6 +68,7 @@ struct Steps {
     upload: Option<f64>,
     basis: Option<f64>,
     search: Option<f64>,
+    newton: Option<f64>,
     readback: Option<f64>,
     wait: f64,
     fetch: f64,
@@ -85,8 +86,10 @@ struct Scoring {
     compared: usize,
     /// Time beyond that of the seeds of the same batch.
     beyond_seeds: f64,
-    /// Time of the exact answers by the clock, where the adapter's clock ran.
+    /// Time of the exact answers, where the adapter's clock ran.
     polish: Option<f64>,
+    /// Share of the kernels' time in which the processor worked on exact answers of a block before.
+    hidden: Option<f64>,
 }
 
 /// How far the screen is from the adapter's limits.
@@ -152,7 +155,7 @@ impl Place {
 
     /// What scoring takes of the seeds.
     fn survivors(&self, batch: &Batch<'_>, set: &SeedSet) -> anyhow::Result<()> {
-        let run = || self.backend.survivors(batch, set);
+        let run = || self.backend.survivors_for(batch, set, &ScoreOptions::default());
         std::hint::black_box(self.pool.as_ref().map_or_else(run, |pool| pool.install(run))?);
         Ok(())
     }
@@ -405,6 +408,7 @@ impl Cell<'_> {
             upload: device(&|device| device.upload),
             basis: device(&|device| Some(device.basis)),
             search: device(&|device| Some(device.search)),
+            newton: device(&|device| Some(device.newton)),
             readback: device(&|device| device.readback),
             wait: sum(&|chunk| chunk.wait),
             fetch: sum(&|chunk| chunk.fetch),
@@ -422,7 +426,7 @@ impl Cell<'_> {
             let edges = (distinct * faces * self.contacts.edges()) as f64;
             let work = evaluation * loads + known::BASIS_EDGE * edges * twists;
             row.share = Some(Share {
-                kernels: (basis + search) / whole,
+                kernels: (basis + search + steps.newton.unwrap_or(0.0)) / whole,
                 arithmetic: self.limits.map(|most| work / (basis + search) / most.lanes),
                 memory: self.limits.map(|most| bytes / search / most.memory),
             });
@@ -469,7 +473,8 @@ impl Cell<'_> {
             solved = scored.iter().map(|scored| scored.solved).sum();
             compared = scored.iter().map(|scored| scored.compared).sum();
         }
-        let polish = self.stop_clock().map(|polish| polish / f64::from(runs));
+        let [polish, hidden] = self.stop_clock();
+        let polish = polish.map(|polish| polish / f64::from(runs));
         let each = spent / f64::from(runs);
         row.scoring = Some(Scoring {
             grips,
@@ -479,6 +484,7 @@ impl Cell<'_> {
             compared,
             beyond_seeds: each - seeds_only,
             polish,
+            hidden,
         });
         Ok(one)
     }
@@ -491,11 +497,20 @@ impl Cell<'_> {
         Ok(())
     }
 
-    /// Seconds of exact answers since the clock was started.
+    /// Seconds of exact answers since the clock was started, and the share of the kernels' time that both
+    /// have in common.
     #[cfg(feature = "gpu")]
-    fn stop_clock(&self) -> Option<f64> {
-        let Backend::Gpu(gpu) = &self.place.backend else { return None };
-        Some(gpu.stop_clock()?.polish.iter().map(|span| span.seconds()).sum())
+    fn stop_clock(&self) -> [Option<f64>; 2] {
+        let Backend::Gpu(gpu) = &self.place.backend else { return [None; 2] };
+        let Some(timeline) = gpu.stop_clock() else { return [None; 2] };
+        let polish = timeline.polish.iter().map(|span| span.seconds()).sum();
+        let kernels = timeline.chunks.iter().filter_map(|chunk| chunk.device);
+        let (mut whole, mut common) = (0.0, 0.0);
+        for span in kernels.flat_map(|device| [device.basis, device.search, device.newton]) {
+            whole += span.seconds();
+            common += timeline.polish.iter().map(|polish| span.common(*polish)).sum::<f64>();
+        }
+        [Some(polish), (whole > 0.0).then(|| common / whole)]
     }
 
     #[cfg(not(feature = "gpu"))]
@@ -504,7 +519,7 @@ impl Cell<'_> {
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn stop_clock(&self) -> Option<f64> {
-        None
+    fn stop_clock(&self) -> [Option<f64>; 2] {
+        [None; 2]
     }
 }

@@ -1,5 +1,5 @@
-//! Grips to score: on pads wholly on the faces, each with a contact of its own, or with different
-//! areas on the two faces.
+//! Grips to score: on pads wholly on the faces, each with a contact of its own, with different areas
+//! on the two faces, or under loads that lift a pad.
 
 use std::sync::Arc;
 
@@ -25,22 +25,25 @@ pub(crate) enum Contacts {
     Own,
     /// Each has its own, and its faces differ.
     Different,
+    /// The same, held so loosely that most loads lift a pad.
+    Lifting,
 }
 
 impl Contacts {
-    pub(crate) const ALL: [Self; 3] = [Self::Shared, Self::Own, Self::Different];
+    pub(crate) const ALL: [Self; 4] = [Self::Shared, Self::Own, Self::Different, Self::Lifting];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Shared => "shared",
             Self::Own => "own",
             Self::Different => "different",
+            Self::Lifting => "lifting",
         }
     }
 
     /// Faces that are integrated.
     pub(crate) fn faces(self) -> usize {
-        if self == Self::Different { 2 } else { 1 }
+        if matches!(self, Self::Different | Self::Lifting) { 2 } else { 1 }
     }
 
     /// Edges of each of them.
@@ -53,6 +56,8 @@ impl Contacts {
 pub(crate) struct Workload {
     pub(crate) contacts: Vec<Arc<Contact>>,
     list: Vec<Wrench>,
+    /// Gripping force [N].
+    force: f64,
     /// Where the centre of mass lies in each grip.
     points: Vec<DVec3>,
 }
@@ -88,9 +93,10 @@ impl Workload {
                 std::iter::repeat_n(shared, grips).collect()
             }
             Contacts::Own => own(true),
-            Contacts::Different => own(false),
+            Contacts::Different | Contacts::Lifting => own(false),
         };
-        Self { contacts, list, points: (0..grips).map(point).collect() }
+        let force = if kind == Contacts::Lifting { 3.0 } else { 40.0 };
+        Self { contacts, list, force, points: (0..grips).map(point).collect() }
     }
 
     pub(crate) fn batch(&self) -> Batch<'_> {
@@ -100,7 +106,7 @@ impl Workload {
                 .map(|(contact, &centre_of_mass)| Problem {
                     contact,
                     distance: 0.03,
-                    force: 40.0,
+                    force: self.force,
                     wrenches: &self.list,
                     pose: Some(Pose { centre_of_mass, part_from_grip: Frame::IDENTITY }),
                 })

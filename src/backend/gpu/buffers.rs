@@ -69,7 +69,7 @@ impl Gpu {
         };
         let more = written.saturating_sub(sure);
         if more > 0 {
-            answer.entries.extend(self.rest(&ticket.found, sure, more)?);
+            answer.entries.extend(self.rest(&ticket.found, ticket.windows + sure, more)?);
         }
         if let Some(clock) = &*self.clock() {
             *spans = ticket.spans;

@@ -1,14 +1,16 @@
 //! How far the kernels' single precision is from the processor's twin of them and from double
 //! precision, on whatever adapter is open.
 
+pub(super) mod estimates;
+
 use std::sync::Arc;
 
 use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 
 use super::super::lanes::Loads;
 use super::super::layout::{
-    CaseRecord, ContactHeader, EdgeRecord, FoundRecord, GripRecord, LEAST_DISSIPATION, LoadRecord,
-    OPEN, SeedRecord,
+    BITS, CaseRecord, ContactHeader, EdgeRecord, FoundRecord, GripRecord, LEAST_DISSIPATION,
+    LoadRecord, OPEN, OutcomeRecord, SeedRecord,
 };
 use super::super::prepare::{Contacts, Records};
 use super::super::screen::Wanted;
@@ -18,17 +20,18 @@ use super::super::table::{Table, contact_basis};
 use super::super::{Batch, Pose, Problem};
 use super::chunk::{Chunk, Maker, plans};
 use super::survivors::seed;
-use super::{Answer, ChunkSpans, Failure, Gpu, State, map, twin};
+use super::{Answer, ChunkSpans, Failure, Gpu, State, map, newton, twin};
 use crate::backend::{F32_TOLERANCE, SeedSet};
 use crate::contact::{Field, Loops, Twist, friction};
 use crate::error::{Error, Result};
 use crate::geometry::polygon::rings_moments;
 use crate::model::{Contact, Frame, Patch, Polygon, Wrench};
+use estimates::{Estimates, LiftingGrip};
 
 /// Largest differences of one number of a kernel.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Deviation {
-    /// `fill_basis` or `screen`.
+    /// `fill_basis`, `screen` or `newton`.
     pub kernel: &'static str,
     /// Which number, and relative to what.
     pub number: &'static str,
@@ -61,13 +64,21 @@ pub struct KernelCheck {
     pub tolerance: f64,
     /// Largest difference of a bound from double precision, on adapter or processor.
     pub largest: f64,
+    /// Loads without bounds of which Newton's method was tried.
+    pub open: usize,
+    /// Those of them with an estimate.
+    pub estimated: usize,
+    /// Loads with an estimate on one of adapter and processor only: a hair from having none.
+    pub other_estimate: usize,
+    /// Largest error of an estimate, over the margin that is stated.
+    pub estimate_error: f64,
 }
 
 impl KernelCheck {
-    /// Whether the tolerance covers every difference of a bound that was seen, and the stated error
-    /// that of every load.
+    /// Whether the tolerance covers every difference of a bound that was seen, and what is stated of
+    /// the error of every load and estimate holds.
     pub fn tolerance_holds(&self) -> bool {
-        self.largest <= self.tolerance && self.load_error <= 1.0
+        self.largest <= self.tolerance && self.load_error <= 1.0 && self.estimate_error <= 1.0
     }
 }
 
@@ -263,7 +274,10 @@ fn random_grips(contacts: usize) -> Vec<RandomGrip> {
         .collect()
 }
 
-/// What the twin of the screen says of a chunk.
+/// Loads on each contact on which estimates are looked at: each takes a chunk of a few.
+const LIFTING: usize = 40;
+
+/// What the twins say of a chunk.
 pub(super) fn twins(chunk: &Chunk, seeds: &SeedSet) -> Answer {
     let cases = cases(chunk);
     let (mut outcomes, mut entries) = (Vec::new(), Vec::new());
@@ -271,8 +285,13 @@ pub(super) fn twins(chunk: &Chunk, seeds: &SeedSet) -> Answer {
         let edges = edges(chunk, header);
         let table = Table::new(header, edges, seeds);
         let field = SearchField { header, edges, table: &table, rings: seeds.rings() };
-        let grips = chunk.grips.iter().zip(0..).filter(|(grip, _)| grip.contact == index);
-        outcomes.extend(grips.map(|grip| twin::screen(&field, grip, &cases, &mut entries)));
+        for grip in chunk.grips.iter().zip(0..).filter(|(grip, _)| grip.contact == index) {
+            let mut windows = Vec::new();
+            let bounded = twin::screen(&field, grip, &cases, (&mut windows, &mut entries));
+            let open = (windows.as_slice(), bounded.floor);
+            let all = newton::newton(&field, grip, &cases, open, &mut entries);
+            outcomes.push(OutcomeRecord { entries: bounded.entries + all.entries, ..all });
+        }
     }
     Answer { outcomes, entries }
 }
@@ -297,7 +316,7 @@ pub(super) fn by_load(
     for entry in entries.iter().filter(|entry| entry.grip == grip) {
         if entry.kind == OPEN {
             let bit = |bit: &u32| entry.words[*bit as usize / 32] >> (bit % 32) & 1 == 1;
-            all.extend((0..128).filter(bit).map(|bit| (entry.load + bit, None)));
+            all.extend((0..BITS as u32).filter(bit).map(|bit| (entry.load + bit, None)));
         } else {
             all.insert(entry.load, Some(seed(entry)));
         }
@@ -401,7 +420,7 @@ impl Compared {
         }
     }
 
-    fn check(&self) -> KernelCheck {
+    fn check(&self, estimates: &Estimates) -> KernelCheck {
         let Self { basis, bounds, .. } = self;
         let largest = bounds[..2]
             .iter()
@@ -414,6 +433,8 @@ impl Compared {
             bounds[0].of("screen", "lower bound, relative", true),
             bounds[1].of("screen", "upper bound, relative", true),
             bounds[2].of("screen", "interpolated twist, absolute", false),
+            estimates.value.of("newton", "estimate, relative", true),
+            estimates.margin.of("newton", "its margin, of the estimate", false),
         ];
         KernelCheck {
             deviations,
@@ -424,14 +445,19 @@ impl Compared {
             bounded: self.bounded,
             tolerance: F32_TOLERANCE,
             largest,
+            open: estimates.open,
+            estimated: estimates.estimated,
+            other_estimate: estimates.by_one,
+            estimate_error: estimates.of_margin,
         }
     }
 }
 
 impl Gpu {
-    /// Runs both kernels on random contacts (half of them with different faces, at no distance so
+    /// Runs the kernels on random contacts (half of them with different faces, at no distance so
     /// that friction does not couple, for double precision has no twin of that) and compares every
-    /// number with the processor's kernels and with the closed forms in double precision.
+    /// number with the processor's kernels and with the closed forms in double precision; and
+    /// Newton's method on other contacts, under loads that mostly lift a pad, with the exact solution.
     ///
     /// # Errors
     /// [`crate::error::ErrorKind::Device`] when the device fails or leaves a record unwritten.
@@ -483,7 +509,27 @@ impl Gpu {
                 }
             }
         }
-        Ok(compared.check())
+        Ok(compared.check(&self.estimates(seeds, contacts)?))
+    }
+
+    /// The estimates of loads without bounds, on so many contacts.
+    fn estimates(&self, seeds: &SeedSet, contacts: usize) -> Result<Estimates> {
+        let grips = Random(101).lifting_grips(contacts, LIFTING);
+        let problems: Vec<Problem<'_>> = grips.iter().map(LiftingGrip::problem).collect();
+        let made = Contacts::new(&problems)?;
+        let mut estimates = Estimates::default();
+        for (chunk, plan) in estimates::chunks(&made, &problems, (self.limits(), seeds)) {
+            let found = self.answer_and_basis(&chunk, seeds)?.0;
+            let twin = twins(&chunk, seeds);
+            let pieces =
+                plan.iter().flat_map(|(slot, pieces)| pieces.iter().map(move |p| (slot, p)));
+            for ((slot, piece), number) in pieces.zip(0..) {
+                let Some(pads) = &made.ready[*slot].pads else { continue };
+                let both = [&found, &twin].map(|answer| answer.entries.as_slice());
+                estimates.add(pads, &problems[piece.problem], both, number);
+            }
+        }
+        Ok(estimates)
     }
 
     /// What came of a chunk, and the basis that the first kernel left.

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::super::layout::{
-    BASIS, CaseRecord, ContactHeader, EdgeRecord, GROUP, GripRecord, OUT_OF_RANGE, WINDOW,
+    BASIS, BITS, CORRECTIONS, CaseRecord, ContactHeader, ESTIMATES, EVERY, EdgeRecord, GROUP,
+    GripRecord, MODES, OUT_OF_RANGE, PRESSURE_STEPS, WINDOW,
 };
 use super::super::prepare::{Contacts, RANGE, Records};
 use super::super::problem::Problem;
@@ -16,14 +17,21 @@ use crate::model::Wrench;
 /// Most loads that one workgroup walks over: those of a grip with more are shared by several.
 const PIECE: usize = 1 << 13;
 
-/// Steps of loops that one invocation takes at most, about: a workgroup shall not hold up the others,
-/// and Mesa's llvmpipe breaks loops off after 65,535 in all.
-const STEPS: usize = 1 << 15;
+/// Steps of loops that one invocation takes at most: a workgroup shall not hold up the others, and
+/// Mesa's llvmpipe breaks loops off after 65,535 in all.
+const STEPS: usize = 60_000;
 
-/// Most loads for one workgroup, from the steps of each: the twists, the ring and some walks round
-/// the contact.
+/// Steps of one load besides.
+const STEPS_A_LOAD: usize = 64;
+
+/// Walks round the contact for one load at most: those of the search, those of the pressure, and three
+/// steps of each edge for every evaluation of the equations.
+const WALKS: usize = 8 + PRESSURE_STEPS as usize + 3 * CORRECTIONS as usize;
+
+/// Most loads for one workgroup, from the steps of each: the twists, and walks along the edges of both
+/// faces.
 fn most_loads(twists: usize, edges: usize) -> usize {
-    (STEPS / (twists + 8 * edges + 64)).max(1) * GROUP
+    (STEPS / (twists + WALKS * edges + STEPS_A_LOAD)).max(1) * GROUP
 }
 
 /// Factors between the list and a grip beyond which its loads are the processor's: products of three
@@ -151,6 +159,8 @@ pub(crate) struct Chunk {
     /// Length of the basis array in vectors of four numbers.
     pub(super) basis: usize,
     pub(super) loads: usize,
+    /// Entries that say which loads are open, [`BITS`] of a grip in each.
+    pub(super) windows: usize,
     /// Whether every load comes back.
     pub(super) every: bool,
 }
@@ -204,7 +214,8 @@ pub(super) fn plans(
     for (slot, users) in users {
         let Some(records) = &contacts.ready[slot].records else { continue };
         let own = [records.edges.len(), basis_length(&records.header, twists)];
-        let most = most_loads(twists, records.edges.len()).min(PIECE);
+        let both = if records.header.faces == 1 { 2 } else { 1 } * records.edges.len();
+        let most = most_loads(twists, both).min(PIECE);
         let within = limits.loads.min(limits.cases).min(most);
         let mut fresh = true;
         for problem in users {
@@ -291,6 +302,11 @@ impl Maker {
         (twists, wanted): (usize, Wanted),
     ) -> Chunk {
         let mut chunk = Chunk { every: wanted == Wanted::All, ..Chunk::default() };
+        let mode = match wanted {
+            Wanted::All => EVERY,
+            Wanted::Worst => 0,
+            Wanted::Estimated => ESTIMATES,
+        };
         let before = std::mem::take(&mut self.known);
         // Where the chunk's lists begin.
         let mut places: HashMap<Key, u32> = HashMap::new();
@@ -312,7 +328,8 @@ impl Maker {
                 let mut record = grip(records, problem, list.units);
                 (record.contact, record.first) = (contact, first);
                 record.count = piece.count as u32;
-                record.every = u32::from(chunk.every);
+                record.wanted = mode + MODES * chunk.windows as u32;
+                chunk.windows += piece.count.div_ceil(BITS);
                 chunk.grips.push(record);
                 chunk.loads += piece.count;
             }

@@ -11,8 +11,9 @@ use crate::error::{Error, Result};
 pub(super) const UPLOAD: u32 = 0;
 pub(super) const BASIS: u32 = 1;
 pub(super) const SEARCH: u32 = 3;
-pub(super) const READBACK: u32 = 5;
-pub(super) const QUERIES: u32 = 6;
+pub(super) const NEWTON: u32 = 5;
+pub(super) const READBACK: u32 = 7;
+pub(super) const QUERIES: u32 = 8;
 
 /// From when to when \[s\], counted from the start of the clock.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
@@ -44,6 +45,8 @@ pub struct DeviceSpans {
     pub basis: Span,
     /// The screen.
     pub search: Span,
+    /// Newton's method on the loads without bounds.
+    pub newton: Span,
     /// Records to memory that the processor reads; `None` where timestamps are for kernels only.
     pub readback: Option<Span>,
 }
@@ -114,7 +117,8 @@ impl Clock {
             upload: if copies { span(UPLOAD, BASIS) } else { None },
             basis: span(BASIS, BASIS + 1)?,
             search: span(SEARCH, SEARCH + 1)?,
-            readback: if copies { span(SEARCH + 1, READBACK) } else { None },
+            newton: span(NEWTON, NEWTON + 1)?,
+            readback: if copies { span(NEWTON + 1, READBACK) } else { None },
         })
     }
 }

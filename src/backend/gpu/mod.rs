@@ -2,15 +2,18 @@
 //! computes, the next is uploaded and the one before read back.
 //!
 //! Up go contacts and grips, each grip a pose of some 80 bytes, and the list of loads unless it lies
-//! there already. The loads of a grip are made where they are searched. Back come eight bytes for
-//! each grip, and 32 for each load that can be its worst; loads without bounds come back as bits. No
-//! memory, there or here, grows with grips times loads.
+//! there already. The loads of a grip are made where they are searched; those without bounds get
+//! estimates from Newton's method. Back come eight bytes for each grip, and 32 for each load that can
+//! be its worst; loads with neither come back as bits. Of grips times loads grows only what says which
+//! are open, a bit for each load of a chunk.
 
 mod adapter;
 mod buffers;
 mod check;
 mod chunk;
 mod clock;
+mod cut;
+mod newton;
 mod shader;
 mod survivors;
 mod twin;
@@ -76,6 +79,7 @@ pub struct Gpu {
     queue: wgpu::Queue,
     fan: Kernel,
     screen: Kernel,
+    newton: Kernel,
     gauss: wgpu::Buffer,
     limits: Limits,
     lost: Arc<AtomicBool>,
@@ -135,6 +139,8 @@ struct Ticket {
     grips: usize,
     /// Entries that there is room for, and those that are read back in any case.
     entries: [usize; 2],
+    /// Windows in front of them.
+    windows: usize,
     found: wgpu::Buffer,
     timed: bool,
     spans: ChunkSpans,
@@ -175,6 +181,7 @@ impl Gpu {
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let fan = Kernel::new(&device, "fill_basis", shader::FAN, &shader::FAN_BINDINGS);
         let screen = Kernel::new(&device, "screen", shader::SCREEN, &shader::SCREEN_BINDINGS);
+        let newton = Kernel::new(&device, "newton", shader::NEWTON, &shader::NEWTON_BINDINGS);
         let gauss = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("gauss"),
             size: size_of_val(&GAUSS) as u64,
@@ -207,6 +214,7 @@ impl Gpu {
             queue,
             fan,
             screen,
+            newton,
             gauss,
             limits,
             lost,
@@ -430,8 +438,8 @@ impl Gpu {
         let State { seeds: known, lists, cases: on_device, slots, .. } = state;
         let slot = &mut slots[slot];
         let tally_bytes = TALLY + (chunk.grips.len() * size_of::<OutcomeRecord>()) as u64;
-        let [found_bytes, back_bytes] =
-            [room, sure].map(|count| (count * size_of::<FoundRecord>()) as u64);
+        let [found_bytes, back_bytes, window_bytes] = [chunk.windows + room, sure, chunk.windows]
+            .map(|count| (count * size_of::<FoundRecord>()) as u64);
         let basis_bytes = (chunk.basis * size_of::<[f32; 4]>()) as u64;
         let input = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let output = input | wgpu::BufferUsages::COPY_SRC;
@@ -494,16 +502,15 @@ impl Gpu {
             let (tally, found) = ((&tally, tally_bytes), (&found, found_bytes));
             let bound = [contacts, edges, twists, basis, cases, grips, tally, found];
             let screen = self.screen.bind(device, &bound);
+            let bound = [contacts, edges, twists, basis, cases, grips, tally, found, gauss];
+            let newton = self.newton.bind(device, &bound);
             let twists = seeds.len().div_ceil(super::layout::BASIS_GROUP) as u32;
             let count = chunk.grips.len() as u32;
+            let grid = [count.min(shader::GRID), count.div_ceil(shader::GRID)];
             for (kernel, bound, place, [x, y]) in [
                 (&self.fan, fan, clock::BASIS, [twists, chunk.contacts.len() as u32]),
-                (
-                    &self.screen,
-                    screen,
-                    clock::SEARCH,
-                    [count.min(shader::GRID), count.div_ceil(shader::GRID)],
-                ),
+                (&self.screen, screen, clock::SEARCH, grid),
+                (&self.newton, newton, clock::NEWTON, grid),
             ] {
                 let mut pass = encoder.begin_compute_pass(&pass(place));
                 pass.set_pipeline(&kernel.pipeline);
@@ -512,7 +519,7 @@ impl Gpu {
             }
         }
         encoder.copy_buffer_to_buffer(&tally, 0, &readback, 0, tally_bytes);
-        encoder.copy_buffer_to_buffer(&found, 0, &readback, tally_bytes, back_bytes);
+        encoder.copy_buffer_to_buffer(&found, window_bytes, &readback, tally_bytes, back_bytes);
         stamp(&mut encoder, clock::READBACK);
         if let Some((set, resolved)) = queries {
             // Places that were not written are not read either.
@@ -532,8 +539,8 @@ impl Gpu {
             grips: chunk.grips.len(),
             ..ChunkSpans::default()
         };
-        let (grips, entries) = (chunk.grips.len(), [room, sure]);
-        Ok(Ticket { submission, mapped, readback, grips, entries, found, timed, spans })
+        let (grips, entries, windows) = (chunk.grips.len(), [room, sure], chunk.windows);
+        Ok(Ticket { submission, mapped, readback, grips, entries, windows, found, timed, spans })
     }
 }
 

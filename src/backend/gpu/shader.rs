@@ -1,12 +1,16 @@
-//! The two kernels: their text, constants, binding layouts and pipelines.
+//! The kernels: their text, constants, binding layouts and pipelines.
 
 use super::super::layout;
 use super::super::problem::F32_TOLERANCE;
 
-/// What both kernels share.
+/// What all kernels share.
 pub(crate) const LAYOUT: &str = include_str!("../../../shaders/layout.wgsl");
 /// The basis kernel.
-pub(crate) const FAN: &str = include_str!("../../../shaders/fan.wgsl");
+pub(crate) const FAN: &str = concat!(
+    include_str!("../../../shaders/edge.wgsl"),
+    "\n",
+    include_str!("../../../shaders/fan.wgsl")
+);
 /// The functions that the screen searches with, and the screen.
 pub(crate) const SCREEN: &str = concat!(
     include_str!("../../../shaders/search.wgsl"),
@@ -14,12 +18,25 @@ pub(crate) const SCREEN: &str = concat!(
     include_str!("../../../shaders/screen.wgsl")
 );
 
+/// The same, and Newton's method.
+pub(crate) const NEWTON: &str = concat!(
+    include_str!("../../../shaders/search.wgsl"),
+    "\n",
+    include_str!("../../../shaders/screen.wgsl"),
+    "\n",
+    include_str!("../../../shaders/edge.wgsl"),
+    "\n",
+    include_str!("../../../shaders/cut.wgsl"),
+    "\n",
+    include_str!("../../../shaders/newton.wgsl")
+);
+
 /// Workgroups per row of a dispatch (the guaranteed least of every implementation is 65,535 per
 /// dimension).
 pub(crate) const GRID: u32 = 32_768;
 
 /// The constants that the shaders leave open, from [`layout`].
-pub(crate) fn constants() -> [(&'static str, f64); 27] {
+pub(crate) fn constants() -> [(&'static str, f64); 46] {
     [
         ("GROUP", layout::GROUP as f64),
         ("BASIS_GROUP", layout::BASIS_GROUP as f64),
@@ -47,6 +64,25 @@ pub(crate) fn constants() -> [(&'static str, f64); 27] {
         ("LOAD_MARGIN", f64::from(layout::LOAD_MARGIN)),
         ("SWAY_CONGRUENT", f64::from(layout::SWAY_CONGRUENT)),
         ("SWAY_DIFFERENT", f64::from(layout::SWAY_DIFFERENT)),
+        ("ESTIMATED", f64::from(layout::ESTIMATED)),
+        ("EVERY", f64::from(layout::EVERY)),
+        ("ESTIMATES", f64::from(layout::ESTIMATES)),
+        ("MODES", f64::from(layout::MODES)),
+        ("FAR_LIMIT", f64::from(layout::FAR_LIMIT)),
+        ("CORRECTIONS", f64::from(layout::CORRECTIONS)),
+        ("PRESSURE_STEPS", f64::from(layout::PRESSURE_STEPS)),
+        ("PRESSED", f64::from(layout::PRESSED)),
+        ("FALL", f64::from(layout::FALL)),
+        ("SHORTER", f64::from(layout::SHORTER)),
+        ("CONTRACTION", f64::from(layout::CONTRACTION)),
+        ("WITHIN", f64::from(layout::WITHIN)),
+        ("SHARP", f64::from(layout::SHARP)),
+        ("QUIET", f64::from(layout::QUIET)),
+        ("HARDLY", f64::from(layout::HARDLY)),
+        ("LEAST_LEFT", f64::from(layout::LEAST_LEFT)),
+        ("STEEPEST", f64::from(layout::STEEPEST)),
+        ("ROUNDING", f64::from(layout::ROUNDING)),
+        ("ESTIMATE_MARGIN", f64::from(layout::ESTIMATE_MARGIN)),
         ("GRID", f64::from(GRID)),
     ]
 }
@@ -75,6 +111,12 @@ pub(crate) const SCREEN_BINDINGS: [Access; 8] = [
     Access::Write,
     Access::Write,
 ];
+
+/// Bindings of Newton's method: those, and Gauss points.
+pub(crate) const NEWTON_BINDINGS: [Access; 9] = {
+    let [contacts, edges, twists, basis, cases, grips, tally, found] = SCREEN_BINDINGS;
+    [contacts, edges, twists, basis, cases, grips, tally, found, Access::Uniform]
+};
 
 /// A compiled kernel.
 #[derive(Debug)]
@@ -198,12 +240,12 @@ mod tests {
 
     #[test]
     fn records_have_the_same_offsets_in_rust_and_in_the_shaders() {
-        for text in [FAN, SCREEN] {
+        for text in [FAN, SCREEN, NEWTON] {
             let module = module(text);
             assert_same_layout!(&module, ContactHeader: edges_i, edges_ii, edges_end, basis, faces, radius, area_i, area_ii, centroid_i, centroid_ii, compliance, resolved, variation_first, variation_second, variation_slope, softness, spread, tilt, slowest, quickest, padding);
             assert_same_layout!(&module, TwistRecord: twist, ring, padding);
             assert_same_layout!(&module, CaseRecord: force, force_size, moment, moment_size);
-            assert_same_layout!(&module, GripRecord: row_1, force, row_2, moment, row_3, distance, lever, arm, contact, first, count, every);
+            assert_same_layout!(&module, GripRecord: row_1, force, row_2, moment, row_3, distance, lever, arm, contact, first, count, wanted);
             assert_same_layout!(&module, LoadRecord: wrench, scale, f3, m1, m2, distance);
             assert_same_layout!(&module, SeedRecord: twist, lower, upper, status, best, padding);
             assert_same_layout!(&module, OutcomeRecord: entries, floor);
@@ -231,14 +273,20 @@ mod tests {
         assert_eq!(fixed("NEGATED"), format!("{:#x}", super::super::super::NEGATED));
         assert_eq!(fixed("WINDOW"), layout::WINDOW.to_string());
         assert_eq!(fixed("WORDS"), (layout::WINDOW / 32).to_string());
+        assert_eq!(fixed("BITS"), layout::BITS.to_string());
+        assert_eq!(fixed("PART"), layout::PART.to_string());
+        assert_eq!(fixed("PART_WORDS"), (layout::PART / 32).to_string());
+        assert_eq!(fixed("INFINITE"), format!("{:#x}", f32::INFINITY.to_bits()));
         assert_eq!(fixed("LARGEST").parse::<f32>().unwrap(), f32::MAX);
     }
 
     #[test]
     fn bindings_are_those_of_the_shaders() {
-        for (text, bindings) in
-            [(FAN, FAN_BINDINGS.as_slice()), (SCREEN, SCREEN_BINDINGS.as_slice())]
-        {
+        for (text, bindings) in [
+            (FAN, FAN_BINDINGS.as_slice()),
+            (SCREEN, SCREEN_BINDINGS.as_slice()),
+            (NEWTON, NEWTON_BINDINGS.as_slice()),
+        ] {
             let module = module(text);
             let mut found: Vec<(u32, Access)> = module
                 .global_variables

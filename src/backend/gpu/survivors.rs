@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 use rayon::prelude::*;
 
 use super::super::cpu::Found;
-use super::super::layout::{FoundRecord, KINDS, OPEN, OutcomeRecord, SeedRecord, UNWRITTEN};
+use super::super::layout::{BITS, FoundRecord, KINDS, OPEN, OutcomeRecord, SeedRecord, UNWRITTEN};
 use super::super::prepare::{Contacts, not_searched};
 use super::super::problem::{Batch, Problem, check_grip, check_load};
 use super::super::screen::{Screen, Wanted, can_be_worst, without_contact};
@@ -60,7 +60,7 @@ impl Gpu {
             .collect::<Result<_>>()?;
         by_hand.into_iter().for_each(|(problem, kept)| add(problem, kept));
         for (found, floor) in &mut by_problem {
-            if wanted == Wanted::Worst {
+            if wanted != Wanted::All {
                 found.retain(|(_, seed)| can_be_worst(seed, *floor));
             }
             found.sort_unstable_by_key(|(load, _)| *load);
@@ -139,10 +139,10 @@ impl<'a> Job<'a> {
         let spread = Spread::new(problem.wrenches.len());
         match self.wanted {
             Wanted::All => Ok((screen.searched.found(problem, index, spread.loads(&piece))?, 0.0)),
-            Wanted::Worst if spread.is_plain() || count == problem.wrenches.len() => {
+            _ if spread.is_plain() || count == problem.wrenches.len() => {
                 screen.survivors(problem, index, first..first + count)
             }
-            Wanted::Worst => {
+            _ => {
                 let wrenches: Vec<Wrench> =
                     spread.loads(&piece).map(|load| problem.wrenches[load]).collect();
                 let some = Problem { wrenches: &wrenches, ..*problem };
@@ -227,7 +227,7 @@ impl<'a> Job<'a> {
             let first = piece.first + entry.load as usize;
             if entry.kind == OPEN {
                 let bit = |bit: &usize| entry.words[bit / 32] >> (bit % 32) & 1 == 1;
-                open.extend((0..128).filter(bit).map(|bit| spread.load(first + bit)));
+                open.extend((0..BITS).filter(bit).map(|bit| spread.load(first + bit)));
             } else {
                 found.push((spread.load(first) as u32, records.answer(&seed(entry), 1.0)?));
             }

@@ -13,6 +13,7 @@ use super::*;
 use crate::model::{Contact, Patch, Polygon, Wrench};
 use glam::{DVec2, DVec3};
 
+mod newton;
 mod screen;
 
 /// Largest difference allowed between the processor's and the shader's records, relative to values
@@ -228,11 +229,14 @@ fn the_same_loads_survive_on_both() {
     let mut random = Random(17);
     let seeds = SeedSet::default();
     // More than a window of loads each, and more than one workgroup takes.
-    for (count, loads) in [(120, 500), (9, 4000), (3, 20_000)] {
+    let sizes = [(120, 500), (9, 4000), (3, 20_000)];
+    let wanted = [Wanted::Worst, Wanted::Estimated];
+    for ((count, loads), wanted) in sizes.into_iter().flat_map(|size| wanted.map(|all| (size, all)))
+    {
         let (grips, list) = ball_grips(&mut random, count, loads);
         let problems = on_ball(&grips, &list).problems;
         let contacts = Contacts::new(&problems).unwrap();
-        let chunks = chunks(&gpu, &contacts, &problems, (&seeds, Wanted::Worst));
+        let chunks = chunks(&gpu, &contacts, &problems, (&seeds, wanted));
         let [mut kept, mut open, mut loads, mut apart] = [0; 4];
         for (answer, (chunk, _)) in answers(&gpu, &seeds, &chunks).iter().zip(&chunks) {
             let twins = twins(chunk, &seeds);
@@ -256,8 +260,9 @@ fn the_same_loads_survive_on_both() {
                 loads += grip.count as usize;
             }
         }
-        println!("{kept} of {loads} loads kept, {open} open, {apart} by one only");
+        println!("{wanted:?}: {kept} of {loads} loads kept, {open} open, {apart} by one only");
         assert!(kept > 0 && kept < (loads - open) / 4 && apart <= kept / 50 + 1);
+        assert!(wanted == Wanted::Worst || open < loads / 20, "{open}");
     }
 }
 
@@ -368,12 +373,39 @@ fn the_tolerance_of_the_bounds_holds_on_this_adapter() {
         let check = gpu.check_kernels(&seeds, 40).unwrap();
         for deviation in &check.deviations {
             println!("{deviation:?}");
-            assert!(deviation.count > 0 && deviation.from_twin < 2e-5, "{deviation:?}");
+            // A margin holds twice the last step, which may be rounding.
+            let most = if deviation.number.contains("margin") { 5e-3 } else { 2e-5 };
+            assert!(deviation.count > 0 && deviation.from_twin < most, "{deviation:?}");
         }
         println!("{} twists: {:.1e} of {:.1e}", seeds.len(), check.largest, check.tolerance);
         assert!(check.tolerance_holds() && check.largest > 0.0, "{check:?}");
         assert!(check.bounded > check.loads / 3, "{check:?}");
+        assert!(check.estimated > check.open / 3 && check.open > 200, "{check:?}");
+        assert!(check.other_estimate <= check.open / 50 && check.estimate_error > 0.0, "{check:?}");
         assert!(check.other_status + check.other_twist <= check.loads / 200, "{check:?}");
+    }
+}
+
+/// The kernels ask for no more than every implementation has.
+#[test]
+fn the_least_limits_are_enough_for_the_kernels() {
+    if gpu(true).is_none() {
+        return;
+    }
+    let adapter = adapter::choose(None).or_else(|_| adapter::choose(Some("0"))).unwrap();
+    let descriptor =
+        wgpu::DeviceDescriptor { required_limits: wgpu::Limits::default(), ..Default::default() };
+    let (device, _) = pollster::block_on(adapter.request_device(&descriptor)).unwrap();
+    let kernels: [(&str, &str, &[shader::Access]); 3] = [
+        ("fill_basis", shader::FAN, &shader::FAN_BINDINGS),
+        ("screen", shader::SCREEN, &shader::SCREEN_BINDINGS),
+        ("newton", shader::NEWTON, &shader::NEWTON_BINDINGS),
+    ];
+    for (name, text, bindings) in kernels {
+        let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        Kernel::new(&device, name, text, bindings);
+        let error = pollster::block_on(scope.pop());
+        assert!(error.is_none(), "{name}: {error:?}");
     }
 }
 

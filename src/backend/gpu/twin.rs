@@ -4,9 +4,9 @@
 
 use super::super::lanes::{LANES, Loads, cross, dot, larger, smaller};
 use super::super::layout::{
-    CaseRecord, FoundRecord, GripRecord, KINDS, LEAST_LOAD, LOAD_MARGIN, LOAD_ROUNDING, LoadRecord,
-    MOST_PULL, OPEN, OutcomeRecord, RANGE, SWAY_CONGRUENT, SWAY_DIFFERENT, SeedRecord, UNBOUNDED,
-    WINDOW,
+    BITS, CaseRecord, EVERY, FoundRecord, GripRecord, KINDS, LEAST_LOAD, LOAD_MARGIN,
+    LOAD_ROUNDING, LoadRecord, MOST_PULL, OPEN, OutcomeRecord, RANGE, SWAY_CONGRUENT,
+    SWAY_DIFFERENT, SeedRecord, UNBOUNDED, WINDOW,
 };
 use super::super::problem::F32_TOLERANCE;
 use super::super::search::{Field, Planes};
@@ -121,12 +121,13 @@ pub(crate) fn append(entries: &mut Vec<FoundRecord>, entry: FoundRecord) {
     entries.push(entry);
 }
 
-/// The loads of the grip with this `number` that can be its worst, or every one.
+/// The loads of the grip with this `number` that can be its worst, or every one: their seeds, or a bit
+/// of a window for one left open.
 pub(crate) fn screen(
     field: &Field<'_>,
     (grip, number): (&GripRecord, u32),
     cases: &[CaseRecord],
-    found: &mut Vec<FoundRecord>,
+    (windows, found): (&mut Vec<FoundRecord>, &mut Vec<FoundRecord>),
 ) -> OutcomeRecord {
     let (before, tolerance) = (found.len(), F32_TOLERANCE as f32);
     let mut floor = 0.0;
@@ -148,10 +149,10 @@ pub(crate) fn screen(
         for (seed, _) in judged.iter().filter(|(_, share)| *share < f32::MAX) {
             floor = larger(seed.lower * (1.0 - tolerance), floor);
         }
-        let mut open = [[0_u32; 4]; WINDOW / 128];
+        let mut open = [[0_u32; 4]; WINDOW / BITS];
         for (slot, (seed, share)) in judged.iter().enumerate() {
             let bounded = *share < f32::MAX;
-            if grip.every == 0 && bounded && seed.upper * (1.0 + tolerance) < floor {
+            if grip.wanted & EVERY == 0 && bounded && seed.upper * (1.0 + tolerance) < floor {
                 continue;
             }
             if *share <= LOAD_MARGIN {
@@ -167,14 +168,12 @@ pub(crate) fn screen(
                     },
                 );
             } else {
-                open[slot / 128][slot % 128 / 32] |= 1 << (slot % 32);
+                open[slot / BITS][slot % BITS / 32] |= 1 << (slot % 32);
             }
         }
-        for (part, words) in (0..).zip(open) {
-            if words != [0; 4] {
-                let load = first + 128 * part;
-                append(found, FoundRecord { words, upper: 0.0, kind: OPEN, load, grip: number });
-            }
+        for (part, words) in (0..).zip(open).take(window.len().div_ceil(BITS)) {
+            let load = first + BITS as u32 * part;
+            windows.push(FoundRecord { words, upper: 0.0, kind: OPEN, load, grip: number });
         }
     }
     OutcomeRecord { entries: (found.len() - before) as u32 + 1, floor }

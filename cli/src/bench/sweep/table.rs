@@ -70,7 +70,7 @@ over all cores | bounds, answers apart |\n|---|---|---|---|---|---|---|---|---|-
 
     fn step_table(&self, text: &mut String) {
         let clock = if self.timestamps {
-            "Upload, basis, search and readback by the device's timestamps"
+            "Upload, basis, search, newton and readback by the device's timestamps"
         } else {
             "The adapter has no timestamps: its steps are in `wait`"
         };
@@ -78,10 +78,11 @@ over all cores | bounds, answers apart |\n|---|---|---|---|---|---|---|---|---|-
             text,
             "\nSteps of a batch on the adapter, nanoseconds a load. {clock}; make, send, wait, \
 fetch and spread by the processor's clock; polish: exact answers, nanoseconds a load of the grips \
-scored. Arithmetic and memory: share of the adapter's limit while the kernels run{}.\n\n\
-| twists | loads | contacts | loads a run | chunks | bytes a grip up | down | entries a grip | make | send | upload | basis | search | \
-readback | wait | fetch | spread | whole | polish | kernels of whole | arithmetic | memory |\n\
-|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+scored; hidden: share of the kernels' time there in \
+which exact answers of the block before were computed. Arithmetic and memory: share of the adapter's limit while the kernels run{}.\n\n\
+| twists | loads | contacts | loads a run | chunks | bytes a grip up | down | entries a grip | make | send | upload | basis | search | newton | \
+readback | wait | fetch | spread | whole | polish | hidden | kernels of whole | arithmetic | memory |\n\
+|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
             if self.limits.is_some() { "" } else { " (unknown for this one)" }
         );
         for row in &self.rows {
@@ -98,7 +99,7 @@ readback | wait | fetch | spread | whole | polish | kernels of whole | arithmeti
             let _ = writeln!(
                 text,
                 "| {} | {} | {} | {loads} | {} | {:.0} | {:.0} | {:.1} | {} | {} | {} | {} | {} | {} | \
-{} | {} | {} | {} | {} | {} | {} | {} |",
+{} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
                 row.twists,
                 row.loads,
                 row.contacts,
@@ -111,12 +112,14 @@ readback | wait | fetch | spread | whole | polish | kernels of whole | arithmeti
                 maybe(steps.upload),
                 maybe(steps.basis),
                 maybe(steps.search),
+                maybe(steps.newton),
                 maybe(steps.readback),
                 each(steps.wait),
                 each(steps.fetch),
                 each(steps.spread),
                 each(steps.whole),
                 maybe(polish),
+                percent(row.scoring.as_ref().and_then(|scoring| scoring.hidden)),
                 percent(row.share.as_ref().map(|share| share.kernels)),
                 percent(row.share.as_ref().and_then(|share| share.arithmetic)),
                 percent(row.share.as_ref().and_then(|share| share.memory)),
