@@ -2,7 +2,7 @@
 
 use glam::{DAffine2, DMat2, DVec2};
 
-use super::quadric::{Quadratic, Region};
+use super::quadric::{Quadratic, Region, area_and_load};
 use crate::geometry::{
     Bounds2, clip_ring_convex, intersect_convex, is_convex, ring_area, transform,
 };
@@ -165,12 +165,20 @@ impl Field {
     /// The part with compression `u = delta - gap + tilt . x > 0`. On a curve the tilt acts where
     /// the surface is highest; that the contact rolls away from there is left out.
     pub(crate) fn pressed(&self, delta: f64, tilt: DVec2) -> Region {
-        let u = Quadratic {
+        Region::new(&self.rings, self.compression(delta, tilt))
+    }
+
+    /// Area of that part, and the integral of the compression over it.
+    pub(crate) fn area_and_load(&self, delta: f64, tilt: DVec2) -> (f64, f64) {
+        area_and_load(&self.rings, &self.compression(delta, tilt))
+    }
+
+    fn compression(&self, delta: f64, tilt: DVec2) -> Quadratic {
+        Quadratic {
             c: delta + tilt.dot(self.origin) - self.gap.c,
             g: self.inward(self.felt(tilt)) - self.gap.g,
             l: -self.gap.l,
-        };
-        Region::new(&self.rings, u)
+        }
     }
 
     /// Smallest gap less tilt over the polygon's corners and the axes' origin: about where contact
