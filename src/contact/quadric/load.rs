@@ -5,7 +5,8 @@
 //! Where it bends along one axis, the integral across the crest is a cubic inside and a power of the
 //! place along the crest outside. Where it is linear, the polygon is cut along a line.
 //!
-//! Against quadrature over the same parts: within 2e-13 of the load (test).
+//! Measured against integrals line by line: within 1e-12 of area and load; of slivers the area is that
+//! of [`Region`], which counts a little more.
 
 use glam::DVec2;
 
@@ -14,7 +15,7 @@ use crate::model::Ring;
 
 /// Share of what the edges add, sign left out, below which rounding shows: such slivers are
 /// integrated over their own points.
-const SLIVER: f64 = 1e-2;
+const SLIVER: f64 = 1e-3;
 
 /// Area of the part of `rings` where `u` is positive, and `int u dA` over it.
 pub(crate) fn area_and_load(rings: &[Ring], u: &Quadratic) -> (f64, f64) {
@@ -85,8 +86,8 @@ fn disc(rings: &[Ring], u: &Quadratic) -> Option<(f64, f64)> {
             let [mut enters, mut leaves] = [1.0; 2];
             if inside > 0.0 {
                 let root = inside.sqrt();
-                let [low, high] = [-towards - root, -towards + root].map(|t| t / length);
-                [enters, leaves] = [low.clamp(0.0, 1.0), high.clamp(0.0, 1.0)];
+                enters = ((-towards - root) / length).clamp(0.0, 1.0);
+                leaves = ((-towards + root) / length).clamp(0.0, 1.0);
             }
             if enters < leaves {
                 let at = |t: f64| if t == 0.0 { a } else { a + t * step };

@@ -67,6 +67,8 @@ pub(super) struct FaceDissipation {
 const STEPS: u32 = 200;
 /// Share of a force that rounding may leave.
 const ROUNDING: f64 = 1e-13;
+/// Share of it below which nothing is gained.
+const EXACT: f64 = 2e-16;
 
 impl Face {
     pub(super) fn new(pieces: &[Piece], stiffness: f64, sign: f64) -> Self {
@@ -134,11 +136,30 @@ impl Face {
 
     /// The pressure that carries `load` at a tilt; `start`: a compression near that of the pad's plane.
     pub(super) fn carry(&self, load: f64, tilt: DVec2, start: Option<f64>) -> Option<Pressed<'_>> {
-        let delta = self.carrying(load, tilt, start, 2e-16)?;
-        let regions: Vec<Region> =
-            self.fields.iter().map(|field| field.pressed(delta, self.sign * tilt)).collect();
+        let delta = self.carrying(load, tilt, start, EXACT)?;
+        let regions = self.regions(delta, tilt);
         let area = regions.iter().map(|region| region.area_and_load().0).sum();
         Some(self.measure(delta, tilt, regions, load, area))
+    }
+
+    fn regions(&self, delta: f64, tilt: DVec2) -> Vec<Region> {
+        self.fields.iter().map(|field| field.pressed(delta, self.sign * tilt)).collect()
+    }
+
+    /// The compression of [`Self::carry`] without tilt, and what it presses.
+    pub(super) fn squeezed(&self, load: f64) -> Option<(f64, Vec<Region>)> {
+        let delta = self.squeeze(load)?;
+        Some((delta, self.regions(delta, DVec2::ZERO)))
+    }
+
+    /// Greatest pressure on regions \[Pa\].
+    pub(super) fn greatest(&self, regions: &[Region]) -> f64 {
+        self.stiffness * regions.iter().map(Region::greatest).fold(0.0, f64::max)
+    }
+
+    /// The compression of [`Self::carry`] without tilt.
+    pub(super) fn squeeze(&self, load: f64) -> Option<f64> {
+        self.carrying(load, DVec2::ZERO, None, EXACT)
     }
 
     /// The compression at the pad's plane that carries `load` without tilt, looked for from `start` on
