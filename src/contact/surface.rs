@@ -374,11 +374,12 @@ const FEW_SIDES: usize = 8;
 
 /// Lets a ring begin where [`intersect_convex`] would: before its leftmost corner.
 fn begin(ring: &mut Ring) {
-    let place = |index: &usize| (ring[*index].x, ring[*index].y);
-    let leftmost = (0..ring.len()).min_by(|a, b| {
-        let (a, b) = (place(a), place(b));
-        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
-    });
+    // Of two at one place along the first axis but for rounding, the lower one.
+    let left = ring.iter().map(|x| x.x).fold(f64::INFINITY, f64::min);
+    let same = left + 1e-12 * Bounds2::of(&*ring).size().max_element();
+    let leftmost = (0..ring.len())
+        .filter(|&index| ring[index].x <= same)
+        .min_by(|&a, &b| ring[a].y.total_cmp(&ring[b].y));
     if let Some(leftmost) = leftmost {
         let before = (leftmost + ring.len() - 1) % ring.len();
         ring.rotate_left(before);

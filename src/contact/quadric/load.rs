@@ -19,7 +19,12 @@ const SLIVER: f64 = 1e-3;
 
 /// Area of the part of `rings` where `u` is positive, and `int u dA` over it.
 pub(crate) fn area_and_load(rings: &[Ring], u: &Quadratic) -> (f64, f64) {
-    let sums = match (u.l.x < 0.0, u.l.y < 0.0) {
+    closed(rings, u).unwrap_or_else(|| Region::new(rings, *u).area_and_load())
+}
+
+/// The same, but for slivers and for what bends up.
+fn closed(rings: &[Ring], u: &Quadratic) -> Option<(f64, f64)> {
+    match (u.l.x < 0.0, u.l.y < 0.0) {
         (true, true) => disc(rings, u),
         (false, true) if u.l.x == 0.0 => crest(rings, u, |x| x),
         (true, false) if u.l.y == 0.0 => {
@@ -30,8 +35,7 @@ pub(crate) fn area_and_load(rings: &[Ring], u: &Quadratic) -> (f64, f64) {
         }
         _ if u.l == DVec2::ZERO => plane(rings, u),
         _ => None,
-    };
-    sums.unwrap_or_else(|| Region::new(rings, *u).area_and_load())
+    }
 }
 
 /// Sums over edges, with their sizes.

@@ -36,6 +36,9 @@ const NEAREST: usize = 3;
 const STEPS: u32 = 40;
 const LONGEST: f64 = 0.15;
 const SHORTEST: f64 = 1e-6;
+/// Most steps after which corners take turns again, and how near two directions are one then.
+const PERIODS: usize = 4;
+const SAME: f64 = 1e-15;
 /// A last step this short still is an answer \[rad\]: corners in turn, each with a fit of its own.
 const SETTLED: f64 = 3e-3;
 /// Share of the width by which the radii of two crests may differ from it for the direction to be
@@ -317,7 +320,26 @@ impl Finder<'_> {
             }
             _ => self.size,
         };
-        for step in 0..STEPS {
+        let mut step = 0;
+        let mut before = [(ends, closing, width); PERIODS];
+        while step < STEPS {
+            // Where corners take turns the last step is one of those before.
+            let state = (ends, closing, width);
+            let again = |&period: &usize| {
+                let known = before[(step as usize + PERIODS - period) % PERIODS];
+                known.0 == ends && known.1.distance(closing) < SAME && known.2 == width
+            };
+            let periods = 2..=PERIODS.min(step as usize);
+            if let Some(period) = periods.clone().find(again) {
+                let left = (STEPS - 1 - step) as usize % period;
+                if left > 0 {
+                    let known = step as usize - period + left;
+                    (ends, closing, width) = before[known % PERIODS];
+                }
+                step = STEPS - 1;
+            } else {
+                before[step as usize % PERIODS] = state;
+            }
             let [one, two] = &mut ends;
             let places = [
                 self.facing_end(one, closing, width, net)?,
@@ -358,6 +380,7 @@ impl Finder<'_> {
                 return (size < SETTLED && off < ASIDE).then_some(pair);
             }
             closing = (closing + u * turned.x + v * turned.y).normalize();
+            step += 1;
         }
         None
     }
