@@ -244,7 +244,7 @@ mod tests {
         assert_eq!(found.iter().map(|ring| ring_area(ring)).collect::<Vec<_>>(), [1.0; 3]);
         // All of it, all of the window, and neither.
         let large = [(-1., -1.), (9., -1.), (9., 9.), (-1., 9.)].map(|(x, y)| DVec2::new(x, y));
-        assert_eq!(within_window(&comb, &large).unwrap(), [comb.clone()]);
+        assert_eq!(within_window(&comb, &large).unwrap(), std::slice::from_ref(&comb));
         let small = [(0.2, 0.2), (0.8, 0.2), (0.5, 0.8)].map(|(x, y)| DVec2::new(x, y));
         assert_eq!(within_window(&comb, &small).unwrap(), [small.to_vec()]);
         // An edge along a side of it, a hair inside or outside of the ring.
