@@ -176,20 +176,23 @@ impl Tree {
     }
 
     /// Children of an inner node; `None` for a leaf.
+    #[inline]
     pub(crate) fn children(&self, node: u32) -> Option<[u32; 2]> {
         let right = self.shape.nodes[node as usize].right;
         (right != 0).then_some([node + 1, right])
     }
 
     /// Middle and half sizes of a node's box.
+    #[inline]
     pub(crate) fn bounds(&self, node: u32) -> (DVec3, DVec3) {
-        let [low, high] = self.boxes[node as usize].map(|corner| {
-            DVec3::new(f64::from(corner[0]), f64::from(corner[1]), f64::from(corner[2]))
-        });
+        let [a, b] = &self.boxes[node as usize];
+        let low = DVec3::new(f64::from(a[0]), f64::from(a[1]), f64::from(a[2]));
+        let high = DVec3::new(f64::from(b[0]), f64::from(b[1]), f64::from(b[2]));
         ((low + high) / 2.0, (high - low) / 2.0)
     }
 
     /// A vertex of some triangle under the node.
+    #[inline]
     pub(crate) fn witness(&self, node: u32) -> DVec3 {
         self.vertex(self.shape.corners[self.shape.nodes[node as usize].first as usize][0])
     }
@@ -198,7 +201,8 @@ impl Tree {
     pub(crate) fn triangles(&self, node: u32) -> impl Iterator<Item = (u32, [DVec3; 3])> + '_ {
         let node = self.shape.nodes[node as usize];
         (node.first as usize..(node.first + node.count) as usize).map(|index| {
-            (self.shape.order[index], self.shape.corners[index].map(|vertex| self.vertex(vertex)))
+            let [a, b, c] = self.shape.corners[index];
+            (self.shape.order[index], [self.vertex(a), self.vertex(b), self.vertex(c)])
         })
     }
 
@@ -214,9 +218,11 @@ impl Tree {
 
     /// Corners of the triangle at this place in the tree's order.
     pub(crate) fn triangle(&self, place: u32) -> [DVec3; 3] {
-        self.shape.corners[place as usize].map(|vertex| self.vertex(vertex))
+        let [a, b, c] = self.shape.corners[place as usize];
+        [self.vertex(a), self.vertex(b), self.vertex(c)]
     }
 
+    #[inline]
     fn vertex(&self, vertex: u32) -> DVec3 {
         self.axes_from_part * self.shape.vertices[vertex as usize]
     }

@@ -15,6 +15,8 @@ use std::sync::LazyLock;
 
 use glam::DVec2;
 
+pub(crate) use load::area_and_load;
+
 use super::far::RULES;
 use super::lanes::{LANES, Lane, total, totals, widest};
 use crate::geometry::polygon::ring_contains;
@@ -412,7 +414,7 @@ impl Region {
 
     /// Area and `int u dA`.
     pub fn area_and_load(&self) -> (f64, f64) {
-        area_and_load(self)
+        sums(self)
     }
 
     /// `int f q dA` for `f` of `u`, `1`, `x1`, `x2` (rows) and `q` of `1`, `x1`, `x2`, `x x grad gap`.
@@ -530,11 +532,11 @@ impl Iterator for Rows<'_> {
 
 widest! {
     /// See [`Region::area_and_load`].
-    fn area_and_load(region: &Region) -> (f64, f64) = area_and_load_in
+    fn sums(region: &Region) -> (f64, f64) = sums_in
 }
 
 #[inline(always)]
-fn area_and_load_in(region: &Region) -> (f64, f64) {
+fn sums_in(region: &Region) -> (f64, f64) {
     let (mut area, mut load) = ([0.0; LANES], [0.0; LANES]);
     for [x, y, weights] in region.rows() {
         for i in 0..LANES {
@@ -589,5 +591,6 @@ fn roots(c: f64, b: f64, a: f64) -> [Option<f64>; 2] {
 
 mod area;
 mod edge;
+mod load;
 #[cfg(test)]
 mod tests;

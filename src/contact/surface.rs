@@ -1,10 +1,12 @@
 //! Contacts as they are: pieces of surface under a pad, each with its gap above the pad plane.
 
+use std::sync::LazyLock;
+
 use glam::{DAffine2, DMat2, DVec2};
 
-use super::quadric::{Quadratic, Region};
+use super::quadric::{Quadratic, Region, area_and_load};
 use crate::geometry::{
-    Bounds2, clip_ring_convex, intersect_convex, is_convex, ring_area, transform,
+    Bounds2, clip_ring_convex, intersect_convex, is_convex, ring_area, transform, within_window,
 };
 use crate::model::{Patch, Polygon, Ring};
 
@@ -165,12 +167,20 @@ impl Field {
     /// The part with compression `u = delta - gap + tilt . x > 0`. On a curve the tilt acts where
     /// the surface is highest; that the contact rolls away from there is left out.
     pub(crate) fn pressed(&self, delta: f64, tilt: DVec2) -> Region {
-        let u = Quadratic {
+        Region::new(&self.rings, self.compression(delta, tilt))
+    }
+
+    /// Area of that part, and the integral of the compression over it.
+    pub(crate) fn area_and_load(&self, delta: f64, tilt: DVec2) -> (f64, f64) {
+        area_and_load(&self.rings, &self.compression(delta, tilt))
+    }
+
+    fn compression(&self, delta: f64, tilt: DVec2) -> Quadratic {
+        Quadratic {
             c: delta + tilt.dot(self.origin) - self.gap.c,
             g: self.inward(self.felt(tilt)) - self.gap.g,
             l: -self.gap.l,
-        };
-        Region::new(&self.rings, u)
+        }
     }
 
     /// Smallest gap less tilt over the polygon's corners and the axes' origin: about where contact
@@ -250,7 +260,8 @@ pub(crate) fn spot(piece: &Piece, stiffness: f64, force: f64) -> Option<f64> {
         let way = x - at;
         DVec2::new(axis.dot(way) / half[0], axis.perp_dot(way) / half[1])
     };
-    let mut turned = 0.0;
+    // How often the outline goes round it: passes of the negative first axis.
+    let mut turns = 0;
     let mut from = place(*piece.outer.last()?);
     for corner in &piece.outer {
         let to = place(*corner);
@@ -260,14 +271,21 @@ pub(crate) fn spot(piece: &Piece, stiffness: f64, force: f64) -> Option<f64> {
         if (from + along * edge).length_squared() < 1.0 {
             return None;
         }
-        turned += from.angle_to(to);
+        let turn = from.perp_dot(to);
+        turns += i32::from(from.y >= 0.0 && to.y < 0.0 && turn > 0.0);
+        turns -= i32::from(from.y < 0.0 && to.y >= 0.0 && turn < 0.0);
         from = to;
     }
-    (turned.abs() > std::f64::consts::PI).then_some(height + deep)
+    (turns != 0).then_some(height + deep)
 }
 
 /// Sides of the polygon in place of an ellipse, of equal area.
 const SIDES: usize = 48;
+/// Its corners on the circle.
+static CIRCLE: LazyLock<[DVec2; SIDES]> = LazyLock::new(|| {
+    let step = std::f64::consts::TAU / SIDES as f64;
+    std::array::from_fn(|k| DVec2::from_angle(step * k as f64))
+});
 
 /// The part of a piece whose gap is less than `delta`: what a layer compressed so far presses.
 /// Ellipses are polygons of the same area, so that this is for pictures and first estimates.
@@ -321,14 +339,12 @@ pub(crate) fn pressed(piece: &Piece, delta: f64) -> Patch {
                 return Patch::new();
             }
             let step = std::f64::consts::TAU / SIDES as f64;
+            // For the area of the ellipse.
             let grown = (step / step.sin()).sqrt();
             let half = radii.map(|radius| grown * (2.0 * radius * (delta - height)).sqrt());
             let axis = axis.normalize();
-            let corner = |k: usize| {
-                let e = DVec2::from_angle(step * k as f64);
-                at + half[0] * e.x * axis + half[1] * e.y * axis.perp()
-            };
-            vec![(0..SIDES).map(corner).collect()]
+            let corner = |e: &DVec2| at + half[0] * e.x * axis + half[1] * e.y * axis.perp();
+            vec![CIRCLE.iter().map(corner).collect()]
         }
         Gap::Cone { radius, slope, axis, at, height } => {
             if slope == 0.0 {
@@ -353,13 +369,46 @@ pub(crate) fn pressed(piece: &Piece, delta: f64) -> Patch {
     windows.iter().flat_map(|window| cut(piece, window)).collect()
 }
 
+/// Sides of a window up to which convex rings are clipped by one after the other.
+const FEW_SIDES: usize = 8;
+
+/// Lets a ring begin where [`intersect_convex`] would: before its leftmost corner.
+fn begin(ring: &mut Ring) {
+    // Of two at one place along the first axis but for rounding, the lower one.
+    let left = ring.iter().map(|x| x.x).fold(f64::INFINITY, f64::min);
+    let same = left + 1e-12 * Bounds2::of(&*ring).size().max_element();
+    let leftmost = (0..ring.len())
+        .filter(|&index| ring[index].x <= same)
+        .min_by(|&a, &b| ring[a].y.total_cmp(&ring[b].y));
+    if let Some(leftmost) = leftmost {
+        let before = (leftmost + ring.len() - 1) % ring.len();
+        ring.rotate_left(before);
+    }
+}
+
 /// The outline of a piece within a convex counter-clockwise ring.
 pub(crate) fn cut(piece: &Piece, window: &[DVec2]) -> Patch {
-    if piece.holes.is_empty() && is_convex(&piece.outer) {
-        let outer = clip_ring_convex(&piece.outer, window);
-        let size = Bounds2::of(&outer).size().max_element();
-        let solid = outer.len() >= 3 && ring_area(&outer) > 1e-9 * size * size;
-        return if solid { vec![Polygon { outer, holes: Vec::new() }] } else { Patch::new() };
+    if !Bounds2::of(&piece.outer).meets(Bounds2::of(window)) {
+        return Patch::new();
+    }
+    let solid = |outer: &Ring| {
+        let size = Bounds2::of(outer).size().max_element();
+        outer.len() >= 3 && ring_area(outer) > 1e-9 * size * size
+    };
+    if piece.holes.is_empty() {
+        let clipped = || vec![clip_ring_convex(&piece.outer, window)];
+        let found = match is_convex(&piece.outer) {
+            true if window.len() <= FEW_SIDES => Some(clipped()),
+            true => within_window(&piece.outer, window).or_else(|| Some(clipped())),
+            false => within_window(&piece.outer, window).map(|mut rings| {
+                rings.iter_mut().for_each(begin);
+                rings
+            }),
+        };
+        if let Some(rings) = found {
+            let rings = rings.into_iter().filter(solid);
+            return rings.map(|outer| Polygon { outer, holes: Vec::new() }).collect();
+        }
     }
     intersect_convex(window, &[piece.polygon()])
 }

@@ -52,6 +52,25 @@ pub fn is_convex(ring: &[DVec2]) -> bool {
     if ring.len() < 3 {
         return false;
     }
+    // Turning left all the way, the edges pass from below to above once for each full turn.
+    let (mut a, mut b) = (ring[ring.len() - 2], ring[ring.len() - 1]);
+    let mut rises = 0;
+    for &c in ring {
+        let turn = orient(a, b, c);
+        if turn < 0.0 {
+            return false;
+        }
+        if turn == 0.0 {
+            return winds_once(ring);
+        }
+        rises += u32::from(b.y < a.y && c.y >= b.y);
+        (a, b) = (b, c);
+    }
+    rises == 1
+}
+
+/// The same by the sum of all turns: edges along one line may lead back.
+fn winds_once(ring: &[DVec2]) -> bool {
     let next = |index: usize| ring[index % ring.len()];
     let mut turns = 0.0;
     for index in 0..ring.len() {

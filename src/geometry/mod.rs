@@ -13,6 +13,7 @@ mod paraboloid;
 pub mod polygon;
 pub mod sphere;
 mod union_find;
+mod window;
 
 pub use clip::{
     HalfPlane, clip_ring_axis, clip_ring_convex, clip_ring_half_plane, clip_ring_half_plane_into,
@@ -26,3 +27,4 @@ pub use polygon::{
     ring_area, transform,
 };
 pub use union_find::UnionFind;
+pub(crate) use window::within_window;

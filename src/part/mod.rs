@@ -58,7 +58,8 @@ pub struct Mesh {
 impl Mesh {
     /// The three corners of triangle `index` \[m\].
     pub fn corners(&self, index: u32) -> [DVec3; 3] {
-        self.triangles[index as usize].map(|vertex| self.vertices[vertex as usize])
+        let [a, b, c] = self.triangles[index as usize];
+        [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
     }
 
     /// Smallest and largest corner of the bounding box \[m\]; zeros for an empty mesh.

@@ -169,8 +169,10 @@ impl<'a> View<'a> {
     }
 
     /// Corners in the grip frame of the grip at `position`.
-    fn local(&self, corners: [DVec3; 3], position: DVec2) -> [DVec3; 3] {
-        corners.map(|corner| self.grip_axes(corner) - position.extend(0.0))
+    fn local(&self, [a, b, c]: [DVec3; 3], position: DVec2) -> [DVec3; 3] {
+        let position = position.extend(0.0);
+        let [a, b, c] = [self.grip_axes(a), self.grip_axes(b), self.grip_axes(c)];
+        [a - position, b - position, c - position]
     }
 
     /// The first triangle, by mesh index, that the sweep meets at `position`, with its corners in

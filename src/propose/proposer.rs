@@ -59,6 +59,8 @@ pub struct Proposer<'a> {
     /// Contact of a pad that lies wholly on both faces.
     pub(super) whole: Arc<Contact>,
     pub(super) symmetric: bool,
+    /// How far the pads reach from the grip axis \[m\].
+    pub(super) reach: f64,
     tally: Tally,
     /// The faces that come nearest to the stroke of those outside.
     pub(super) outside: Option<FacePair>,
@@ -204,6 +206,7 @@ impl<'a> Proposer<'a> {
             shape: Arc::new(Topology::new(&part.mesh)),
             whole: Arc::new(Contact { face_i: pad.clone(), face_ii: pad }),
             symmetric: gripper.is_symmetric(),
+            reach: gripper.pad_reach(),
             tally,
             outside,
             plane,
@@ -254,7 +257,7 @@ impl<'a> Proposer<'a> {
 
     pub(super) fn prepare<'s>(&self, site: &'s Site) -> Prepared<'s> {
         let axes = site::axes(self.directions[site.direction]);
-        let reach = self.gripper.pad_reach();
+        let reach = self.reach;
         let (low, high) = self.part.mesh.bounding_box();
         let fingers = Jaw::BOTH.iter().flat_map(|&jaw| self.gripper.bodies(jaw));
         let bodies = fingers.chain(&self.gripper.palm);

@@ -34,8 +34,8 @@ use super::options::ProposeOptions;
 use super::patch::PatchIndex;
 use crate::clash::{Motion, Sweep, sweeps};
 use crate::error::{Error, Result};
-use crate::geometry::polygon::{self, Bounds2};
-use crate::geometry::{contains, overlay};
+use crate::geometry::polygon::{self, Bounds2, rings};
+use crate::geometry::{contains, even_odd, overlay};
 use crate::gripper::{Gripper, Jaws};
 use crate::model::{Frame, Patch, Polygon, Ring};
 use crate::part::{FacePair, PairKind, Part};
@@ -156,6 +156,7 @@ pub(super) fn sites(
         options,
         environment,
         size,
+        reach: gripper.pad_reach(),
         centre_of_mass,
         planes: &planes,
         chosen,
@@ -233,6 +234,8 @@ struct Finder<'a> {
     environment: &'a Environment,
     /// Diagonal of the part's bounding box \[m\].
     size: f64,
+    /// How far the pads reach from the grip axis \[m\].
+    reach: f64,
     /// Of the part \[m\].
     centre_of_mass: DVec3,
     planes: &'a Planes,
@@ -246,7 +249,7 @@ struct Finder<'a> {
 impl Finder<'_> {
     /// The sites of pairs whose planes coincide.
     fn sites(&mut self, kind: PairKind, pairs: &[&FacePair]) -> Result<Vec<Site>> {
-        let (part, gripper, size) = (self.part, self.gripper, self.size);
+        let (part, size, reach) = (self.part, self.size, self.reach);
         let (direction, sides) = self.sides(pairs);
         let face = |id: u32| &part.faces[id as usize];
         let axis = self.directions[direction];
@@ -254,7 +257,6 @@ impl Finder<'_> {
         let patches =
             [0, 1].map(|side| project(sides[side].iter().map(|&id| face(id)), &axes_from_part));
         let overlap = overlay::intersect(&patches[0], &patches[1]);
-        let reach = gripper.pad_reach();
         let mut found = Vec::new();
         for overlap in stretches(overlap, 2.0 * reach) {
             let (turn, middle) = lie(&overlap, None);
@@ -527,7 +529,13 @@ impl Site {
     ) -> Vec<PatchIndex> {
         let [side_i, side_ii] = [0, 1].map(|side| -> Patch {
             if let Some(relief) = &self.relief {
-                return relief.pressed[side].clone();
+                // Facets beside each other are one area.
+                return match &relief.pressed[side] {
+                    facets if facets.len() > 1 => even_odd(
+                        &facets.iter().flat_map(rings).map(<[DVec2]>::to_vec).collect::<Vec<_>>(),
+                    ),
+                    one => one.clone(),
+                };
             }
             let faces = self.touched[side].iter().map(|&id| &part.faces[id as usize]);
             project(faces, axes_from_part)

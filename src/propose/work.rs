@@ -391,7 +391,7 @@ impl Proposer<'_> {
 
     /// Coordinates closer than this are one, for what is shared \[m\].
     fn same(&self) -> f64 {
-        SAME_CONTACT * self.gripper.pad_reach()
+        SAME_CONTACT * self.reach
     }
 
     fn shared(&self, contact: Contact, known: &mut Known) -> Touched {
@@ -430,7 +430,7 @@ impl Proposer<'_> {
         }
         let touched = || Touched {
             contact: Arc::new(relief.outlines(&surfaces, jaws)),
-            surfaces: Some(Arc::new(surfaces.clone())),
+            surfaces: Some(Arc::new(surfaces)),
         };
         known.entry(key).or_insert_with(touched).clone()
     }

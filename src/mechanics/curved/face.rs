@@ -67,13 +67,8 @@ pub(super) struct FaceDissipation {
 const STEPS: u32 = 200;
 /// Share of a force that rounding may leave.
 const ROUNDING: f64 = 1e-13;
-
-/// What carries a force: the compression at the pad's plane, and what is pressed.
-struct Carrying {
-    delta: f64,
-    regions: Vec<Region>,
-    area: f64,
-}
+/// Share of it below which nothing is gained.
+const EXACT: f64 = 2e-16;
 
 impl Face {
     pub(super) fn new(pieces: &[Piece], stiffness: f64, sign: f64) -> Self {
@@ -98,15 +93,11 @@ impl Face {
         self.reach
     }
 
-    /// The regions pressed at a compression and tilt, their area, and the normal force.
-    fn press(&self, delta: f64, tilt: DVec2) -> (Vec<Region>, f64, f64) {
-        let regions: Vec<Region> =
-            self.fields.iter().map(|field| field.pressed(delta, self.sign * tilt)).collect();
-        let (area, load) = regions.iter().fold((0.0, 0.0), |(area, load), region| {
-            let (a, l) = region.area_and_load();
-            (area + a, load + l)
-        });
-        (regions, area, self.stiffness * load)
+    /// The area pressed at a compression and tilt, and the normal force.
+    fn press(&self, delta: f64, tilt: DVec2) -> (f64, f64) {
+        let sums = self.fields.iter().map(|field| field.area_and_load(delta, self.sign * tilt));
+        let (area, load) = sums.fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
+        (area, self.stiffness * load)
     }
 
     /// What a compression and tilt carry, with the derivatives for the compression and for more tilt
@@ -145,25 +136,42 @@ impl Face {
 
     /// The pressure that carries `load` at a tilt; `start`: a compression near that of the pad's plane.
     pub(super) fn carry(&self, load: f64, tilt: DVec2, start: Option<f64>) -> Option<Pressed<'_>> {
-        let Carrying { delta, regions, area } = self.carrying(load, tilt, start, 2e-16)?;
+        let delta = self.carrying(load, tilt, start, EXACT)?;
+        let regions = self.regions(delta, tilt);
+        let area = regions.iter().map(|region| region.area_and_load().0).sum();
         Some(self.measure(delta, tilt, regions, load, area))
+    }
+
+    fn regions(&self, delta: f64, tilt: DVec2) -> Vec<Region> {
+        self.fields.iter().map(|field| field.pressed(delta, self.sign * tilt)).collect()
+    }
+
+    /// The compression of [`Self::carry`] without tilt, and what it presses.
+    pub(super) fn squeezed(&self, load: f64) -> Option<(f64, Vec<Region>)> {
+        let delta = self.squeeze(load)?;
+        Some((delta, self.regions(delta, DVec2::ZERO)))
+    }
+
+    /// Greatest pressure on regions \[Pa\].
+    pub(super) fn greatest(&self, regions: &[Region]) -> f64 {
+        self.stiffness * regions.iter().map(Region::greatest).fold(0.0, f64::max)
+    }
+
+    /// The compression of [`Self::carry`] without tilt.
+    pub(super) fn squeeze(&self, load: f64) -> Option<f64> {
+        self.carrying(load, DVec2::ZERO, None, EXACT)
     }
 
     /// The compression at the pad's plane that carries `load` without tilt, looked for from `start` on
     /// \[m\].
     pub(super) fn compression(&self, load: f64, start: f64) -> Option<f64> {
-        Some(self.carrying(load, DVec2::ZERO, Some(start), ROUNDING)?.delta)
+        self.carrying(load, DVec2::ZERO, Some(start), ROUNDING)
     }
 
-    /// What carries `load` at a tilt, but for a share of `within` of it, or for rounding. The force grows convexly with the compression, so that Newton's
-    /// method comes down to the answer from above after its first step.
-    fn carrying(
-        &self,
-        load: f64,
-        tilt: DVec2,
-        start: Option<f64>,
-        within: f64,
-    ) -> Option<Carrying> {
+    /// The compression that carries `load` at a tilt, but for a share of `within` of it, or for
+    /// rounding. The force grows convexly with the compression, so that Newton's method comes down to
+    /// the answer from above after its first step.
+    fn carrying(&self, load: f64, tilt: DVec2, start: Option<f64>, within: f64) -> Option<f64> {
         let nearest = self
             .fields
             .iter()
@@ -173,7 +181,7 @@ impl Face {
         let mut delta = start.unwrap_or(nearest + step);
         let mut best: Option<(f64, f64)> = None;
         for _ in 0..STEPS {
-            let (regions, area, carried) = self.press(delta, tilt);
+            let (area, carried) = self.press(delta, tilt);
             let error = carried - load;
             if !error.is_finite() {
                 return None;
@@ -187,7 +195,7 @@ impl Face {
                 || best.is_some_and(|(_, least)| error.abs() >= least)
                     && error.abs() <= ROUNDING * load
             {
-                return Some(Carrying { delta, regions, area });
+                return Some(delta);
             }
             if best.is_none_or(|(_, least)| error.abs() < least) {
                 best = Some((delta, error.abs()));
@@ -195,8 +203,7 @@ impl Face {
             delta -= error / (self.stiffness * area);
         }
         let (delta, error) = best?;
-        let (regions, area, _) = self.press(delta, tilt);
-        (error <= 1e-9 * load).then_some(Carrying { delta, regions, area })
+        (error <= 1e-9 * load).then_some(delta)
     }
 
     fn measure(

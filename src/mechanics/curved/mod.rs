@@ -220,15 +220,22 @@ impl Pads {
     /// Both faces squeezed with `force` \[N\] without a load; `None` without contact.
     pub fn squeezed(&self, force: f64) -> Option<[Squeezed; 2]> {
         let squeezed = |face: &Face| {
-            let pressed = face.carry(force, DVec2::ZERO, None)?;
+            let (delta, regions) = face.squeezed(force)?;
+            let area = regions.iter().map(|region| region.area_and_load().0).sum::<f64>();
             Some(Squeezed {
-                delta: pressed.delta,
-                area: pressed.area,
-                mean_pressure: pressed.load / pressed.area,
-                greatest_pressure: pressed.greatest(),
+                delta,
+                area,
+                mean_pressure: force / area,
+                greatest_pressure: face.greatest(&regions),
             })
         };
         Some([squeezed(&self.faces[0])?, squeezed(&self.faces[1])?])
+    }
+
+    /// Compressions at the pads' planes \[m\], as [`Self::squeezed`] tells.
+    pub(crate) fn deltas(&self, force: f64) -> Option<[f64; 2]> {
+        let [one, two] = &self.faces;
+        Some([one.squeeze(force)?, two.squeeze(force)?])
     }
 
     /// Compressions at the pads' planes \[m\] under a squeeze with `force` \[N\], looked for from `near`

@@ -73,6 +73,7 @@ pub(super) struct Piece {
 }
 
 /// The part of the edge from `a` to `b` inside the window (Cyrus and Beck 1978).
+#[inline(always)]
 pub(super) fn clip_edge(edge: u32, a: DVec2, b: DVec2, sides: &[(DVec2, f64)]) -> Option<Piece> {
     let (mut low, mut high, mut entry, mut exit) = (0.0, 1.0, None, None);
     for (side, &(normal, height)) in sides.iter().enumerate() {

@@ -98,6 +98,8 @@ pub(super) struct Crests<'a> {
     pub(super) mesh: &'a Mesh,
     pub(super) net: &'a Net,
     pub(super) axes_from_part: DMat3,
+    /// Corners of the mesh in the axes, or none.
+    pub(super) points: Vec<DVec3>,
     pub(super) pad: Pad,
 }
 
@@ -173,7 +175,7 @@ impl Crests<'_> {
             delta,
             smooth: None,
         };
-        let found = self.cover(face, (&place, side), (height, at), delta, &value)?;
+        let found = self.cover(face, side, (height, at), delta, &value)?;
         let line = found.near.iter().map(|x| first.dot(*x - at));
         if bends[0] == 0.0 && !found.near.is_empty() {
             let [from, to] = [line.clone().fold(0.0, f64::min), line.fold(0.0, f64::max)];
@@ -244,7 +246,7 @@ impl Crests<'_> {
     fn cover(
         &self,
         face: &CurvedFace,
-        (place, side): (&impl Fn(DVec3) -> DVec3, f64),
+        side: f64,
         (height, at): (f64, DVec2),
         delta: f64,
         value: &impl Fn(DVec2) -> f64,
@@ -254,7 +256,11 @@ impl Crests<'_> {
         let mut is_of_face = false;
         let mut seen: Vec<(f64, u32)> = Vec::new();
         for &triangle in &face.triangles {
-            let corners = self.mesh.corners(triangle).map(place);
+            let corners = match &self.points[..] {
+                [] => self.mesh.corners(triangle).map(|corner| self.axes_from_part * corner),
+                points => self.mesh.triangles[triangle as usize].map(|id| points[id as usize]),
+            };
+            let corners = corners.map(|point| DVec3::new(point.x, point.y, side * point.z));
             let gaps = corners.map(|corner| height - corner.z);
             let least = gaps.into_iter().fold(f64::INFINITY, f64::min);
             let flat = corners.map(DVec3::truncate);

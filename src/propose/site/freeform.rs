@@ -9,10 +9,9 @@ use glam::{DMat2, DMat3, DVec2, DVec3};
 use rustc_hash::FxHashSet;
 
 use super::crest::{Crests, FreeCrest, Pad, compression, half};
-use super::net::{Facing, Net, square};
+use super::net::{Facing, Net, Normals, square};
 use super::relief::{Survey, ellipse, is_free};
 use super::round::{Crest, MOST_PLANES, Outcomes, Round};
-use super::skyline::Skyline;
 use super::tapers::upright;
 use super::{Finder, SAME_PLANE, Site, axes};
 use crate::error::Result;
@@ -38,6 +37,9 @@ const NEAREST: usize = 3;
 const STEPS: u32 = 40;
 const LONGEST: f64 = 0.15;
 const SHORTEST: f64 = 1e-6;
+/// Most steps after which corners take turns again, and how near two directions are one then.
+const PERIODS: usize = 4;
+const SAME: f64 = 1e-15;
 /// A last step this short still is an answer \[rad\]: corners in turn, each with a fit of its own.
 const SETTLED: f64 = 3e-3;
 /// Share of the width by which the radii of two crests may differ from it for the direction to be
@@ -83,7 +85,8 @@ struct Pair {
 struct Known {
     faces: [u32; 2],
     closing: DVec3,
-    /// In the axes of the direction.
+    axes_from_part: DMat3,
+    /// In these axes, those of the direction.
     boxes: [Bounds2; 2],
 }
 
@@ -112,8 +115,10 @@ impl Finder<'_> {
         let mut seen = Outcomes::default();
         let mut known: Vec<Known> = Vec::new();
         let mut tried = 0;
+        let near = (SAME_STEP * self.options.angle_step).sin();
         for pair in &pairs {
-            if tried == most || known.iter().any(|known| self.is_known(known, pair, &net)) {
+            let is_known = |known: &Known| self.is_known(known, pair, near, &net);
+            if tried == most || known.iter().any(is_known) {
                 continue;
             }
             tried += 1;
@@ -133,7 +138,7 @@ impl Finder<'_> {
                     self.opposite(pair, &crests, &loose, &mut sites)?
                 }
             };
-            known.push(Known { faces, closing: pair.closing, boxes });
+            known.push(Known { faces, closing: pair.closing, axes_from_part, boxes });
             sites[first..].iter().for_each(|site| self.budget.take(site));
             if self.budget.is_spent() {
                 round.left_out = true;
@@ -158,9 +163,10 @@ impl Finder<'_> {
         }
     }
 
-    /// Whether a pair of crests is one that was looked at.
-    fn is_known(&self, known: &Known, pair: &Pair, net: &Net) -> bool {
-        let reach = self.gripper.pad_reach();
+    /// Whether a pair of crests is one that was looked at; `near`: the sine of the angle up to which
+    /// two directions are one.
+    fn is_known(&self, known: &Known, pair: &Pair, near: f64, net: &Net) -> bool {
+        let reach = self.reach;
         let faces = pair.ends.map(|end| self.face_of(end, net));
         // Near the border between upright and not.
         let swapped = known.closing.dot(pair.closing) < 0.0;
@@ -168,13 +174,11 @@ impl Finder<'_> {
         if [faces[one], faces[two]] != known.faces {
             return false;
         }
-        let apart = known.closing.cross(pair.closing).length();
-        if apart > (SAME_STEP * self.options.angle_step).sin() {
+        if known.closing.cross(pair.closing).length() > near {
             return false;
         }
-        let axes_from_part = axes(known.closing);
         [one, two].iter().zip(known.boxes).all(|(&end, bounds)| {
-            let at = (axes_from_part * pair.places[end].point).truncate();
+            let at = (known.axes_from_part * pair.places[end].point).truncate();
             let at = Bounds2 { min: at, max: at };
             matches!(pair.ends[end], End::Plane(_)) || bounds.grown(0.5 * reach).meets(at)
         })
@@ -182,14 +186,14 @@ impl Finder<'_> {
 
     /// Pairs of places opposite each other, the best first.
     fn pairs(&self, net: &mut Net) -> Vec<Pair> {
-        let reach = self.gripper.pad_reach();
-        let mut corners = net.sample(CORNERS);
-        corners.retain(|&corner| net.is_convex(corner));
+        let reach = self.reach;
+        let corners = net.sample(CORNERS);
+        let normals = Normals::new(&corners, net);
         let mut starts: Vec<([End; 2], DVec3)> = Vec::new();
         for &a in &corners {
             let (point, normal) = (net.points[a as usize], net.normals[a as usize]);
             let mut near: Vec<(f64, u32, DVec3)> = Vec::new();
-            for &b in &corners {
+            for b in normals.near(-normal) {
                 let other = net.normals[b as usize];
                 if -normal.dot(other) < OPPOSITE {
                     continue;
@@ -203,9 +207,13 @@ impl Finder<'_> {
                     near.push((miss, b, closing));
                 }
             }
+            if near.is_empty() || !net.is_convex(a) {
+                continue;
+            }
             near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             // Each pair from one of its corners.
-            let near = near.into_iter().take(NEAREST).filter(|(_, b, _)| a < *b || *b == a);
+            let near = near.into_iter().filter(|(_, b, _)| net.is_convex(*b)).take(NEAREST);
+            let near = near.filter(|(_, b, _)| a < *b || *b == a);
             starts.extend(near.map(|(_, b, closing)| ([End::Free(a), End::Free(b)], closing)));
         }
         for (end, of) in self.others() {
@@ -213,7 +221,10 @@ impl Finder<'_> {
             for &a in &corners {
                 let normal = net.normals[a as usize];
                 let Some(closing) = of(net.points[a as usize], normal) else { continue };
-                if normal.dot(closing) >= OPPOSITE && taken.insert(net.walk(a, closing)) {
+                if normal.dot(closing) >= OPPOSITE
+                    && net.is_convex(a)
+                    && taken.insert(net.walk(a, closing))
+                {
                     starts.push(([End::Free(a), end], closing));
                 }
             }
@@ -310,7 +321,26 @@ impl Finder<'_> {
             }
             _ => self.size,
         };
-        for step in 0..STEPS {
+        let mut step = 0;
+        let mut before = [(ends, closing, width); PERIODS];
+        while step < STEPS {
+            // Where corners take turns the last step is one of those before.
+            let state = (ends, closing, width);
+            let again = |&period: &usize| {
+                let known = before[(step as usize + PERIODS - period) % PERIODS];
+                known.0 == ends && known.1.distance(closing) < SAME && known.2 == width
+            };
+            let periods = 2..=PERIODS.min(step as usize);
+            if let Some(period) = periods.clone().find(again) {
+                let left = (STEPS - 1 - step) as usize % period;
+                if left > 0 {
+                    let known = step as usize - period + left;
+                    (ends, closing, width) = before[known % PERIODS];
+                }
+                step = STEPS - 1;
+            } else {
+                before[step as usize % PERIODS] = state;
+            }
             let [one, two] = &mut ends;
             let places = [
                 self.facing_end(one, closing, width, net)?,
@@ -351,6 +381,7 @@ impl Finder<'_> {
                 return (size < SETTLED && off < ASIDE).then_some(pair);
             }
             closing = (closing + u * turned.x + v * turned.y).normalize();
+            step += 1;
         }
         None
     }
@@ -375,7 +406,13 @@ impl Finder<'_> {
         net: &Net,
     ) -> std::result::Result<Option<[FreeCrest; 2]>, Rejection> {
         let axes_from_part = axes(pair.closing);
-        let crests = Crests { mesh: &self.part.mesh, net, axes_from_part, pad: self.pad() };
+        let mesh = &self.part.mesh;
+        // All corners together where most of them are looked at.
+        let points = match 4 * net.points.len() >= mesh.vertices.len() {
+            true => mesh.vertices.iter().map(|&vertex| axes_from_part * vertex).collect(),
+            false => Vec::new(),
+        };
+        let crests = Crests { mesh, net, axes_from_part, points, pad: self.pad() };
         let mut found = Vec::new();
         for (index, side) in [1.0, -1.0].into_iter().enumerate() {
             let crest = match pair.ends[index] {
@@ -391,7 +428,7 @@ impl Finder<'_> {
         }
         let Ok([top, bottom]) = <[FreeCrest; 2]>::try_from(found) else { return Ok(None) };
         let width = top.height + bottom.height;
-        let reach = self.gripper.pad_reach();
+        let reach = self.reach;
         if width <= 0.0 || !top.bounds.grown(reach).meets(bottom.bounds.grown(reach)) {
             return Ok(None);
         }
@@ -456,7 +493,7 @@ impl Finder<'_> {
         Pad {
             layer: self.gripper.layer(),
             force: self.options.force_on(self.gripper),
-            reach: self.gripper.pad_reach(),
+            reach: self.reach,
         }
     }
 
@@ -470,20 +507,17 @@ impl Finder<'_> {
         sites: &mut Vec<Site>,
     ) -> Result<Option<Option<Rejection>>> {
         let closing = pair.closing;
-        let skyline = self
-            .half_pad()
-            .map(|half| Skyline::new(&self.part.mesh.vertices, &axes(closing), half));
         let levels = [top, bottom].map(|crest| {
             let ends = crest.ends.map(|end| end.extend(0.0));
             let FreeCrest { face, height, bounds, radii: [radius, _], .. } = *crest;
             [Crest { face, height, radius, bounds, ends }]
         });
-        if self.is_buried(&levels[0], &levels[1], skyline.as_ref()) {
+        if self.is_buried(closing, [&levels[0], &levels[1]], &mut None) {
             return Ok(Some(Some(Rejection::OutOfReach)));
         }
         let direction = self.direction(closing);
         let heights = [top.height, -bottom.height];
-        let reach = self.gripper.pad_reach();
+        let reach = self.reach;
         let common = Bounds2 {
             min: top.bounds.min.max(bottom.bounds.min),
             max: top.bounds.max.min(bottom.bounds.max),

@@ -37,6 +37,8 @@ struct Local {
     /// Rows: two tangents and the normal.
     axes: DMat3,
     form: Paraboloid,
+    /// [`Paraboloid::principal`].
+    principal: ([f64; 2], DVec2),
     /// Distance of the farthest corner that was fitted \[m\].
     size: f64,
 }
@@ -139,12 +141,18 @@ impl Net {
     /// The corner that faces a direction best, from one to the next.
     pub(super) fn walk(&self, mut corner: u32, direction: DVec3) -> u32 {
         loop {
-            let facing = |corner: &u32| self.normals[*corner as usize].dot(direction);
-            let best = self.beside(corner).iter().max_by(|a, b| facing(a).total_cmp(&facing(b)));
-            match best {
-                Some(best) if facing(best) > facing(&corner) + 1e-12 => corner = *best,
-                _ => return corner,
+            let facing = |corner: u32| self.normals[corner as usize].dot(direction);
+            let (mut best, mut most) = (corner, f64::NEG_INFINITY);
+            for &other in self.beside(corner) {
+                let value = facing(other);
+                if value >= most {
+                    (best, most) = (other, value);
+                }
             }
+            if most <= facing(corner) + 1e-12 {
+                return corner;
+            }
+            corner = best;
         }
     }
 
@@ -182,26 +190,26 @@ impl Net {
         let points = near.iter().map(|&other| (axes * (self.points[other as usize] - origin), 1.0));
         let size = points.clone().map(|(point, _)| point.truncate().length()).fold(0.0, f64::max);
         let form = Paraboloid::fit(points)?;
-        Some(Local { axes, form, size })
+        Some(Local { axes, principal: form.principal(), form, size })
     }
 
     /// Whether the surface about a corner bulges outwards in all directions, or nearly.
     pub(super) fn is_convex(&mut self, corner: u32) -> bool {
         self.local(corner).is_some_and(|local| {
-            let ([low, high], _) = local.form.principal();
+            let ([low, high], _) = local.principal;
             low < 0.0 && high < -0.2 * low
         })
     }
 
     /// The place near a corner where the surface faces a direction, for a grip of a `width`.
     pub(super) fn facing(&mut self, corner: u32, direction: DVec3, width: f64) -> Option<Facing> {
-        let Local { axes, form, size } = self.local(corner)?;
+        let Local { axes, form, principal, size } = self.local(corner)?;
         let towards = axes * direction;
         if towards.z < NEAR {
             return None;
         }
         let lacks = -towards.truncate() / towards.z - form.slope;
-        let ([low, high], first) = form.principal();
+        let ([low, high], first) = principal;
         let mut step = DVec2::ZERO;
         let mut radii = DMat3::ZERO;
         let mut straight = [None; 2];
@@ -221,5 +229,34 @@ impl Net {
         step = step.clamp_length_max(size);
         let point = self.points[corner as usize] + axes.transpose() * step.extend(form.at(step));
         Some(Facing { point, radii, straight })
+    }
+}
+
+/// Corners by their normals.
+pub(super) struct Normals(FxHashMap<[i32; 3], Vec<u32>>);
+
+impl Normals {
+    /// Distance within which all are found: of unit vectors 12.6 degrees apart.
+    const CELL: f64 = 0.22;
+
+    pub(super) fn new(corners: &[u32], net: &Net) -> Self {
+        let mut cells: FxHashMap<[i32; 3], Vec<u32>> = FxHashMap::default();
+        for &corner in corners {
+            cells.entry(Self::cell(net.normals[corner as usize])).or_default().push(corner);
+        }
+        Self(cells)
+    }
+
+    fn cell(normal: DVec3) -> [i32; 3] {
+        (normal / Self::CELL).floor().as_ivec3().to_array()
+    }
+
+    /// Corners whose normals may be that near to `normal`, and others.
+    pub(super) fn near(&self, normal: DVec3) -> impl Iterator<Item = u32> + '_ {
+        let [x, y, z] = Self::cell(normal);
+        let around = (-1..=1).flat_map(move |i| {
+            (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [x + i, y + j, z + k]))
+        });
+        around.filter_map(|cell| self.0.get(&cell)).flatten().copied()
     }
 }

@@ -61,8 +61,7 @@ impl Relief {
             &DAffine2::from_translation(-place),
             Jaws::Straight,
         );
-        let squeezed = Pads::new(&under).ok()?.squeezed(force)?;
-        let deltas = squeezed.map(|face| face.delta);
+        let deltas = Pads::new(&under).ok()?.deltas(force)?;
         Some(Self::pressed_by(relief.pieces, layer, force, deltas))
     }
 
@@ -213,6 +212,8 @@ fn moved(polygon: &Polygon, gap: &Gap, map: &DAffine2) -> Piece {
 pub(super) struct Survey<'a> {
     part: &'a Part,
     axes_from_part: DMat3,
+    /// Corners of the part in the axes, where most of them are looked at; else none.
+    points: Vec<DVec3>,
     /// Boxes around plane faces and curved ones, and the triangles of no face with theirs.
     planes: Vec<Span>,
     curved: Vec<Span>,
@@ -253,20 +254,27 @@ impl<'a> Survey<'a> {
         axes_from_part: DMat3,
         is_left_out: fn(&CurvedFace) -> bool,
     ) -> Self {
-        let corners = |&triangle: &u32| corners(part, &axes_from_part, triangle);
+        let curved = || part.curved.iter().filter(|face| !is_left_out(face));
+        let looks = loose.len() + curved().map(|face| face.triangles.len()).sum::<usize>();
+        let vertices = &part.mesh.vertices;
+        let points = match 3 * looks >= vertices.len() {
+            true => vertices.iter().map(|&vertex| axes_from_part * vertex).collect(),
+            false => Vec::new(),
+        };
+        let corners = |&triangle: &u32| corners(part, &axes_from_part, &points, triangle);
         let plane = |face: &PlanarFace| {
             let outlines = face.polygons.iter().flat_map(|polygon| &polygon.outer);
             Span::of(outlines.map(|at| axes_from_part * face.part_from_face.point(at.extend(0.0))))
         };
-        let curved = |face: &CurvedFace| Span::of(face.triangles.iter().flat_map(corners));
-        Self {
-            part,
-            axes_from_part,
-            planes: part.faces.iter().map(plane).collect(),
-            curved: part.curved.iter().filter(|face| !is_left_out(face)).map(curved).collect(),
-            is_left_out,
-            loose: loose.iter().map(|id| (Span::of(corners(id).into_iter()), *id)).collect(),
-        }
+        let span = |face: &CurvedFace| Span::of(face.triangles.iter().flat_map(corners));
+        let (planes, curved) =
+            (part.faces.iter().map(plane).collect(), curved().map(span).collect());
+        let loose = loose.iter().map(|id| (Span::of(corners(id).into_iter()), *id)).collect();
+        Self { part, axes_from_part, points, planes, curved, is_left_out, loose }
+    }
+
+    fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        corners(self.part, &self.axes_from_part, &self.points, triangle)
     }
 
     /// What faces each pad's plane within a region: up to a gap of `reach`, and no higher than `above`
@@ -304,9 +312,14 @@ pub(super) fn is_free(face: &CurvedFace) -> bool {
     face.shape == Shape::Freeform
 }
 
-/// Corners of a triangle in the axes.
-fn corners(part: &Part, axes_from_part: &DMat3, triangle: u32) -> [DVec3; 3] {
-    part.mesh.corners(triangle).map(|corner| *axes_from_part * corner)
+/// Corners of a triangle in the axes; `points`: all of the part's, or none.
+fn corners(part: &Part, axes_from_part: &DMat3, points: &[DVec3], triangle: u32) -> [DVec3; 3] {
+    if points.is_empty() {
+        let [a, b, c] = part.mesh.corners(triangle);
+        return [*axes_from_part * a, *axes_from_part * b, *axes_from_part * c];
+    }
+    let [a, b, c] = part.mesh.triangles[triangle as usize];
+    [points[a as usize], points[b as usize], points[c as usize]]
 }
 
 /// Looks for the surface that faces one pad's plane.
@@ -393,7 +406,7 @@ impl Look<'_> {
     }
 
     fn facet(&self, triangle: u32, pieces: &mut Vec<Piece>) {
-        let corners = corners(self.survey.part, &self.survey.axes_from_part, triangle);
+        let corners = self.survey.corners(triangle);
         let [a, b, c] = corners;
         let Some(normal) = (b - a).cross(c - a).try_normalize() else { return };
         let nearest = corners
@@ -515,14 +528,14 @@ impl Look<'_> {
         }
         let mut rings: Vec<Ring> = Vec::new();
         for &triangle in triangles {
-            let corners = corners(self.survey.part, &self.survey.axes_from_part, triangle);
+            let corners = self.survey.corners(triangle);
             let [a, b, c] = corners;
             if (b - a).cross(c - a).z * self.side <= 0.0 {
                 continue;
             }
-            let ring = corners.map(DVec3::truncate).to_vec();
+            let ring = corners.map(DVec3::truncate);
             if Bounds2::of(&ring).meets(within) {
-                rings.push(ring);
+                rings.push(ring.to_vec());
             }
         }
         for Polygon { outer, holes } in intersect_convex(window, &even_odd(&rings)) {

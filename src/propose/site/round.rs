@@ -145,16 +145,14 @@ impl Finder<'_> {
         let loose = self.loose();
         for closing in self.closings() {
             self.budget.look();
-            let skyline = self
-                .half_pad()
-                .map(|half| Skyline::new(&self.part.mesh.vertices, &axes(closing), half));
+            let mut skyline = None;
             let [above, below] =
                 [1.0, -1.0].map(|side| levels(self.crests(side * closing), SAME_PLANE * self.size));
             let mut survey = None;
             for (top, bottom) in above.iter().flat_map(|top| below.iter().map(move |b| (top, b))) {
                 let outcome = match self.facing(closing, top, bottom) {
                     Ok(None) => None,
-                    Ok(Some(_)) if self.is_buried(top, bottom, skyline.as_ref()) => {
+                    Ok(Some(_)) if self.is_buried(closing, [top, bottom], &mut skyline) => {
                         Some(Some(Rejection::OutOfReach))
                     }
                     Ok(Some(boxes)) => {
@@ -195,16 +193,26 @@ impl Finder<'_> {
         (one == two && one.len() == 4).then(|| 0.5 * self.gripper.pad_sizes()[0].min_element())
     }
 
-    /// Whether the part stands in the pads' way wherever they cover a crest of two levels.
+    /// Whether the part stands in the pads' way wherever they cover a crest of two levels. `skyline`:
+    /// that of the direction, once it was needed.
     pub(super) fn is_buried(
         &self,
-        top: &[Crest],
-        bottom: &[Crest],
-        skyline: Option<&Skyline>,
+        closing: DVec3,
+        [top, bottom]: [&[Crest]; 2],
+        skyline: &mut Option<Skyline>,
     ) -> bool {
-        let Some(skyline) = skyline else { return false };
+        let Some(half) = self.half_pad() else { return false };
         let slack = 2.0 * SAME_PLANE * self.size;
         let heights = [top[0].height + slack, -bottom[0].height - slack];
+        let vertices = &self.part.mesh.vertices;
+        let stands_out = |vertex: &DVec3| {
+            let height = closing.dot(*vertex);
+            height > heights[0] || height < heights[1]
+        };
+        if !vertices.iter().any(stands_out) {
+            return false;
+        }
+        let skyline = skyline.get_or_insert_with(|| Skyline::new(vertices, &axes(closing), half));
         let is_round = |level: &[Crest]| level.iter().all(|crest| crest.radius.is_finite());
         let level = if is_round(top) { top } else { bottom };
         is_round(level)
@@ -360,16 +368,20 @@ impl Finder<'_> {
         };
         let slack = 1e-3 * radius;
         face.triangles.iter().any(|&triangle| {
-            let corners = self.part.mesh.corners(triangle).map(|corner| corner - middle);
-            let height = corners.iter().map(|corner| corner.dot(closing)).fold(0.0, f64::max);
+            let [a, b, c] = self.part.mesh.corners(triangle);
+            let corners = [a - middle, b - middle, c - middle];
+            let [x, y, z] = corners;
+            let height = x.dot(closing).max(y.dot(closing)).max(z.dot(closing));
             if height < 0.5 * radius {
                 return false;
             }
             if across == DVec3::ZERO {
                 return height > 0.97 * radius;
             }
-            let along = corners.map(|corner| corner.dot(across));
-            along.iter().any(|y| *y >= -slack) && along.iter().any(|y| *y <= slack)
+            let sides = |test: fn(f64, f64) -> bool| {
+                corners.iter().any(|corner| test(corner.dot(across), slack))
+            };
+            sides(|y, slack| y >= -slack) && sides(|y, slack| y <= slack)
         })
     }
 
@@ -383,7 +395,7 @@ impl Finder<'_> {
     ) -> std::result::Result<Option<[Bounds2; 2]>, Rejection> {
         let width = top[0].height + bottom[0].height;
         let flat = |level: &[Crest]| level.iter().any(|crest| crest.radius.is_infinite());
-        let reach = self.gripper.pad_reach();
+        let reach = self.reach;
         let around = |level: &[Crest], flip: bool| {
             let bounds = level.iter().map(|crest| crest.bounds);
             let bounds = bounds.fold(Bounds2::EMPTY, Bounds2::union);
@@ -417,7 +429,7 @@ impl Finder<'_> {
         sites: &mut Vec<Site>,
     ) -> Result<Option<Option<Rejection>>> {
         let heights = [top[0].height, -bottom[0].height];
-        let reach = self.gripper.pad_reach();
+        let reach = self.reach;
         let common =
             Bounds2 { min: boxes[0].min.max(boxes[1].min), max: boxes[0].max.min(boxes[1].max) };
         let region = Bounds2 {
@@ -462,7 +474,7 @@ impl Finder<'_> {
         };
         let overlap = overlay::intersect(&relief.pressed[0], &relief.pressed[1]);
         let mut any = false;
-        for overlap in stretches(overlap, 2.0 * self.gripper.pad_reach()) {
+        for overlap in stretches(overlap, 2.0 * self.reach) {
             let (turn, middle) = lie(&overlap, main);
             let (kind, sides) = (PairKind::External, &sides);
             let base = Base { kind, direction, sides, overlap, turn, middle, heights, rise };

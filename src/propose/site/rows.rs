@@ -256,7 +256,7 @@ impl Finder<'_> {
         let off = off.min(sag + LAYER_SHARE * layer.reach()) + taper.chords;
         let Some(deltas) = self.takes(taper, posture, (y, top), layer)? else { return Ok(None) };
         let level = taper.level();
-        let reach = self.gripper.pad_reach();
+        let reach = self.reach;
         let window = |low: DVec2, high: DVec2| -> Ring {
             [low, DVec2::new(high.x, low.y), high, DVec2::new(low.x, high.y)]
                 .map(|x| level * x.x + taper.uphill * x.y)
