@@ -6,6 +6,7 @@
 #![allow(missing_docs, reason = "criterion's macros make undocumented functions")]
 
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -246,7 +247,7 @@ fn lifted(criterion: &mut Criterion) {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     for kind in KINDS.iter().filter(|kind| kind.separated > 0) {
         let mut random = Random(4);
-        let grips: Vec<(Case, Vec<Wrench>)> = cases(kind, 8)
+        let grips: Vec<(Arc<Contact>, Vec<Wrench>)> = cases(kind, 8)
             .into_iter()
             .map(|mut case| {
                 let mut loads = Vec::with_capacity(500);
@@ -257,12 +258,12 @@ fn lifted(criterion: &mut Criterion) {
                         loads.push(case.wrench);
                     }
                 }
-                (case, loads)
+                (Arc::new(case.contact), loads)
             })
             .collect();
-        let problems = grips.iter().map(|(case, loads)| Problem {
-            contact: &case.contact,
-            distance: case.distance,
+        let problems = grips.iter().map(|(contact, loads)| Problem {
+            contact,
+            distance: kind.distance,
             force: FORCE,
             wrenches: loads,
             pose: None,

@@ -108,6 +108,23 @@ fn an_ellipsoid_is_gripped_along_its_shortest_axis() {
     }
 }
 
+/// A flat of 3 mm at one end of the long axis is smaller than what a pad presses there: the part rolls
+/// over it.
+#[test]
+fn a_small_flat_on_an_ellipsoid_gives_no_grip_along_its_long_axis() {
+    for cut in [2e-5, 1e-4, 4e-4] {
+        let (mut vertices, triangles) = ellipsoid(HALF, 96, 95);
+        vertices.iter_mut().for_each(|vertex| vertex.z = vertex.z.min(HALF.z - cut));
+        let part = part(&(vertices, triangles));
+        assert!(part.curved.len() == 1 && part.curved[0].shape == Shape::Freeform);
+        let (grips, rejections) = grips(&part, &options());
+        assert!(grips.len() >= 20, "{cut}: {}", grips.len());
+        assert!(grips.iter().all(|grip| closing(grip).cross(DVec3::X).length() < 1e-4), "{cut}");
+        let rolls = rejections.get("face_pair_rolls_apart");
+        assert!(!part.faces.is_empty() && rolls.is_some(), "{cut}: {rejections:?}");
+    }
+}
+
 #[test]
 fn an_ellipsoid_that_only_its_longer_axes_fit_rolls() {
     // 100 mm across its shortest axis: the other two are longer still.

@@ -1,6 +1,6 @@
 //! One face under its pad: the pressure for a given tilt and normal force, and what it carries.
 
-use glam::{DMat2, DVec2};
+use glam::DVec2;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 use crate::contact::quadric::{Dissipation, Region};
@@ -11,7 +11,7 @@ use crate::contact::surface::{Field, Piece};
 pub(super) struct Face {
     pub(super) fields: Vec<Field>,
     /// Stiffness of the pad [Pa/m].
-    stiffness: f64,
+    pub(super) stiffness: f64,
     /// +1 on face I, -1 on face II.
     pub(super) sign: f64,
     reach: f64,
@@ -404,28 +404,6 @@ impl Pressed<'_> {
             }
         }
         sum.times(self.face.stiffness)
-    }
-
-    /// Second moment of the pressed area about its middle, times the pad's stiffness [N m].
-    pub(super) fn second_moment(&self) -> DMat2 {
-        let outer = |a: DVec2, b: DVec2| DMat2::from_cols(a * b.x, a * b.y);
-        let (mut area, mut first, mut second) = (0.0, DVec2::ZERO, DMat2::ZERO);
-        for (field, region) in self.face.fields.iter().zip(&self.regions) {
-            if region.is_empty() {
-                continue;
-            }
-            let [_, of_one, of_x, of_y] = region.moments(&field.gap);
-            let own = field.outward(DVec2::new(of_one[1], of_one[2]));
-            let turned = DMat2::from_cols(field.axis, field.axis.perp());
-            let around = DMat2::from_cols_array(&[of_x[1], of_x[2], of_y[1], of_y[2]]);
-            area += of_one[0];
-            first += field.origin * of_one[0] + own;
-            second += turned * around * turned.transpose()
-                + outer(field.origin, own)
-                + outer(own, field.origin)
-                + outer(field.origin, field.origin) * of_one[0];
-        }
-        (second - outer(first, first) * area.recip()) * self.face.stiffness
     }
 
     /// The gradient alone, of a translation without any integral.

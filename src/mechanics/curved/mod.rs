@@ -14,17 +14,17 @@ mod note;
 mod screen;
 mod slip;
 mod space;
+mod turning;
 
 use std::sync::OnceLock;
 
-use glam::{DMat2, DVec2};
+use glam::DVec2;
 use nalgebra::Vector5;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::quadric::Quadratic;
 use crate::contact::surface::{Field, Piece, Surfaces};
 use crate::error::{Error, Result};
-use crate::geometry::principal;
 use crate::model::{Face as Side, Score, Slip, Status, Wrench};
 
 use super::{COUPLING_SEARCH, refused};
@@ -199,22 +199,6 @@ impl Pads {
             answer.notes.extend(case.softness(self, &answer));
         }
         answer
-    }
-
-    /// Stiffness of two faces at a `distance` \[m\], squeezed with `force` \[N\], against turning about
-    /// that axis along the pads about which it is least, without friction [N m per rad]: negative where
-    /// the part rolls out of the grip. `None` without contact.
-    ///
-    /// A turn by a small angle lifts the surface above `x` by the angle times `x - d/2 h'`, and by its
-    /// square times half of `d/2 - (d/2)^2 h''`, where `h` is the gap. As the pressure is zero where it
-    /// ends, integrals of the slopes are the force, and what is left is the second moment of the
-    /// pressed areas times the pads' stiffness, less the force times the distance.
-    pub(crate) fn turning_stiffness(&self, distance: f64, force: f64) -> Option<f64> {
-        let mut resisting = DMat2::ZERO;
-        for face in &self.faces {
-            resisting += face.carry(force, DVec2::ZERO, None)?.second_moment();
-        }
-        Some(principal(resisting).0[0] - force * distance)
     }
 
     /// Both faces squeezed with `force` \[N\] without a load; `None` without contact.
