@@ -18,6 +18,12 @@ fn only_case(name: &str) -> Option<case::Case> {
     Some(case::read(&path).unwrap().remove(0))
 }
 
+/// Cases of a file beside these tests.
+fn kept(name: &str) -> Vec<case::Case> {
+    let path = crate::support::root().join(format!("tests/mechanics/cases/{name}.json"));
+    case::read(&path).unwrap()
+}
+
 /// `mu_s` of all limit states of a case whose answer must say that there are several.
 fn states_of_an_ambiguous_one(case: &case::Case, name: &str) -> Vec<f64> {
     let (contact, d, force, wrench) = (&case.contact, case.distance, case.force, &case.wrench);
@@ -49,8 +55,7 @@ fn a_second_state_is_seen() {
 /// beside each other.
 #[test]
 fn two_states_on_the_last_of_a_contact_are_seen() {
-    let path = crate::support::root().join("tests/mechanics/cases/two_states.json");
-    let case = case::read(&path).unwrap().remove(0);
+    let case = kept("two_states").remove(0);
     let found = states_of_an_ambiguous_one(&case, "two_states");
     for mu in [0.1679805660842801, 0.1694572464368676] {
         assert!(found.iter().any(|other| (other / mu - 1.0).abs() < 1e-6), "{found:?}");
@@ -61,8 +66,7 @@ fn two_states_on_the_last_of_a_contact_are_seen() {
 /// Without either the load would be refused.
 #[test]
 fn a_pair_just_born_is_seen() {
-    let path = crate::support::root().join("tests/mechanics/cases/born_pair.json");
-    let case = case::read(&path).unwrap().remove(0);
+    let case = kept("born_pair").remove(0);
     let found = states_of_an_ambiguous_one(&case, "born_pair");
     let expected = [0.0673765818382913, 0.06745679103157741];
     let same = |(a, b): (&f64, &f64)| (a / b - 1.0).abs() < 1e-8;
@@ -74,8 +78,7 @@ fn a_pair_just_born_is_seen() {
 /// equations are hard to solve to the last digits here, but it is known to be there.
 #[test]
 fn a_turn_between_two_points_is_counted() {
-    let path = crate::support::root().join("tests/mechanics/cases/turn_between.json");
-    let case = case::read(&path).unwrap().remove(0);
+    let case = kept("turn_between").remove(0);
     let found = states_of_an_ambiguous_one(&case, "turn_between");
     assert!((found[0] / 5197.696103209445 - 1.0).abs() < 1e-8, "{found:?}");
 }
@@ -84,10 +87,9 @@ fn a_turn_between_two_points_is_counted() {
 /// at couplings of 0.95 and 0.13. The frictions are the scan's.
 #[test]
 fn further_states_of_much_contact_are_seen() {
-    let path = crate::support::root().join("tests/mechanics/cases/far_apart.json");
     let expected =
         [[0.28274249567450205, 0.2901277791171748], [0.13630574258994071, 0.46538148944627655]];
-    for (case, expected) in case::read(&path).unwrap().iter().zip(&expected) {
+    for (case, expected) in kept("far_apart").iter().zip(&expected) {
         let found = states_of_an_ambiguous_one(case, "far_apart");
         let same = |(a, b): (&f64, &f64)| (a / b - 1.0).abs() < 1e-8;
         assert!(found.len() == 2 && found.iter().zip(expected).all(same), "{found:?}");
@@ -98,8 +100,7 @@ fn further_states_of_much_contact_are_seen() {
 /// couplings down to 0.03 of the width.
 #[test]
 fn further_states_of_narrow_contacts_are_seen() {
-    let path = crate::support::root().join("tests/mechanics/cases/narrow.json");
-    let cases = case::read(&path).unwrap();
+    let cases = kept("narrow");
     let expected: [&[f64]; 4] = [
         &[0.2777335062718857, 0.4461180908674975],
         &[0.00237634398757025, 0.017897007858337394],
@@ -170,8 +171,7 @@ fn a_state_on_the_last_of_a_contact_is_found() {
 /// no code with this one.
 #[test]
 fn a_state_is_found_where_one_pad_is_nearly_pulled_off() {
-    let path = crate::support::root().join("tests/mechanics/cases/nearly_pulled_off.json");
-    let cases = case::read(&path).unwrap();
+    let cases = kept("nearly_pulled_off");
     let expected = [111.21419717658016505, 281.084691226088881];
     assert_eq!(cases.len(), expected.len());
     for (case, expected) in cases.iter().zip(expected) {
