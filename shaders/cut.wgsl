@@ -27,6 +27,15 @@ struct AreaMoments {
     high: vec3<f32>,
 }
 
+// The pressed part of an edge, and where it crosses the zero-pressure line.
+struct Cut {
+    a: vec2<f32>,
+    b: vec2<f32>,
+    x: vec2<f32>,
+    crosses: bool,
+    leaves: bool,
+}
+
 struct Part {
     moments: AreaMoments,
     // Of the weights 1, x1, x2.
@@ -148,6 +157,19 @@ fn face_edges(header: ContactHeader, face: u32) -> vec2<u32> {
     return vec2(header.edges_i, header.edges_ii);
 }
 
+fn cut_edge(a: vec2<f32>, b: vec2<f32>, pa: f32, pb: f32) -> Cut {
+    let crosses = (pa < 0.0) != (pb < 0.0);
+    let leaves = pb < 0.0;
+    let x = a + pa / (pa - pb) * (b - a);
+    var cut = Cut(a, b, x, crosses, leaves);
+    if crosses && leaves {
+        cut.b = x;
+    } else if crosses {
+        cut.a = x;
+    }
+    return cut;
+}
+
 fn integrate(header: ContactHeader, face: u32, v: vec3<f32>, p: vec3<f32>) -> Part {
     let speed = v.x * v.x + v.y * v.y;
     let near = speed <= FAR_LIMIT * FAR_LIMIT * header.radius * header.radius * v.z * v.z;
@@ -175,24 +197,19 @@ fn integrate(header: ContactHeader, face: u32, v: vec3<f32>, p: vec3<f32>) -> Pa
         if pa < 0.0 && pb < 0.0 {
             continue;
         }
-        let crosses = (pa < 0.0) != (pb < 0.0);
-        let x = a + pa / (pa - pb) * (b - a);
-        let leaves = pb < 0.0;
-        if crosses && leaves {
-            b = x;
-        } else if crosses {
-            a = x;
-        }
+        let cut = cut_edge(a, b, pa, pb);
+        a = cut.a;
+        b = cut.b;
         // The pressed part, and then what closes the boundary.
-        let parts = select(1u, 2u, crosses && crossed);
+        let parts = select(1u, 2u, cut.crosses && crossed);
         for (var part = 0u; part < parts; part++) {
             add_edge(&s, &moments, at, a, b);
-            a = select(first, x, leaves);
-            b = select(x, first, leaves);
+            a = select(first, cut.x, cut.leaves);
+            b = select(cut.x, first, cut.leaves);
         }
-        if crosses && !crossed {
+        if cut.crosses && !crossed {
             crossed = true;
-            first = x;
+            first = cut.x;
         }
     }
     let c = at.c;
@@ -235,28 +252,21 @@ fn pressed_moments(header: ContactHeader, face: u32, p: vec3<f32>) -> AreaMoment
     let range = face_edges(header, face);
     for (var i = range.x; i < range.y; i++) {
         let edge = edges[i];
-        var a = edge.xy;
-        var b = edge.zw;
+        let a = edge.xy;
+        let b = edge.zw;
         let pa = p.x + p.y * a.x + p.z * a.y;
         let pb = p.x + p.y * b.x + p.z * b.y;
         if pa < 0.0 && pb < 0.0 {
             continue;
         }
-        let crosses = (pa < 0.0) != (pb < 0.0);
-        let x = a + pa / (pa - pb) * (b - a);
-        let leaves = pb < 0.0;
-        if crosses && leaves {
-            b = x;
-        } else if crosses {
-            a = x;
+        let cut = cut_edge(a, b, pa, pb);
+        add_moments(&moments, cut.a, cut.b);
+        if cut.crosses && crossed {
+            add_moments(&moments, select(first, cut.x, cut.leaves), select(cut.x, first, cut.leaves));
         }
-        add_moments(&moments, a, b);
-        if crosses && crossed {
-            add_moments(&moments, select(first, x, leaves), select(x, first, leaves));
-        }
-        if crosses && !crossed {
+        if cut.crosses && !crossed {
             crossed = true;
-            first = x;
+            first = cut.x;
         }
     }
     return moments;

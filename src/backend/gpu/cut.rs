@@ -35,6 +35,18 @@ pub(crate) struct Centre {
     omega: f32,
 }
 
+/// The pressed part of an edge.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Cut {
+    a: [f32; 2],
+    b: [f32; 2],
+    /// Where it crosses the zero-pressure line, if it does.
+    x: [f32; 2],
+    crosses: bool,
+    /// Whether its end is not pressed.
+    leaves: bool,
+}
+
 /// Integrals over what is left of a face.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Part {
@@ -173,6 +185,22 @@ pub(crate) fn face_edges<'a>(
     if face == 1 && header.faces == 2 { edges[1] } else { edges[0] }
 }
 
+/// The pressed part of an edge from `a` to `b` with the pressures `pa` and `pb`, of which one is not
+/// negative.
+pub(crate) fn cut_edge(a: [f32; 2], b: [f32; 2], pa: f32, pb: f32) -> Cut {
+    let crosses = (pa < 0.0) != (pb < 0.0);
+    let leaves = pb < 0.0;
+    let share = pa / (pa - pb);
+    let x = [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])];
+    let mut cut = Cut { a, b, x, crosses, leaves };
+    if crosses && leaves {
+        cut.b = x;
+    } else if crosses {
+        cut.a = x;
+    }
+    cut
+}
+
 /// The integrals over what the pressure `p` leaves of a face, at a twist.
 pub(crate) fn integrate(
     header: &ContactHeader,
@@ -196,23 +224,14 @@ pub(crate) fn integrate(
     let mut crossed = false;
     let mut first = [0.0; 2];
     for edge in face_edges(header, edges, face) {
-        let mut a = [edge[0], edge[1]];
-        let mut b = [edge[2], edge[3]];
+        let (a, b) = ([edge[0], edge[1]], [edge[2], edge[3]]);
         let pa = p[0] + p[1] * a[0] + p[2] * a[1];
         let pb = p[0] + p[1] * b[0] + p[2] * b[1];
         part.lowest = smaller(pb, part.lowest);
         if pa < 0.0 && pb < 0.0 {
             continue;
         }
-        let crosses = (pa < 0.0) != (pb < 0.0);
-        let share = pa / (pa - pb);
-        let x = [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])];
-        let leaves = pb < 0.0;
-        if crosses && leaves {
-            b = x;
-        } else if crosses {
-            a = x;
-        }
+        let Cut { a, b, x, crosses, leaves } = cut_edge(a, b, pa, pb);
         add_edge(&mut s, &mut part.moments, &at, a, b);
         if crosses && crossed {
             let (from, to) = if leaves { (x, first) } else { (first, x) };
@@ -264,22 +283,13 @@ pub(crate) fn pressed_moments(
     let mut crossed = false;
     let mut first = [0.0; 2];
     for edge in face_edges(header, edges, face) {
-        let mut a = [edge[0], edge[1]];
-        let mut b = [edge[2], edge[3]];
+        let (a, b) = ([edge[0], edge[1]], [edge[2], edge[3]]);
         let pa = p[0] + p[1] * a[0] + p[2] * a[1];
         let pb = p[0] + p[1] * b[0] + p[2] * b[1];
         if pa < 0.0 && pb < 0.0 {
             continue;
         }
-        let crosses = (pa < 0.0) != (pb < 0.0);
-        let share = pa / (pa - pb);
-        let x = [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])];
-        let leaves = pb < 0.0;
-        if crosses && leaves {
-            b = x;
-        } else if crosses {
-            a = x;
-        }
+        let Cut { a, b, x, crosses, leaves } = cut_edge(a, b, pa, pb);
         add_moments(&mut moments, a, b);
         if crosses && crossed {
             let (from, to) = if leaves { (x, first) } else { (first, x) };
