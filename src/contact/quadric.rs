@@ -47,6 +47,9 @@ const MORE: usize = 1;
 const SHIFT: f64 = 1e-8;
 /// Turn of an arc's tangent up to which it is one element \[rad\].
 const TURN: f64 = 0.4;
+/// Length of a chord over the rings' farthest coordinate up to which it is rounding: where an edge
+/// passes through the conic's tip, its crossing and the tip are one point, found twice.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// `c + g . x + (l1 x1^2 + l2 x2^2) / 2`: no mixed term, the axes are the surface's own.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -251,6 +254,7 @@ impl Region {
                 (a.min(swap(x).x), b.max(swap(x).x))
             });
         let reach = |x: &f64| (low..=high).contains(x);
+        let farthest = rings.iter().flatten().map(|x| x.abs().max_element()).fold(0.0, f64::max);
         // Both branches of a cylinder's conic are lines, but for the square of the slope.
         let straight = l.x == 0.0 && g.x.abs() * (high - low) <= LINE * rest.abs();
         let tips: Vec<f64> =
@@ -268,6 +272,9 @@ impl Region {
                 let x = 0.5 * (pair[0].x + pair[1].x);
                 let w = width(x);
                 let middle = swap(DVec2::new(x, m + side * w.max(0.0).sqrt()));
+                if pair[0].distance(pair[1]) <= ROUNDING * farthest {
+                    continue;
+                }
                 if w > 0.0 && contains(rings, middle) {
                     let (a, b) = (swap(pair[0]), swap(pair[1]));
                     let inward = (b - a).perp().dot(u.slope(middle)) > 0.0;
@@ -297,13 +304,18 @@ impl Region {
         }
     }
 
-    /// An arc in pieces that turn little.
+    /// An arc in pieces that turn little and are short beside the ellipse's narrower half.
     fn push_arc(&mut self, a: DVec2, b: DVec2, depth: u32) {
         let (one, two) = (self.u.slope(a), self.u.slope(b));
         self.push(a, b, true);
+        let is_long = |element: &Element| {
+            element.arc.is_some_and(|arc| arc.bent.is_nan() || arc.bent > PANEL)
+        };
         if depth < 12
-            && one.angle_to(two).abs() > TURN
-            && let Some(element) = self.elements.pop_if(|element| (element.a, element.b) == (a, b))
+            && let Some(element) = self.elements.pop_if(|element| {
+                (element.a, element.b) == (a, b)
+                    && (one.angle_to(two).abs() > TURN || is_long(element))
+            })
         {
             let (middle, _) = self.at(&element, 0.5);
             self.push_arc(a, middle, depth + 1);

@@ -212,3 +212,37 @@ fn a_plane_agrees_with_the_planar_closed_forms() {
         }
     }
 }
+
+/// An edge of the polygon through the crest, as a pad's edge on a sphere's pole: where the edge
+/// meets the conic is its tip too.
+#[test]
+fn a_disk_halved_by_an_edge_is_half_a_disk() {
+    let edges = [vec![[-2.0, -2.0], [2.0, -2.0], [2.0, 0.0], [-2.0, 0.0]], {
+        vec![[0.0, -2.0], [2.0, -2.0], [2.0, 2.0], [0.0, 2.0]]
+    }];
+    for ring in edges {
+        let ring: Ring = ring.into_iter().map(DVec2::from).collect();
+        for i in 0..300 {
+            let (radius, l) = (0.3 + 0.003_1 * f64::from(i), 4.0);
+            let u = Quadratic { c: 0.5 * l * radius * radius, g: DVec2::ZERO, l: DVec2::splat(-l) };
+            let region = Region::new(&[ring.clone()], u);
+            let (area, load) = region.area_and_load();
+            let half = std::f64::consts::FRAC_PI_2 * radius * radius;
+            assert!((area / half - 1.0).abs() < 1e-8, "{radius} {area} {half}");
+            assert!((load / (0.25 * l * radius * radius * half) - 1.0).abs() < 1e-12, "{radius}");
+            for j in 0..6 {
+                let c = radius * (0.2 + 0.3 * f64::from(j)) * DVec2::from_angle(0.9 * f64::from(j));
+                let twist = [c.y, -c.x, 1.0];
+                let mut points = Default::default();
+                for element in &region.elements {
+                    let whole = [[0.0, 1.0]; 2];
+                    region.area_panel::<true>(element, twist, c, whole, 0, &mut points);
+                }
+                let (edges, by) = region.edges(c, true).assemble(c, 1.0);
+                assert!((edges.value / points.0.value - 1.0).abs() < 1e-11, "{radius} {c}");
+                let pairs = by.iter().flatten().zip(points.1.iter().flatten());
+                assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-9), "{radius} {c}");
+            }
+        }
+    }
+}
