@@ -49,7 +49,10 @@ const SHIFT: f64 = 1e-8;
 const TURN: f64 = 0.4;
 /// Length of a chord over the rings' farthest coordinate up to which it is rounding: where an edge
 /// passes through the conic's tip, its crossing and the tip are one point, found twice.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+/// A chord's step along the axis through the tips over that across it, up to which it stands for its
+/// arc.
+const STEEP: f64 = 1e-5;
 
 /// `c + g . x + (l1 x1^2 + l2 x2^2) / 2`: no mixed term, the axes are the surface's own.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -257,25 +260,38 @@ impl Region {
         let farthest = rings.iter().flatten().map(|x| x.abs().max_element()).fold(0.0, f64::max);
         // Both branches of a cylinder's conic are lines, but for the square of the slope.
         let straight = l.x == 0.0 && g.x.abs() * (high - low) <= LINE * rest.abs();
-        let tips: Vec<f64> =
-            roots(rest, g.x, 0.5 * l.x).into_iter().flatten().filter(reach).collect();
+        let tips = roots(rest, g.x, 0.5 * l.x);
+        // Beside a tip places are told apart by their distance from the axis.
+        let opens = |x: f64| -(g.x + l.x * x) / l.y > 0.0;
+        let along = |at: &DVec2| {
+            let is_here = |tip: &f64| (at.x - tip).abs() <= ROUNDING * farthest;
+            let x = tips.into_iter().flatten().find(is_here).unwrap_or(at.x);
+            [x, if opens(x) { (at.y - m).abs() } else { -(at.y - m).abs() }]
+        };
         for side in [-1.0, 1.0] {
             let mut events: Vec<DVec2> =
                 crossings.iter().map(|&x| swap(x)).filter(|x| side * (x.y - m) >= 0.0).collect();
-            events.extend(tips.iter().map(|&x| DVec2::new(x, m)));
+            events.extend(tips.into_iter().flatten().filter(reach).map(|x| DVec2::new(x, m)));
             let crest = -g.x / l.x;
             if reach(&crest) && width(crest) > 0.0 {
                 events.push(DVec2::new(crest, m + side * width(crest).sqrt()));
             }
-            events.sort_by(|a, b| a.x.total_cmp(&b.x));
+            events.sort_by(|a, b| {
+                let ([x, y], [z, w]) = (along(a), along(b));
+                x.total_cmp(&z).then(y.total_cmp(&w))
+            });
             for pair in events.windows(2) {
-                let x = 0.5 * (pair[0].x + pair[1].x);
-                let w = width(x);
-                let middle = swap(DVec2::new(x, m + side * w.max(0.0).sqrt()));
-                if pair[0].distance(pair[1]) <= ROUNDING * farthest {
+                let step = (pair[1] - pair[0]).abs();
+                if step.length() <= ROUNDING * farthest {
                     continue;
                 }
-                if w > 0.0 && contains(rings, middle) {
+                let chord = 0.5 * (pair[0] + pair[1]);
+                let w = width(chord.x);
+                // Beside a tip rounding leaves nothing of the width, and the chord is near enough.
+                let steep = step.x < STEEP * step.y;
+                let y = if steep { chord.y } else { m + side * w.max(0.0).sqrt() };
+                let middle = swap(DVec2::new(chord.x, y));
+                if (steep || w > 0.0) && contains(rings, middle) {
                     let (a, b) = (swap(pair[0]), swap(pair[1]));
                     let inward = (b - a).perp().dot(u.slope(middle)) > 0.0;
                     let (a, b) = if inward { (a, b) } else { (b, a) };

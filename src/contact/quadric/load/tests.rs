@@ -223,3 +223,19 @@ fn a_long_flat_arc_is_cut() {
     assert!(closed(&rings, &u).is_none());
     assert!((region.1 / lines.1 - 1.0).abs() < 1e-12, "{region:?} {lines:?}");
 }
+
+/// A ring that leaves the disc at its last corner, which lies on the circle.
+#[test]
+fn a_corner_on_the_circle_is_in_or_out() {
+    let ring = vec![DVec2::new(-1.0 + 1e-16, -1.0), DVec2::ZERO, DVec2::new(-1.0, 0.0)];
+    let u = Quadratic { c: 0.5, g: DVec2::ZERO, l: DVec2::splat(-1.0) };
+    for first in 0..3 {
+        let mut ring = ring.clone();
+        ring.rotate_left(first);
+        let (area, load) = area_and_load(&[ring], &u);
+        assert!(
+            (area - PI / 8.0).abs() < 1e-12 && (load - PI / 32.0).abs() < 1e-12,
+            "{area} {load}"
+        );
+    }
+}
