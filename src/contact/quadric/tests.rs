@@ -235,7 +235,7 @@ fn edges_through_the_crest_leave_sectors() {
         for i in 0..100 {
             let (radius, l) = (0.3 + 0.009_1 * f64::from(i), 4.0);
             let u = Quadratic { c: 0.5 * l * radius * radius, g: DVec2::ZERO, l: DVec2::splat(-l) };
-            let region = Region::new(&[ring.clone()], u);
+            let region = Region::new(std::slice::from_ref(&ring), u);
             let (area, load) = region.area_and_load();
             let wanted = share * std::f64::consts::PI * radius * radius;
             assert!((area / wanted - 1.0).abs() < 1e-8, "{radius} {area} {wanted}");

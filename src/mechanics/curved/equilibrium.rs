@@ -8,7 +8,7 @@ use glam::DVec2;
 use nalgebra::Vector5;
 
 use super::face::{Face, Pressed};
-use super::joint::{Joint, Mode, Place, Reached};
+use super::joint::{Joint, Mode, Near, Place, Reached};
 use super::slip::{self, Slipping, Space};
 use crate::model::Wrench;
 
@@ -206,8 +206,7 @@ impl<'a> Problem<'a> {
     /// Newton's step of the tilt.
     fn step(&self, state: &State<'a>, coupling: f64) -> Option<Vec<f64>> {
         let faces = [&state.faces[0], &state.faces[1]];
-        let give = faces[0].compression().max(faces[1].compression());
-        let joint = Joint::new(self, slip::length(faces), give).coupled(coupling);
+        let joint = Joint::new(self, &Near::new(faces)).coupled(coupling);
         let mut place = Place::new(faces);
         place.angles[..state.angles.len()].copy_from_slice(&state.angles);
         let mut mu = 1.0;
@@ -226,8 +225,7 @@ impl<'a> Problem<'a> {
         if self.held.is_empty() {
             return None;
         }
-        let give = pressed[0].compression().max(pressed[1].compression());
-        let joint = Joint::new(self, slip::length(pressed), give);
+        let joint = Joint::new(self, &Near::new(pressed));
         let solved = |place: &Place| match joint.newton(place, 0.0)? {
             Reached::Solution(found) => Some(found),
             Reached::Below(..) => None,

@@ -94,7 +94,7 @@ impl Face {
     }
 
     /// The area pressed at a compression and tilt, and the normal force.
-    fn press(&self, delta: f64, tilt: DVec2) -> (f64, f64) {
+    pub(super) fn press(&self, delta: f64, tilt: DVec2) -> (f64, f64) {
         let sums = self.fields.iter().map(|field| field.area_and_load(delta, self.sign * tilt));
         let (area, load) = sums.fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
         (area, self.stiffness * load)
@@ -137,12 +137,11 @@ impl Face {
     /// The pressure that carries `load` at a tilt; `start`: a compression near that of the pad's plane.
     pub(super) fn carry(&self, load: f64, tilt: DVec2, start: Option<f64>) -> Option<Pressed<'_>> {
         let delta = self.carrying(load, tilt, start, EXACT)?;
-        let regions = self.regions(delta, tilt);
-        let area = regions.iter().map(|region| region.area_and_load().0).sum();
-        Some(self.measure(delta, tilt, regions, load, area))
+        let (area, _) = self.press(delta, tilt);
+        Some(self.measure(delta, tilt, self.regions(delta, tilt), load, area))
     }
 
-    fn regions(&self, delta: f64, tilt: DVec2) -> Vec<Region> {
+    pub(super) fn regions(&self, delta: f64, tilt: DVec2) -> Vec<Region> {
         self.fields.iter().map(|field| field.pressed(delta, self.sign * tilt)).collect()
     }
 
@@ -206,7 +205,7 @@ impl Face {
         (error <= 1e-9 * load).then_some(delta)
     }
 
-    fn measure(
+    pub(super) fn measure(
         &self,
         delta: f64,
         tilt: DVec2,
@@ -226,17 +225,21 @@ impl Face {
             tilted: DVec2::ZERO,
             second: 0.0,
         };
-        let (mut first, mut slope, mut second) = (DVec2::ZERO, DVec2::ZERO, 0.0);
-        let (mut turn, mut tilted) = (0.0, DVec2::ZERO);
-        pressed.each(|field, x, grade, p| {
-            first += p * x;
-            slope += p * grade;
-            second += p * x.length_squared();
-            turn -= p * x.perp_dot(grade);
-            tilted += p * self.sign * field.felt(tilt);
-        });
-        (pressed.first, pressed.slope, pressed.second) = (first, slope, second);
-        (pressed.turn, pressed.tilted) = (turn, tilted);
+        for (field, region) in self.fields.iter().zip(&pressed.regions) {
+            if region.is_empty() {
+                continue;
+            }
+            let [sums @ .., second] =
+                region.pressure_moments(&field.gap).map(|sum| self.stiffness * sum);
+            let [load, x1, x2, slope1, slope2, turn] = field.carried(&sums);
+            let (first, around) = (DVec2::new(x1, x2), field.origin);
+            pressed.first += first;
+            pressed.slope += DVec2::new(slope1, slope2);
+            pressed.turn += turn;
+            pressed.tilted += load * self.sign * field.felt(tilt);
+            // About the origin of the pad plane, from that of the surface's axes.
+            pressed.second += second + around.dot(2.0 * first - load * around);
+        }
         pressed
     }
 }
@@ -326,6 +329,12 @@ impl Pressed<'_> {
                 visit(field, field.origin + field.outward(x), field.slope(x), p);
             });
         }
+    }
+
+    /// What the pressure carries.
+    pub(super) fn carried(&self) -> Carried {
+        let Self { load, first, slope, turn, .. } = *self;
+        Carried::new(load, first.x, first.y, slope.x, slope.y, turn)
     }
 
     /// Middle of pressure.
