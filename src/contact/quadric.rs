@@ -16,7 +16,7 @@ use std::sync::LazyLock;
 use glam::DVec2;
 
 pub(crate) use load::area_and_load;
-use moments::{Rows, moments, pressure_moments, second_moments, sums};
+use moments::{Rows, moments, second_moments, sums};
 
 use super::far::RULES;
 use super::lanes::{LANES, Lane};
@@ -453,7 +453,9 @@ impl Region {
 
     /// `int u q dA` for `q` of `1`, `x1`, `x2`, `x x grad gap` and `|x|^2`.
     pub fn pressure_moments(&self, gap: &Quadratic) -> [f64; 5] {
-        pressure_moments(self, gap)
+        let [[load, x1, x2, x11, x12, x22], _] = second_moments(self);
+        let turn = x1 * gap.g.y - x2 * gap.g.x + (gap.l.y - gap.l.x) * x12;
+        [load, x1, x2, turn, x11 + x22]
     }
 
     /// `int u |v| dA` for the twist `(u1, u2, omega)` about the origin of the region's axes, any

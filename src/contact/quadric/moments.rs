@@ -113,25 +113,3 @@ fn second_moments_in(region: &Region) -> [[f64; 6]; 2] {
     }
     [totals(&lanes[0]), totals(&lanes[1])]
 }
-
-widest! {
-    /// See [`Region::pressure_moments`].
-    pub(super) fn pressure_moments(region: &Region, gap: &Quadratic) -> [f64; 5] = pressure_moments_in
-}
-
-#[inline(always)]
-fn pressure_moments_in(region: &Region, gap: &Quadratic) -> [f64; 5] {
-    let mut lanes = [[0.0; LANES]; 5];
-    for [x, y, weights] in region.rows() {
-        for i in 0..LANES {
-            let at = DVec2::new(x[i], y[i]);
-            let pressure = weights[i] * region.u.value(at);
-            let turn = at.perp_dot(gap.slope(at));
-            for (lane, value) in lanes.iter_mut().zip([1.0, at.x, at.y, turn, at.length_squared()])
-            {
-                lane[i] += pressure * value;
-            }
-        }
-    }
-    totals(&lanes)
-}

@@ -5,9 +5,9 @@
 //! or none.
 
 use glam::DVec2;
-use nalgebra::Vector5;
+use nalgebra::{Vector3, Vector5};
 
-use super::face::{Face, Pressed};
+use super::face::{Carried, Face, Pressed};
 use super::joint::{Joint, Mode, Near, Place, Reached};
 use super::slip::{self, Slipping, Space};
 use crate::model::Wrench;
@@ -100,12 +100,19 @@ impl<'a> Problem<'a> {
         w
     }
 
+    /// What pressures bring, linear in what they carry: force along the pads and moment about the
+    /// closing axis, and the moment in the pad plane.
+    pub(super) fn brought(&self, one: &Carried, two: &Carried) -> (Vector3<f64>, DVec2) {
+        let half = 0.5 * self.distance;
+        let lever = |c: &Carried| DVec2::new(c[1] - half * c[3], c[2] - half * c[4]);
+        let slide = Vector3::new(-one[3] - two[3], -one[4] - two[4], one[5] + two[5]);
+        (slide, (lever(one) - lever(two)).perp())
+    }
+
     /// The moment in the pad plane that the pressure leaves over.
     pub(super) fn moment_beyond(&self, faces: [&Pressed<'_>; 2]) -> DVec2 {
-        let xi = |face: &Pressed<'_>| face.first - 0.5 * self.distance * face.slope;
-        let pressed = xi(faces[0]) - xi(faces[1]);
-        let outer = DVec2::new(self.wrench.moment.x, self.wrench.moment.y);
-        outer + DVec2::new(-pressed.y, pressed.x)
+        let (_, moment) = self.brought(&faces[0].carried(), &faces[1].carried());
+        self.wrench.moment.truncate() + moment
     }
 
     /// What friction would do with the pressure of a state if the force along the pads counted

@@ -94,7 +94,7 @@ impl Face {
     }
 
     /// The area pressed at a compression and tilt, and the normal force.
-    pub(super) fn press(&self, delta: f64, tilt: DVec2) -> (f64, f64) {
+    fn press(&self, delta: f64, tilt: DVec2) -> (f64, f64) {
         let sums = self.fields.iter().map(|field| field.area_and_load(delta, self.sign * tilt));
         let (area, load) = sums.fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
         (area, self.stiffness * load)
@@ -141,7 +141,14 @@ impl Face {
         Some(self.measure(delta, tilt, self.regions(delta, tilt), load, area))
     }
 
-    pub(super) fn regions(&self, delta: f64, tilt: DVec2) -> Vec<Region> {
+    /// What a compression presses without tilt; `None` where that is nothing.
+    pub(super) fn pressed_by(&self, delta: f64) -> Option<Pressed<'_>> {
+        let (area, load) = self.press(delta, DVec2::ZERO);
+        let regions = || self.regions(delta, DVec2::ZERO);
+        (load > 0.0).then(|| self.measure(delta, DVec2::ZERO, regions(), load, area))
+    }
+
+    fn regions(&self, delta: f64, tilt: DVec2) -> Vec<Region> {
         self.fields.iter().map(|field| field.pressed(delta, self.sign * tilt)).collect()
     }
 
@@ -205,7 +212,7 @@ impl Face {
         (error <= 1e-9 * load).then_some(delta)
     }
 
-    pub(super) fn measure(
+    fn measure(
         &self,
         delta: f64,
         tilt: DVec2,
@@ -319,14 +326,10 @@ impl FaceDissipation {
 impl Pressed<'_> {
     /// Visits points of the pressed area: place, slope of the gap there, normal force of the point.
     pub(super) fn points(&self, mut visit: impl FnMut(DVec2, DVec2, f64)) {
-        self.each(|_, x, slope, p| visit(x, slope, p));
-    }
-
-    fn each(&self, mut visit: impl FnMut(&Field, DVec2, DVec2, f64)) {
         for (field, region) in self.face.fields.iter().zip(&self.regions) {
             region.points(|x, weight| {
                 let p = self.face.stiffness * weight * region.compression(x);
-                visit(field, field.origin + field.outward(x), field.slope(x), p);
+                visit(field.origin + field.outward(x), field.slope(x), p);
             });
         }
     }

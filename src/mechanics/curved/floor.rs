@@ -12,9 +12,11 @@
 //! solution, which grows from that without a couple, cannot pass it.
 
 use glam::DVec2;
+use nalgebra::Vector5;
 
 use super::equilibrium::Problem;
 use super::face::{Carried, Face, Pressed};
+use super::slip::{self, Bearing, Slipping};
 
 /// The faces at a few depths, ready for many loads.
 #[derive(Debug)]
@@ -34,18 +36,6 @@ struct Level {
     moment: f64,
 }
 
-/// What the friction of a face bears, over `mu`.
-#[derive(Debug, Clone, Copy)]
-struct Bearing {
-    /// Force in any direction through the middle of pressure \[N\].
-    load: f64,
-    /// That middle \[m\].
-    centre: DVec2,
-    /// Force \[N\] and moment about the middle [N m] of a turn about it.
-    side: DVec2,
-    turn: f64,
-}
-
 /// Shares of the greatest compression by which the levels of a part that can tilt are pressed less.
 const DROPS: [f64; 6] = [0.02, 0.05, 0.1, 0.16, 0.23, 0.32];
 /// Pull on a pad over the gripping force up to which there are floors.
@@ -60,12 +50,20 @@ const SLACK: f64 = 1e-6;
 const ALIKE: [f64; 2] = [1e-9, 1e-6];
 
 impl Floors {
-    /// For pulls of up to `pull` \[N\] on the pads of a problem under its gripping force `force`; `None`
-    /// where the floors say nothing: two held axes, pieces that lean differently along the tilt, or a
+    /// For pulls of up to `pull` \[N\] on the pads of a problem under its gripping force `force`, which
+    /// alone presses the faces as `squeezed`; `None` where the floors say nothing: two held axes, pieces that lean differently along the tilt, or a
     /// pressure whose middle wanders with the force.
-    pub(super) fn new(problem: &Problem<'_>, force: f64, pull: f64) -> Option<Self> {
+    pub(super) fn new(
+        problem: &Problem<'_>,
+        squeezed: [&Pressed<'_>; 2],
+        force: f64,
+        pull: f64,
+    ) -> Option<Self> {
         let change = 0.5 * pull.max(2.0 * CHANGE * force);
-        if change > PULL * force || problem.held.len() > 1 || !problem.rolling.iter().all(is_none) {
+        if change > PULL * force
+            || problem.held.len() > 1
+            || problem.rolling.iter().any(|x| *x != 0.0)
+        {
             return None;
         }
         let range = [force - change, force + change];
@@ -73,10 +71,10 @@ impl Floors {
         let mut least = Vec::new();
         for (k, face) in problem.faces.into_iter().enumerate() {
             let at = |force: f64| face.carry(force, DVec2::ZERO, None);
-            let (low, middle, high) = (at(range[0])?, at(force)?, at(range[1])?);
+            let (low, high) = (at(range[0])?, at(range[1])?);
             carried[k] = [&low, &high].map(Pressed::carried);
             let reach = face.reach();
-            let bend = 0.5 * (carried[k][0] + carried[k][1]) - middle.carried();
+            let bend = 0.5 * (carried[k][0] + carried[k][1]) - squeezed[k].carried();
             let sizes = [1.0, reach, reach, 1.0, 1.0, reach];
             if bend.iter().zip(sizes).any(|(bend, size)| bend.abs() > LINE * force * size) {
                 return None;
@@ -137,27 +135,22 @@ impl Floors {
         }
         let Load { slide, turn, moment, first } = self.load(problem)?;
         let faces = &self.levels.first()?.faces;
+        let basis = [0, 1].map(|k| space.basis(k, *distance));
+        let mut w = Vector5::new(slide.x, slide.y, turn, 0.0, 0.0);
+        for (i, axis) in space.spins.iter().enumerate() {
+            w[3 + i] = axis.dot(moment);
+        }
         (0..2).find_map(|k| {
-            // The other face's force bears the moments about the face at rest.
-            let (other, to_rest) = (1 - k, if k == 0 { 0.5 * distance } else { -0.5 * distance });
-            let spins = space.spins.iter();
-            let sliding: DVec2 = spins
-                .map(|axis| {
-                    let across = axis.perp();
-                    (axis.dot(moment) + to_rest * across.dot(slide)) / (2.0 * to_rest) * across
-                })
-                .sum();
-            let mu = sliding.length() / normal[other];
-            let resting = slide - sliding;
-            let turn = turn - first[other].perp_dot(sliding) / normal[other];
-            let turned = (turn - faces[k].centre.perp_dot(resting)) / faces[k].turn;
-            (faces[k].asks(resting, turned) <= mu * (1.0 - SLACK)).then_some(mu)
+            let slides = (normal[1 - k], first[1 - k]);
+            let Slipping { mu, shares, .. } =
+                slip::rolling(&basis, space.spins.len(), k, &w, slides)?;
+            (faces[k].bears(&shares[k]) <= mu * (1.0 - SLACK)).then_some(mu)
         })
     }
 
     /// `None` where the normal forces are beyond those looked at.
     fn load(&self, problem: &Problem<'_>) -> Option<Load> {
-        let Problem { normal, distance, wrench, .. } = problem;
+        let Problem { normal, wrench, .. } = problem;
         let [low, high] = self.range;
         if normal.iter().any(|n| *n < low || *n > high) {
             return None;
@@ -166,13 +159,11 @@ impl Floors {
             let share = (normal[k] - low) / (high - low);
             self.carried[k][0].lerp(&self.carried[k][1], share)
         });
-        let half = 0.5 * distance;
-        let lever = |c: &Carried| DVec2::new(c[1] - half * c[3], c[2] - half * c[4]);
-        let pressed = lever(&one) - lever(&two);
+        let (brought, moment) = problem.brought(&one, &two);
         Some(Load {
-            slide: wrench.force.truncate() - DVec2::new(one[3] + two[3], one[4] + two[4]),
-            turn: wrench.moment.z + one[5] + two[5],
-            moment: wrench.moment.truncate() + pressed.perp(),
+            slide: wrench.force.truncate() + DVec2::new(brought.x, brought.y),
+            turn: wrench.moment.z + brought.z,
+            moment: wrench.moment.truncate() + moment,
             first: [&one, &two].map(|c| DVec2::new(c[1], c[2])),
         })
     }
@@ -189,10 +180,6 @@ struct Load {
     first: [DVec2; 2],
 }
 
-fn is_none(stiffness: &f64) -> bool {
-    *stiffness == 0.0
-}
-
 /// Both faces pressed by the share `drop` of their compression less than `least`, or by a smaller one;
 /// `reach`: the greatest change of the compression per tilt along a direction \[m\].
 fn level(least: [&Pressed<'_>; 2], along: DVec2, reach: [f64; 2], drop: f64) -> Option<Level> {
@@ -205,29 +192,7 @@ fn level(least: [&Pressed<'_>; 2], along: DVec2, reach: [f64; 2], drop: f64) -> 
     Some(Level { faces: [0, 1].map(|k| Bearing::of(&floors[k])), moment: tilt * stiffness })
 }
 
-impl Bearing {
-    fn of(pressed: &Pressed<'_>) -> Self {
-        let centre = pressed.centre();
-        let turn = pressed.support(&nalgebra::Vector3::new(centre.y, -centre.x, 1.0));
-        let side = DVec2::new(turn.x, turn.y);
-        Self { load: pressed.load, centre, side, turn: turn.z - centre.perp_dot(side) }
-    }
-
-    /// A friction at which the face bears a force through the middle of pressure and `turned` times
-    /// what a turn about it does.
-    fn asks(&self, force: DVec2, turned: f64) -> f64 {
-        (force - turned * self.side).length() / self.load + turned.abs()
-    }
-}
-
 impl Face {
-    /// The face without tilt at a compression; `None` where nothing is pressed.
-    fn pressed_by(&self, delta: f64) -> Option<Pressed<'_>> {
-        let (area, load) = self.press(delta, DVec2::ZERO);
-        (load > 0.0)
-            .then(|| self.measure(delta, DVec2::ZERO, self.regions(delta, DVec2::ZERO), load, area))
-    }
-
     /// Greatest change of the compression per tilt along a direction \[m\]; `None` where a piece bends
     /// along it, or where they lean along it by different slopes.
     fn tilted(&self, along: DVec2) -> Option<f64> {

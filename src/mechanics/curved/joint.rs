@@ -140,6 +140,7 @@ const CONTRACTION: f64 = 0.25;
 const WITHIN: f64 = 2.0;
 
 impl<'p, 'a> Joint<'p, 'a> {
+    /// `near`: of faces without tilt, or of a state nearby.
     pub(super) fn new(problem: &'p Problem<'a>, near: &Near) -> Self {
         let (space, distance) = (&problem.space, problem.distance);
         let Near { length, give, carried: [one, two] } = near;
@@ -204,11 +205,7 @@ impl<'p, 'a> Joint<'p, 'a> {
     /// What pressures mean for the load along the motions, in units, and for the moment in the pad
     /// plane; linear in what they carry.
     fn effect(&self, one: &Carried, two: &Carried) -> (Vector5<f64>, DVec2) {
-        let half = 0.5 * self.problem.distance;
-        let lever = |c: &Carried| DVec2::new(c[1] - half * c[3], c[2] - half * c[4]);
-        let pressed = lever(one) - lever(two);
-        let moment = DVec2::new(-pressed.y, pressed.x);
-        let slide = Vector3::new(-one[3] - two[3], -one[4] - two[4], one[5] + two[5]);
+        let (slide, moment) = self.problem.brought(one, two);
         (self.along(slide, moment), moment)
     }
 

@@ -140,7 +140,8 @@ impl Pads {
         };
         let problem = case.problem(is_free);
         let pull = f64::max(-low, high);
-        let floors = (wrenches.len() >= MANY).then(|| Floors::new(&problem, force, pull)).flatten();
+        let floors =
+            if wrenches.len() >= MANY { Floors::new(&problem, faces, force, pull) } else { None };
         let (near, known) = (Near::new(faces), Vec::new());
         Some(Screen { problem, force, near, rolling, floors, known, pressed })
     }

@@ -5,11 +5,10 @@ use super::*;
 use crate::contact::surface::{Piece, Surfaces};
 use crate::model::{Gap, Wrench};
 
-/// A gap and whether a cylinder's or ball's radius is half the distance, with its polygon's half
-/// sides.
+/// Both faces alike, of a cylinder, a ball, a cone or planes, with their distance.
 fn surfaces(kind: u32, half: [f64; 2], off: f64) -> (Surfaces, f64) {
     let radius = 0.01;
-    let (axis, at, height) = (glam::DVec2::X, glam::DVec2::ZERO, 0.0);
+    let (axis, at, height) = (DVec2::X, DVec2::ZERO, 0.0);
     let gap = match kind {
         0 => Gap::Cylinder { radius, axis, at, height },
         1 => Gap::Sphere { radius, at, height },
@@ -17,14 +16,10 @@ fn surfaces(kind: u32, half: [f64; 2], off: f64) -> (Surfaces, f64) {
         _ => Gap::default(),
     };
     let [x, y] = half;
-    let outer =
-        [(-x, -y), (x, -y), (x, y), (-x, y)].map(|(a, b)| glam::DVec2::new(a + off, b)).to_vec();
+    let outer = [(-x, -y), (x, -y), (x, y), (-x, y)].map(|(a, b)| DVec2::new(a + off, b)).to_vec();
     let piece = Piece { outer, holes: Vec::new(), gap };
-    let faces = (vec![piece.clone()], vec![piece]);
-    let distance = 2.0 * radius;
-    let surfaces =
-        Surfaces { face_i: faces.0, face_ii: faces.1, stiffness: [5e9, 3e9], layer: None };
-    (surfaces, distance)
+    let (face_i, face_ii) = (vec![piece.clone()], vec![piece]);
+    (Surfaces { face_i, face_ii, stiffness: [5e9, 3e9], layer: None }, 2.0 * radius)
 }
 
 proptest! {
@@ -37,7 +32,7 @@ proptest! {
         half in [0.004..0.012_f64, 0.006..0.01_f64],
         off in -0.004..0.004_f64,
         loads in prop::collection::vec(
-            (prop::array::uniform3(-1.0..1.0_f64), prop::array::uniform3(-1.0..1.0_f64)), 16,
+            (prop::array::uniform3(-1.0..1.0_f64), prop::array::uniform3(-1.0..1.0_f64)), MANY,
         ),
         size in 0.5..40.0_f64,
         share in 0.2..3.0_f64,
