@@ -77,6 +77,30 @@ impl Quadratic {
         self.g + self.l * x
     }
 
+    /// Greatest value within rings.
+    pub(crate) fn greatest(&self, rings: &[Ring]) -> f64 {
+        let mut most = f64::NEG_INFINITY;
+        for ring in rings {
+            let Some(&last) = ring.last() else { continue };
+            let mut a = last;
+            for &b in ring {
+                // Along an edge it may be greatest between its ends.
+                let step = b - a;
+                let bend = self.l.dot(step * step);
+                let t = if bend < 0.0 { -self.slope(a).dot(step) / bend } else { 0.0 };
+                most = most.max(self.value(b)).max(self.value(a + t.clamp(0.0, 1.0) * step));
+                a = b;
+            }
+        }
+        // Or at its own crest; one that is a line crosses an edge.
+        if self.l.max_element() < 0.0 {
+            let top = -self.g / self.l;
+            let is_within = rings.iter().filter(|ring| ring_contains(ring, top)).count() % 2 == 1;
+            most = if is_within { most.max(self.value(top)) } else { most };
+        }
+        most
+    }
+
     /// Greatest value that it can have within the ring, or more.
     fn bound(&self, ring: &[DVec2]) -> f64 {
         let along = |g: f64, l: f64, x: f64| g * x + 0.5 * l * x * x;

@@ -333,3 +333,41 @@ proptest! {
         }
     }
 }
+
+/// On a grid of points, and where an area under pressure has it.
+#[test]
+fn the_greatest_value_is_that_of_points() {
+    let ring = |shift: DVec2, size: f64| -> Ring {
+        let step = std::f64::consts::TAU / 7.0;
+        let corner = |k: u32| {
+            shift + size * (1.0 + 0.3 * f64::from(k % 3)) * DVec2::from_angle(step * f64::from(k))
+        };
+        (0..7).map(corner).collect()
+    };
+    for k in 0..60_u32 {
+        let part = |n: u32| (f64::from(k * n + n) * 0.618_034).fract() - 0.5;
+        let outer = ring(DVec2::new(part(1), part(2)), 1.0);
+        let mut hole = ring(DVec2::new(part(1), part(2)), 0.4);
+        hole.reverse();
+        let rings = if k % 2 == 0 { vec![outer] } else { vec![outer, hole] };
+        let bends =
+            [DVec2::new(-1.0, -2.0), DVec2::new(0.0, -1.0), DVec2::ZERO, DVec2::new(0.5, -1.0)];
+        let g = 2.0 * DVec2::new(part(3), part(5));
+        let u = Quadratic { c: 0.4, g, l: bends[k as usize % 4] };
+        let found = u.greatest(&rings);
+        let mut most = f64::NEG_INFINITY;
+        for i in -500..=500 {
+            for j in -500..=500 {
+                let x = 0.004 * DVec2::new(f64::from(i), f64::from(j));
+                if u.value(x) > most
+                    && rings.iter().filter(|ring| ring_contains(ring, x)).count() == 1
+                {
+                    most = u.value(x);
+                }
+            }
+        }
+        assert!((-1e-12..0.03).contains(&(found - most)), "{k}: {found} {most}");
+        let region = Region::new(&rings, u).greatest();
+        assert!((found.max(0.0) - region).abs() < 1e-8, "{k}: {found} {region}");
+    }
+}

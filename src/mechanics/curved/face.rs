@@ -67,6 +67,8 @@ pub(super) struct FaceDissipation {
 const STEPS: u32 = 200;
 /// Share of a force that rounding may leave.
 const ROUNDING: f64 = 1e-13;
+/// Share of it from which one step is enough but for the rounding.
+const NEAR: f64 = 1e-7;
 /// Share of it below which nothing is gained.
 const EXACT: f64 = 2e-16;
 
@@ -163,6 +165,11 @@ impl Face {
         self.stiffness * regions.iter().map(Region::greatest).fold(0.0, f64::max)
     }
 
+    /// Greatest compression without tilt at one of the pad's plane \[m\].
+    pub(super) fn compressed(&self, delta: f64) -> f64 {
+        self.fields.iter().map(|field| field.greatest(delta)).fold(0.0, f64::max)
+    }
+
     /// The compression of [`Self::carry`] without tilt.
     pub(super) fn squeeze(&self, load: f64) -> Option<f64> {
         self.carrying(load, DVec2::ZERO, None, EXACT)
@@ -202,6 +209,10 @@ impl Face {
                     && error.abs() <= ROUNDING * load
             {
                 return Some(delta);
+            }
+            // The step from so near leaves the square of it.
+            if within > EXACT && error.abs() <= NEAR * load {
+                return Some(delta - error / (self.stiffness * area));
             }
             if best.is_none_or(|(_, least)| error.abs() < least) {
                 best = Some((delta, error.abs()));
