@@ -313,7 +313,7 @@ impl Region {
                 let chord = 0.5 * (pair[0] + pair[1]);
                 let w = width(chord.x);
                 // Beside a tip rounding leaves nothing of the width, and the chord is near enough.
-                let steep = step.x < STEEP * step.y;
+                let steep = step.x < (STEEP * step.y).max(ROUNDING * farthest);
                 let y = if steep { chord.y } else { m + side * w.max(0.0).sqrt() };
                 let middle = swap(DVec2::new(chord.x, y));
                 if (steep || w > 0.0) && contains(rings, middle) {
@@ -411,9 +411,9 @@ impl Region {
         }
     }
 
-    /// Calls `visit` with points of the area and their weights, right for polynomials of `x` up to
-    /// the fourth degree besides `u` on straight pieces; weights may be negative where the area is
-    /// not convex.
+    /// Calls `visit` with points of the area and their weights, right for polynomials of `x` besides `u`:
+    /// up to the second degree where `u` is linear, else up to the fourth on straight pieces; weights may
+    /// be negative where the area is not convex.
     pub fn points(&self, mut visit: impl FnMut(DVec2, f64)) {
         for [x, y, weights] in self.rows() {
             for i in 0..LANES {
@@ -510,6 +510,10 @@ impl Region {
         let near = OUTSIDE * omega.abs() * self.half.min_element();
         let centre = DVec2::new(-u2, u1) / omega;
         if outside.length_squared() > near * near {
+            if self.u.l == DVec2::ZERO {
+                self.triangles::<BY>(twist, centre, &mut sum);
+                return sum;
+            }
             let whole = [[0.0, 1.0]; 2];
             for element in &self.elements {
                 self.area_panel::<BY>(element, twist, centre, whole, 0, &mut sum);

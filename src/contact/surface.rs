@@ -199,6 +199,11 @@ impl Field {
         corners.fold(value(DVec2::ZERO), f64::min)
     }
 
+    /// Slopes of the gap at the polygon's corners, in the pad plane: the steepest is among them.
+    pub(crate) fn slopes(&self) -> impl Iterator<Item = DVec2> {
+        self.rings.iter().flatten().map(|x| self.slope(*x))
+    }
+
     /// Corners of the polygon in the pad plane.
     pub(crate) fn corners(&self) -> impl Iterator<Item = DVec2> {
         self.rings.iter().flatten().map(|x| self.origin + self.outward(*x))
