@@ -1,7 +1,8 @@
 //! Grips on what is not plane: on the processor, the loads that can be the worst solved to the end.
 //!
 //! The seed stage knows the twists of planes only. Here a load begins at the state of another one
-//! ([`Screen`]), and those that stay below the worst are left before their solution.
+//! ([`Screen`]), and those that stay below the worst are left before their solution. Where loads cannot
+//! be compared all are solved, those first that may be the worst.
 
 use rayon::prelude::*;
 
@@ -32,7 +33,7 @@ pub fn score_curved(problems: &[CurvedProblem<'_>], polish: Polish) -> Vec<Score
         .par_iter()
         .map(|problem| match polish {
             Polish::All => problem.score_all(),
-            _ => problem.screened(None).unwrap_or_else(|| problem.score(None)),
+            _ => problem.score(None),
         })
         .collect()
 }
@@ -45,10 +46,7 @@ pub fn score_curved_best(
 ) -> Vec<Scored> {
     let promise = |(index, problem): (usize, &CurvedProblem<'_>)| merit(index, problem.about());
     let promise = problems.par_iter().enumerate().map(promise).collect();
-    race(promise, best, merit, &|index, beaten| {
-        let problem = &problems[index];
-        problem.screened(Some(beaten)).unwrap_or_else(|| problem.score(Some(beaten)))
-    })
+    race(promise, best, merit, &|index, beaten| problems[index].score(Some(beaten)))
 }
 
 /// Loads looked at so far.
@@ -71,12 +69,19 @@ impl Seen {
 impl CurvedProblem<'_> {
     /// About the `mu_s` of the worst load, for the order of grips.
     fn about(&self) -> f64 {
-        let lever = self.pads.map_or(f64::INFINITY, |pads| 0.5 * pads.reach());
-        let about = |wrench: &Wrench| {
-            let slide = wrench.force.x.hypot(wrench.force.y);
-            slide.hypot(wrench.moment.z / lever) / (2.0 * self.force - wrench.force.z.abs())
-        };
-        self.wrenches.iter().map(about).fold(0.0, f64::max)
+        let lever = self.lever();
+        self.wrenches.iter().map(|wrench| self.roughly(wrench, lever)).fold(0.0, f64::max)
+    }
+
+    /// Lever of friction that turns about the closing axis, about \[m\].
+    fn lever(&self) -> f64 {
+        self.pads.map_or(f64::INFINITY, |pads| 0.5 * pads.reach())
+    }
+
+    /// About the `mu_s` of a load.
+    fn roughly(&self, wrench: &Wrench, lever: f64) -> f64 {
+        let slide = wrench.force.x.hypot(wrench.force.y);
+        slide.hypot(wrench.moment.z / lever) / (2.0 * self.force - wrench.force.z.abs())
     }
 
     fn solve(&self, load: usize) -> Score {
@@ -96,29 +101,20 @@ impl CurvedProblem<'_> {
         Scored { worst, solved: all.len(), all, compared: 0, outranked: false }
     }
 
-    /// Every load solved, up to the first that is not held, or that is beaten.
+    /// The worst load from few solutions, or from all where loads cannot be compared. `beaten`: whether a
+    /// grip of at least this `mu_s` need not be solved to the end.
     fn score(&self, beaten: Option<&Beaten<'_>>) -> Scored {
-        let mut seen = Seen::default();
-        for load in 0..self.wrenches.len() {
-            let score = self.solve(load);
-            seen.solved.push((load, score));
-            match usable(&score) {
-                Some(mu) if beaten.is_some_and(|beaten| beaten(mu)) => return seen.outranked(),
-                Some(_) => {}
-                None => break,
-            }
-        }
-        let Seen { solved, compared, .. } = seen;
-        let worst = worst(solved.iter().copied());
-        Scored { worst, all: Vec::new(), solved: solved.len(), compared, outranked: false }
+        let Self { pads, distance, force, wrenches } = *self;
+        self.compared(pads.and_then(|pads| pads.screen(distance, force, wrenches)), beaten)
     }
 
-    /// The same answer from fewer solutions; `None` where loads cannot be compared. `beaten`: whether
-    /// a grip of at least this `mu_s` need not be solved to the end.
-    fn screened(&self, beaten: Option<&Beaten<'_>>) -> Option<Scored> {
-        let mut screen = self.pads?.screen(self.distance, self.force, self.wrenches)?;
-        let estimates: Vec<f64> =
-            self.wrenches.iter().map(|wrench| screen.estimate(wrench)).collect();
+    fn compared(&self, mut screen: Option<Screen<'_>>, beaten: Option<&Beaten<'_>>) -> Scored {
+        let lever = self.lever();
+        let estimate = |wrench: &Wrench| match &screen {
+            Some(screen) => screen.estimate(wrench),
+            None => self.roughly(wrench, lever),
+        };
+        let estimates: Vec<f64> = self.wrenches.iter().map(estimate).collect();
         let mut order: Vec<usize> = (0..self.wrenches.len()).collect();
         order.sort_by(|&a, &b| estimates[b].total_cmp(&estimates[a]).then(a.cmp(&b)));
         let (mut seen, mut largest) = (Seen::default(), 0.0);
@@ -127,10 +123,10 @@ impl CurvedProblem<'_> {
                 Some(mu) => {
                     largest = f64::max(largest, mu);
                     if beaten.is_some_and(|beaten| beaten(largest)) {
-                        return Some(seen.outranked());
+                        return seen.outranked();
                     }
                 }
-                None => return Some(self.first_refused(&mut screen, &order[place..], seen)),
+                None => return self.first_refused(&mut screen, &order[place..], seen),
             }
         }
         // The first of those that tie is the answer.
@@ -139,10 +135,8 @@ impl CurvedProblem<'_> {
         for (load, mu) in std::mem::take(&mut seen.near) {
             let score = self.solve(load);
             seen.solved.push((load, score));
-            let found = usable(&score)?;
-            if (found - mu).abs() > TIE * mu {
-                return None;
-            }
+            let found = usable(&score).filter(|found| (found - mu).abs() <= TIE * mu);
+            let Some(found) = found else { return self.compared(None, beaten) };
             if found >= largest * (1.0 - TIE) {
                 break;
             }
@@ -150,18 +144,22 @@ impl CurvedProblem<'_> {
         seen.solved.sort_by_key(|&(load, _)| load);
         let Seen { solved, compared, .. } = seen;
         let worst = worst(solved.iter().copied());
-        Some(Scored { worst, all: Vec::new(), solved: solved.len(), compared, outranked: false })
+        Scored { worst, all: Vec::new(), solved: solved.len(), compared, outranked: false }
     }
 
     /// At least the `mu_s` of a load that is held, or no more than `value`.
     fn held(
         &self,
-        screen: &mut Screen<'_>,
+        screen: &mut Option<Screen<'_>>,
         load: usize,
         value: f64,
         seen: &mut Seen,
     ) -> Option<f64> {
-        match screen.compare(&self.wrenches[load], value) {
+        let compared = match screen {
+            Some(screen) => screen.compare(&self.wrenches[load], value),
+            None => Compared::Open,
+        };
+        match compared {
             Compared::Below => {
                 seen.compared += 1;
                 Some(0.0)
@@ -180,7 +178,12 @@ impl CurvedProblem<'_> {
     }
 
     /// The answer where the first load of `rest` is not held: it, or one before it by number.
-    fn first_refused(&self, screen: &mut Screen<'_>, rest: &[usize], mut seen: Seen) -> Scored {
+    fn first_refused(
+        &self,
+        screen: &mut Option<Screen<'_>>,
+        rest: &[usize],
+        mut seen: Seen,
+    ) -> Scored {
         let mut open: Vec<usize> = rest[1..].iter().copied().filter(|&x| x < rest[0]).collect();
         open.sort_unstable();
         open.into_iter().find(|&load| self.held(screen, load, 0.0, &mut seen).is_none());
