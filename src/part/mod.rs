@@ -26,6 +26,7 @@ mod given;
 pub mod health;
 mod mass;
 mod noise;
+mod order;
 mod orient;
 mod pairs;
 mod read;
@@ -343,8 +344,9 @@ impl Part {
         Ok(part)
     }
 
-    fn build(soup: weld::Soup, unit: Unit, options: &ReadOptions, place: &str) -> Result<Self> {
+    fn build(mut soup: weld::Soup, unit: Unit, options: &ReadOptions, place: &str) -> Result<Self> {
         check_extent(&soup, unit, place)?;
+        order::sort(&mut soup);
         let mut repaired = repair::repair(soup, unit.metres(), place)?;
         if let Some(fit) = options.fit {
             fitted::check(fit, repaired.diagonal)?;

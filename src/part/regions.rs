@@ -4,10 +4,12 @@
 //! distance of the region's plane and whose normals agree within an angle; both tests are needed.
 //! The distance is scaled to the part. The angle is widened for a narrow triangle by what the
 //! uncertainty of its corners can tilt it: refining a plane in 32-bit floats leaves slivers whose
-//! normals point anywhere. The plane is refitted each time the region has doubled.
+//! normals point anywhere. The plane is refitted each time the region has doubled, between
+//! rings of neighbours.
 
 use glam::DVec3;
 use nalgebra::Matrix3;
+use rayon::prelude::*;
 
 use super::Mesh;
 use super::given::{GivenFaces, Stated};
@@ -16,6 +18,11 @@ use super::topology::NONE;
 
 /// Angle between a wide triangle and its face: 0.2 degrees.
 const ANGLE: f64 = 0.2 * std::f64::consts::PI / 180.0;
+
+/// Factor above the largest area from which its steps of two are counted.
+const EQUAL: f64 = 1.001;
+/// Square of the sine of the angle between triangles below which they are level: 1e-6.
+const LEVEL: f64 = 1e-12;
 
 /// How exactly a triangle must lie in a region's plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -146,7 +153,7 @@ fn twice_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
 /// Partitions the triangles into planar regions. A plane that the file states is a region as it is;
 /// others end where faces do that the file states.
 pub(super) fn grow(part: &Repaired, given: &GivenFaces, flatness: Flatness) -> Regions {
-    let seeds = seeds(&part.mesh);
+    let seeds = seeds(part);
     grow_from(part, given, flatness, seeds.iter().map(std::slice::from_ref))
 }
 
@@ -190,7 +197,7 @@ fn grow_from<'a>(
         }
         let plane = Plane { normal, offset: normal.dot(origin), tilt: 0.0 };
         let centre = sums.centre();
-        let centre = centre - normal * (normal.dot(centre - origin));
+        let centre = centre - normal * normal.dot(centre - origin);
         regions.push(Region { begin, end: order.len(), plane, area: sums.area, centre });
     }
     for start in starts {
@@ -222,22 +229,26 @@ fn grow_from<'a>(
         refused.clear();
         loop {
             while next < order.len() {
-                let triangle = order[next];
-                next += 1;
-                for half in triangle * 3..triangle * 3 + 3 {
-                    let twin = part.edges.twin[half as usize];
-                    if twin == NONE || region_of[(twin / 3) as usize] != NONE {
-                        continue;
-                    }
-                    let other = twin / 3;
-                    if given.of(other) != own {
-                        continue;
-                    }
-                    if take(mesh, other, &plane, distance, uncertainty, &mut sums) {
-                        region_of[other as usize] = number;
-                        order.push(other);
-                    } else {
-                        refused.push(other);
+                // One ring of neighbours with one plane: their order does not matter.
+                let ring = next..order.len();
+                next = ring.end;
+                for index in ring {
+                    let triangle = order[index];
+                    for half in triangle * 3..triangle * 3 + 3 {
+                        let twin = part.edges.twin[half as usize];
+                        if twin == NONE || region_of[(twin / 3) as usize] != NONE {
+                            continue;
+                        }
+                        let other = twin / 3;
+                        if given.of(other) != own {
+                            continue;
+                        }
+                        if take(mesh, other, &plane, distance, uncertainty, &mut sums) {
+                            region_of[other as usize] = number;
+                            order.push(other);
+                        } else {
+                            refused.push(other);
+                        }
                     }
                 }
                 if order.len() - begin >= refit_at {
@@ -275,6 +286,59 @@ fn grow_from<'a>(
     Regions { all: regions, order, of: region_of }
 }
 
+/// The triangles of a region in the order in which they are met going outwards from the first of the
+/// largest, their plane and the middle of their area. They are those with the `number` in `of`.
+pub(super) fn gathered(
+    part: &Repaired,
+    triangles: &[u32],
+    number: u32,
+    of: &mut [u32],
+) -> Option<(Vec<u32>, Plane, DVec3)> {
+    let step = |triangle: u32| area_step(twice_normal(part.mesh.corners(triangle)));
+    let first = triangles.iter().copied().min_by_key(|&triangle| (step(triangle), triangle))?;
+    let mut order = Vec::with_capacity(triangles.len());
+    let mut is_met = |triangle: u32| {
+        let of = &mut of[triangle as usize];
+        *of != number || std::mem::replace(of, NONE) == NONE
+    };
+    let mut sums = Sums::new(part.mesh.corners(first)[0]);
+    // One that hangs together has no other starts.
+    for &start in std::iter::once(&first).chain(triangles) {
+        if is_met(start) {
+            continue;
+        }
+        let mut next = order.len();
+        order.push(start);
+        while next < order.len() {
+            let triangle: u32 = order[next];
+            next += 1;
+            let corners = part.mesh.corners(triangle);
+            let cross = twice_normal(corners);
+            sums.add(corners, cross, cross.length() / 2.0);
+            for half in triangle * 3..triangle * 3 + 3 {
+                let twin = part.edges.twin[half as usize];
+                if twin != NONE && !is_met(twin / 3) {
+                    order.push(twin / 3);
+                }
+            }
+        }
+    }
+    order.iter().for_each(|&triangle| of[triangle as usize] = number);
+    Some((order, sums.fit(part.noise)?, sums.centre()))
+}
+
+/// The middle of the area of triangles in a plane through `origin` that is known.
+pub(super) fn middle(mesh: &Mesh, triangles: &[u32], origin: DVec3, normal: DVec3) -> DVec3 {
+    let mut sums = Sums::new(origin);
+    for &triangle in triangles {
+        let corners = mesh.corners(triangle);
+        let cross = twice_normal(corners);
+        sums.add(corners, cross, cross.length() / 2.0);
+    }
+    let centre = sums.centre();
+    centre - normal * normal.dot(centre - origin)
+}
+
 /// Adds a triangle to the sums if it lies in the plane.
 fn take(
     mesh: &Mesh,
@@ -305,28 +369,44 @@ fn take(
     true
 }
 
-/// Triangles by falling area, in steps of a factor of two: a counting sort by the exponent, file
-/// order within a step.
-fn seeds(mesh: &Mesh) -> Vec<u32> {
-    let exponents: Vec<u16> = (0..mesh.triangles.len() as u32)
-        .map(|triangle| {
-            let squared = twice_normal(mesh.corners(triangle)).length_squared();
-            // Exponent of the squared area; half of it is that of the area.
-            (0x7ff - ((squared.to_bits() >> 52) as u16 & 0x7ff)) / 2
+/// Step of a factor of two of a triangle's area, falling, by the vector of twice that length.
+fn area_step(twice_normal: DVec3) -> u16 {
+    // Exponent of the squared area; half of it is that of the area.
+    (0x7ff - ((twice_normal.length_squared().to_bits() >> 52) as u16 & 0x7ff)) / 2
+}
+
+/// Triangles by falling area, in steps of a factor of two from the largest; within a step the one
+/// that bends least against its neighbours first, so that a plane that runs out into a bend is
+/// found from its middle.
+fn seeds(part: &Repaired) -> Vec<u32> {
+    let normals: Vec<DVec3> = (0..part.mesh.triangles.len() as u32)
+        .into_par_iter()
+        .map(|triangle| twice_normal(part.mesh.corners(triangle)))
+        .collect();
+    let largest = normals.iter().map(|normal| normal.length_squared()).fold(0.0, f64::max).sqrt();
+    // Rounding does not part equal areas at a step.
+    let scale = 1.0 / (EQUAL * largest).max(f64::MIN_POSITIVE);
+    let mut keys: Vec<u64> = normals
+        .par_iter()
+        .zip(0..normals.len())
+        .map(|(normal, triangle)| {
+            let step = u64::from(area_step(*normal * scale));
+            let neighbours = part.edges.twin[3 * triangle..3 * triangle + 3].iter();
+            let bend = neighbours
+                .filter(|&&twin| twin != NONE)
+                .map(|&twin| {
+                    let other = normals[(twin / 3) as usize];
+                    let across = normal.cross(other).length_squared();
+                    across
+                        / (normal.length_squared() * other.length_squared()).max(f64::MIN_POSITIVE)
+                })
+                .fold(0.0, f64::max);
+            // Sign and exponent of a 32-bit number and 12 bits of its mantissa: numbers above zero
+            // compare as their bits do. Below the floor it is rounding.
+            let bend = if bend > LEVEL { (bend as f32).to_bits() >> 11 } else { 0 };
+            (step << 53) | (u64::from(bend) << 32) | triangle as u64
         })
         .collect();
-    let mut starts = vec![0_u32; 0x402];
-    for &exponent in &exponents {
-        starts[exponent as usize + 1] += 1;
-    }
-    for index in 1..starts.len() {
-        starts[index] += starts[index - 1];
-    }
-    let mut seeds = vec![0; exponents.len()];
-    for (triangle, &exponent) in exponents.iter().enumerate() {
-        let slot = &mut starts[exponent as usize];
-        seeds[*slot as usize] = triangle as u32;
-        *slot += 1;
-    }
-    seeds
+    keys.par_sort_unstable();
+    keys.into_iter().map(|key| key as u32).collect()
 }

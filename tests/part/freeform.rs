@@ -72,3 +72,64 @@ fn sample_parts_of_planes_and_round_faces_have_none() {
         assert_eq!(free(&part), 0, "{name}");
     }
 }
+
+/// An ellipsoid of 20 x 30 x 44 mm with corners moved at random, by `noise` [m] root mean square.
+fn pebble(noise: f64) -> Part {
+    use crate::solids::{Random, Solid};
+    let profile: Vec<DVec2> = (0..=64)
+        .map(|row| {
+            let turn = DVec2::from_angle(std::f64::consts::PI * f64::from(row) / 64.0);
+            DVec2::new(-turn.x, if row % 64 == 0 { 0.0 } else { turn.y })
+        })
+        .collect();
+    let solid = Solid::lathe(&profile, 96, |row| 0.5 * (row % 2) as f64);
+    let mut random = Random(3);
+    let vertices: Vec<DVec3> = solid
+        .vertices
+        .iter()
+        .map(|vertex| {
+            // An even distribution from -1 to 1 has a root mean square of 0.577.
+            let shift = DVec3::new(random.next(), random.next(), random.next()) / 0.577;
+            *vertex * DVec3::new(0.010, 0.015, 0.022) + noise * shift
+        })
+        .collect();
+    Part::from_triangles("pebble", &vertices, &solid.triangles).unwrap()
+}
+
+fn said(part: &Part) -> Option<&String> {
+    part.health.warnings.iter().find(|warning| warning.starts_with("curved faces are rough"))
+}
+
+#[test]
+fn roughness_that_hides_a_form_is_told_and_measured() {
+    let smooth = pebble(0.0);
+    assert_eq!((free(&smooth), said(&smooth)), (1, None));
+    for noise in [2e-5, 4e-5] {
+        let part = pebble(noise);
+        assert_eq!(free(&part), 0, "{noise}");
+        let warning = said(&part).unwrap_or_else(|| panic!("{noise}: {:?}", part.health.warnings));
+        let number = warning.split(" um").next().unwrap().rsplit(' ').next().unwrap();
+        let scatter = number.parse::<f64>().unwrap() * 1e-6;
+        assert!((0.8..1.2).contains(&(scatter / noise)), "{noise}: {warning}");
+    }
+}
+
+#[test]
+fn roughness_is_said_of_no_clean_part() {
+    let mut files: Vec<std::path::PathBuf> = Vec::new();
+    for folder in ["data/parts", "../shared/parts/gen", "../shared/parts/parts"] {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+        let Ok(entries) = std::fs::read_dir(folder) else { continue };
+        files.extend(entries.map(|entry| entry.unwrap().path()));
+    }
+    let mut read = 0;
+    for file in files {
+        if file.extension().is_some_and(|suffix| suffix == "step" || suffix == "STEP") {
+            continue;
+        }
+        let Ok(part) = Part::read(&file, &ReadOptions::default()) else { continue };
+        assert_eq!(said(&part), None, "{}", file.display());
+        read += 1;
+    }
+    assert!(read >= 6, "{read}");
+}

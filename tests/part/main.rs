@@ -9,6 +9,7 @@ mod formats;
 mod freeform;
 mod hostile;
 mod no_curve;
+mod order;
 mod solids;
 #[cfg(feature = "step")]
 mod step;
