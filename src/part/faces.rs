@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::curves::{self, Curves, Roughness};
+use super::curves::{self, Curves};
 use super::facets::Facets;
 use super::fitted::{self, Tolerance};
 use super::given::{GivenFace, GivenFaces, Stated};
@@ -134,39 +134,22 @@ fn recognised(
     let triangles = triangles.chain(curved.iter().map(|face| &face.triangles)).flatten();
     triangles.for_each(|&triangle| is_taken[triangle as usize] = true);
     let free = curves::free_faces(part, &regions, &is_taken);
-    free.iter()
-        .flat_map(|face| &face.triangles)
-        .for_each(|&triangle| is_taken[triangle as usize] = true);
-    // Where a curved form shows beneath, distances from planes are not those of noise.
-    let hidden = curves::roughness(part, &is_taken).map(rough_form);
-    part.health.warnings.extend(hidden.or(noise.map(|noise| noisy(noise, taken))));
+    part.health.warnings.extend(noise.map(|noise| noisy(noise, taken)));
     (planar, curved.into_iter().chain(free).collect())
 }
 
 /// What is said where noise has broken planes up; `taken`: distance within which corners count as
 /// flat \[m\].
-fn noisy(Noise { share, distance }: Noise, taken: f64) -> String {
+fn noisy(noise: Noise, taken: f64) -> String {
     format!(
         "flat faces are noisy: on {:.0} % of the surface corners lie {:.1} um (root mean square) off the planes that fit them, {:.1} times the {:.2} um \
          up to which they count as flat, so planes have fallen into single triangles and grips on them are missing or tilted; export the part \
          from its CAD model, or fit planes and round faces to corners within {} mm",
-        share * 100.0,
-        distance * 1e6,
-        distance / taken,
+        noise.share * 100.0,
+        noise.distance * 1e6,
+        noise.distance / taken,
         taken * 1e6,
-        noise::tolerance(distance, 1e-3) * 1e3
-    )
-}
-
-/// What is said where roughness hides a curved form.
-fn rough_form(Roughness { share, distance }: Roughness) -> String {
-    format!(
-        "curved faces are rough: on {:.0} % of the surface corners scatter by {:.1} um (root mean square) about a smooth form, which was not recognised \
-         for it, so grips there are missing; export the part from its CAD model, smooth the mesh where it is of free form (Taubin's filter, some \
-         ten passes), or fit planes and round faces to corners within {} mm where it is made of such",
-        share * 100.0,
-        distance * 1e6,
-        noise::tolerance(distance, 1e-3) * 1e3
+        noise.tolerance(1e-3) * 1e3
     )
 }
 

@@ -46,14 +46,15 @@ pub(super) struct Noise {
     pub distance: f64,
 }
 
-/// A tolerance with which faces can be fitted where corners lie off by `distance` \[m\], root mean
-/// square, rounded up to a plain number of `unit` \[m\].
-pub(super) fn tolerance(distance: f64, unit: f64) -> f64 {
-    let plain = FITS * distance / unit;
-    let step = 10.0_f64.powf(plain.log10().floor());
-    // A power of ten below one is no exact number, its inverse is.
-    let rounded = (plain / step).ceil();
-    unit * if step < 1.0 { rounded / (1.0 / step).round() } else { rounded * step }
+impl Noise {
+    /// A tolerance with which planes can be fitted, rounded up to a plain number of `unit` \[m\].
+    pub(super) fn tolerance(&self, unit: f64) -> f64 {
+        let plain = FITS * self.distance / unit;
+        let step = 10.0_f64.powf(plain.log10().floor());
+        // A power of ten below one is no exact number, its inverse is.
+        let rounded = (plain / step).ceil();
+        unit * if step < 1.0 { rounded / (1.0 / step).round() } else { rounded * step }
+    }
 }
 
 /// Looks for planes that fell into single triangles when regions were grown as `fine` ones: patches

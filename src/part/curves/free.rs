@@ -6,11 +6,11 @@ use rustc_hash::FxHashSet;
 use super::find::sort;
 use super::{CurvedFace, Shape};
 use crate::geometry::{Paraboloid, UnionFind};
+use crate::part::FaceSource;
 use crate::part::orient::Role;
 use crate::part::regions::Regions;
 use crate::part::repair::Repaired;
 use crate::part::topology::NONE;
-use crate::part::{FaceSource, Mesh};
 
 /// Cosine of the greatest angle between neighbouring triangles of one surface: 25 degrees, as
 /// between facets of round faces.
@@ -124,55 +124,34 @@ fn describe(part: &Repaired, triangles: Vec<u32>, least: f64) -> Option<CurvedFa
     })
 }
 
-/// The neighbourhoods of vertices in a piece of surface.
-pub(super) struct Hoods<'a> {
-    mesh: &'a Mesh,
-    /// The triangles about each vertex.
-    about: Vec<(u32, u32)>,
-    vertices: Vec<u32>,
-}
-
-/// Vertices about one, whose normal is `z`, from it \[m\].
-pub(super) struct Patch {
-    pub points: Vec<DVec3>,
-}
-
-impl<'a> Hoods<'a> {
-    pub(super) fn new(mesh: &'a Mesh, triangles: &[u32]) -> Self {
-        let mut about: Vec<(u32, u32)> = triangles
-            .iter()
-            .flat_map(|&triangle| {
-                mesh.triangles[triangle as usize].map(|vertex| (vertex, triangle))
-            })
-            .collect();
-        about.sort_unstable();
-        let mut vertices: Vec<u32> = about.iter().map(|entry| entry.0).collect();
-        vertices.dedup();
-        Self { mesh, about, vertices }
-    }
-
-    /// Some of the vertices, evenly spread, up to `most`.
-    pub(super) fn spread(&self, most: usize) -> impl Iterator<Item = u32> + '_ {
-        self.vertices.iter().step_by(self.vertices.len().div_ceil(most).max(1)).copied()
-    }
-
-    fn of(&self, vertex: u32) -> impl Iterator<Item = u32> + '_ {
-        let from = self.about.partition_point(|entry| entry.0 < vertex);
-        self.about[from..].iter().take_while(move |entry| entry.0 == vertex).map(|entry| entry.1)
-    }
-
-    /// The vertices about one, ring after ring so that both sides count alike, until they are `least`.
-    /// Empty where the surface has no normal.
-    pub(super) fn patch(&self, vertex: u32, least: usize) -> Patch {
-        let mesh = self.mesh;
+/// Whether a region is smooth, and then whether most of it bulges outwards.
+fn smooth(part: &Repaired, triangles: &[u32]) -> Option<bool> {
+    let mesh = &part.mesh;
+    // The triangles about each vertex.
+    let mut about: Vec<(u32, u32)> = triangles
+        .iter()
+        .flat_map(|&triangle| mesh.triangles[triangle as usize].map(|vertex| (vertex, triangle)))
+        .collect();
+    about.sort_unstable();
+    let of = |vertex: u32| {
+        let from = about.partition_point(|entry| entry.0 < vertex);
+        about[from..].iter().take_while(move |entry| entry.0 == vertex).map(|entry| entry.1)
+    };
+    let mut vertices: Vec<u32> = about.iter().map(|entry| entry.0).collect();
+    vertices.dedup();
+    let stride = vertices.len().div_ceil(PLACES);
+    // Distances from a paraboloid and a plane, and the mean bend.
+    let mut places: Vec<[f64; 3]> = Vec::new();
+    for &vertex in vertices.iter().step_by(stride) {
         let mut near = vec![vertex];
         let mut inner = 0;
         let mut normal = DVec3::ZERO;
-        while inner < near.len() && near.len() < least {
+        // Ring after ring, so that both sides count alike.
+        while inner < near.len() && near.len() < AROUND {
             let ring = inner..near.len();
             inner = near.len();
             for index in ring {
-                for triangle in self.of(near[index]) {
+                for triangle in of(near[index]) {
                     let [a, b, c] = mesh.corners(triangle);
                     normal += (b - a).cross(c - a);
                     for corner in mesh.triangles[triangle as usize] {
@@ -183,23 +162,11 @@ impl<'a> Hoods<'a> {
                 }
             }
         }
-        let Some(normal) = normal.try_normalize() else { return Patch { points: Vec::new() } };
+        let Some(normal) = normal.try_normalize() else { continue };
         let (x, y) = normal.any_orthonormal_pair();
         let axes = DMat3::from_cols(x, y, normal).transpose();
         let origin = mesh.vertices[vertex as usize];
-        let points = near.iter().map(|&v| axes * (mesh.vertices[v as usize] - origin)).collect();
-        Patch { points }
-    }
-}
-
-/// Whether a region is smooth, and then whether most of it bulges outwards.
-fn smooth(part: &Repaired, triangles: &[u32]) -> Option<bool> {
-    let hoods = Hoods::new(&part.mesh, triangles);
-    // Distances from a paraboloid and a plane, and the mean bend.
-    let mut places: Vec<[f64; 3]> = Vec::new();
-    for vertex in hoods.spread(PLACES) {
-        let Patch { points } = hoods.patch(vertex, AROUND);
-        let points = points.iter().copied();
+        let points = near.iter().map(|&v| axes * (mesh.vertices[v as usize] - origin));
         let weighted = points.clone().map(|point| (point, 1.0));
         let (Some(form), Some(plane)) =
             (Paraboloid::fit(weighted.clone()), Paraboloid::flat(weighted))

@@ -18,7 +18,6 @@ mod grow;
 mod judge;
 mod net;
 mod profile;
-mod rough;
 mod seed;
 mod trim;
 
@@ -26,7 +25,6 @@ pub(super) use describe::arcs;
 pub(super) use find::{Curves, curved_faces, given_faces};
 pub(super) use fit::{Kind, Profile, Surface};
 pub(super) use free::free_faces;
-pub(super) use rough::{Roughness, roughness};
 pub(super) use seed::{cone_by_circles, cylinder_along, outer, smallest_direction, sphere_through};
 
 /// A line in the part frame.
