@@ -29,6 +29,7 @@ mod noise;
 mod order;
 mod orient;
 mod pairs;
+mod patches;
 mod read;
 mod regions;
 mod repair;

@@ -1,28 +1,26 @@
 //! Planar regions by growing.
 //!
-//! A region starts at the largest triangle left and takes in neighbours whose corners lie within a
+//! A region starts at the largest flat patch left and takes in neighbours whose corners lie within a
 //! distance of the region's plane and whose normals agree within an angle; both tests are needed.
 //! The distance is scaled to the part. The angle is widened for a narrow triangle by what the
 //! uncertainty of its corners can tilt it: refining a plane in 32-bit floats leaves slivers whose
-//! normals point anywhere. The plane is refitted each time the region has doubled, between
+//! normals point anywhere. The plane is refitted each time the region's area has doubled, between
 //! rings of neighbours.
 
 use glam::DVec3;
 use nalgebra::Matrix3;
-use rayon::prelude::*;
 
 use super::Mesh;
 use super::given::{GivenFaces, Stated};
+use super::patches::{Patches, area_step};
 use super::repair::Repaired;
 use super::topology::NONE;
 
 /// Angle between a wide triangle and its face: 0.2 degrees.
 const ANGLE: f64 = 0.2 * std::f64::consts::PI / 180.0;
 
-/// Factor above the largest area from which its steps of two are counted.
-const EQUAL: f64 = 1.001;
-/// Square of the sine of the angle between triangles below which they are level: 1e-6.
-const LEVEL: f64 = 1e-12;
+/// Growth of a region's area after which its plane is fitted again: two, less rounding.
+const REFIT: f64 = 2.0 - 1e-6;
 
 /// How exactly a triangle must lie in a region's plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -146,15 +144,16 @@ impl Regions {
     }
 }
 
-fn twice_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
+pub(super) fn twice_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
 /// Partitions the triangles into planar regions. A plane that the file states is a region as it is;
 /// others end where faces do that the file states.
 pub(super) fn grow(part: &Repaired, given: &GivenFaces, flatness: Flatness) -> Regions {
-    let seeds = seeds(part);
-    grow_from(part, given, flatness, seeds.iter().map(std::slice::from_ref))
+    let patches = Patches::new(part, given, flatness);
+    let seeds = patches.seeds(part);
+    grow_from(part, given, flatness, &patches, seeds.iter().map(|&seed| patches.triangles(seed)))
 }
 
 /// Grows regions once more, from the largest to the smallest: with its plane known, a large one takes
@@ -167,7 +166,9 @@ pub(super) fn grow_again(
 ) -> Regions {
     let mut order: Vec<usize> = (0..first.all.len()).collect();
     order.sort_by(|&a, &b| first.all[b].area.total_cmp(&first.all[a].area).then(a.cmp(&b)));
-    grow_from(part, given, flatness, order.into_iter().map(|index| first.triangles(index)))
+    let patches = Patches::new(part, given, flatness);
+    let starts = order.into_iter().map(|index| first.triangles(index));
+    grow_from(part, given, flatness, &patches, starts)
 }
 
 /// Grows regions from groups of triangles, as far as those belong to no region yet.
@@ -175,11 +176,12 @@ fn grow_from<'a>(
     part: &Repaired,
     given: &GivenFaces,
     flatness: Flatness,
+    patches: &Patches,
     starts: impl Iterator<Item = &'a [u32]>,
 ) -> Regions {
     let mesh = &part.mesh;
     let count = mesh.triangles.len();
-    let Flatness { distance, uncertainty } = flatness;
+    let uncertainty = flatness.uncertainty;
     let mut order = Vec::with_capacity(count);
     let mut region_of = vec![NONE; count];
     let mut regions = Vec::new();
@@ -224,7 +226,7 @@ fn grow_from<'a>(
             plane.normal = twice_normal(corners).normalize();
             plane.offset = plane.normal.dot(corners[0]);
         }
-        let mut refit_at = 2 * (order.len() - begin);
+        let mut refit_at = REFIT * sums.area;
         let mut next = begin;
         refused.clear();
         loop {
@@ -243,16 +245,17 @@ fn grow_from<'a>(
                         if given.of(other) != own {
                             continue;
                         }
-                        if take(mesh, other, &plane, distance, uncertainty, &mut sums) {
-                            region_of[other as usize] = number;
-                            order.push(other);
+                        let piece = patches.about(other);
+                        if take(mesh, piece, &plane, flatness, &mut sums) {
+                            piece.iter().for_each(|&other| region_of[other as usize] = number);
+                            order.extend(piece);
                         } else {
                             refused.push(other);
                         }
                     }
                 }
-                if order.len() - begin >= refit_at {
-                    refit_at *= 2;
+                if sums.area >= refit_at {
+                    refit_at = REFIT * sums.area;
                     plane = sums.fit(uncertainty).unwrap_or(plane);
                 }
             }
@@ -264,10 +267,11 @@ fn grow_from<'a>(
                 if region_of[other as usize] != NONE {
                     return false;
                 }
-                let taken = take(mesh, other, &plane, distance, uncertainty, &mut sums);
+                let piece = patches.about(other);
+                let taken = take(mesh, piece, &plane, flatness, &mut sums);
                 if taken {
-                    region_of[other as usize] = number;
-                    order.push(other);
+                    piece.iter().for_each(|&other| region_of[other as usize] = number);
+                    order.extend(piece);
                 }
                 !taken
             });
@@ -339,16 +343,46 @@ pub(super) fn middle(mesh: &Mesh, triangles: &[u32], origin: DVec3, normal: DVec
     centre - normal * normal.dot(centre - origin)
 }
 
-/// Adds a triangle to the sums if it lies in the plane.
+/// Whether triangles lie in one plane.
+pub(super) fn is_flat(part: &Repaired, triangles: &[u32], flatness: Flatness) -> bool {
+    let mesh = &part.mesh;
+    if triangles.len() < 2 {
+        return true;
+    }
+    let mut sums = Sums::new(mesh.corners(triangles[0])[0]);
+    for &triangle in triangles {
+        let corners = mesh.corners(triangle);
+        let cross = twice_normal(corners);
+        sums.add(corners, cross, cross.length() / 2.0);
+    }
+    let plane = sums.fit(flatness.uncertainty);
+    plane.is_some_and(|plane| {
+        triangles.iter().all(|&triangle| lies_in(mesh.corners(triangle), &plane, flatness))
+    })
+}
+
+/// Adds the triangles of a patch to the sums if all of them lie in the plane.
 fn take(
     mesh: &Mesh,
-    triangle: u32,
+    triangles: &[u32],
     plane: &Plane,
-    distance: f64,
-    uncertainty: f64,
+    flatness: Flatness,
     sums: &mut Sums,
 ) -> bool {
-    let corners = mesh.corners(triangle);
+    if !triangles.iter().all(|&triangle| lies_in(mesh.corners(triangle), plane, flatness)) {
+        return false;
+    }
+    for &triangle in triangles {
+        let corners = mesh.corners(triangle);
+        let cross = twice_normal(corners);
+        sums.add(corners, cross, cross.length() / 2.0);
+    }
+    true
+}
+
+/// Whether a triangle lies in the plane.
+fn lies_in(corners: [DVec3; 3], plane: &Plane, flatness: Flatness) -> bool {
+    let Flatness { distance, uncertainty } = flatness;
     if corners.iter().any(|&corner| plane.distance(corner) > distance) {
         return false;
     }
@@ -362,51 +396,5 @@ fn take(
         ANGLE + plane.tilt + 2.0 * uncertainty * longest / twice_area.max(f64::MIN_POSITIVE);
     // A sliver narrower than the uncertainty has no direction: the distance alone decides.
     // 1 - x^2/2 is below the cosine by less than x^4/24: nothing at the angles in question.
-    if allowed < 1.0 && cross.dot(plane.normal) < (1.0 - allowed * allowed / 2.0) * twice_area {
-        return false;
-    }
-    sums.add(corners, cross, twice_area / 2.0);
-    true
-}
-
-/// Step of a factor of two of a triangle's area, falling, by the vector of twice that length.
-fn area_step(twice_normal: DVec3) -> u16 {
-    // Exponent of the squared area; half of it is that of the area.
-    (0x7ff - ((twice_normal.length_squared().to_bits() >> 52) as u16 & 0x7ff)) / 2
-}
-
-/// Triangles by falling area, in steps of a factor of two from the largest; within a step the one
-/// that bends least against its neighbours first, so that a plane that runs out into a bend is
-/// found from its middle.
-fn seeds(part: &Repaired) -> Vec<u32> {
-    let normals: Vec<DVec3> = (0..part.mesh.triangles.len() as u32)
-        .into_par_iter()
-        .map(|triangle| twice_normal(part.mesh.corners(triangle)))
-        .collect();
-    let largest = normals.iter().map(|normal| normal.length_squared()).fold(0.0, f64::max).sqrt();
-    // Rounding does not part equal areas at a step.
-    let scale = 1.0 / (EQUAL * largest).max(f64::MIN_POSITIVE);
-    let mut keys: Vec<u64> = normals
-        .par_iter()
-        .zip(0..normals.len())
-        .map(|(normal, triangle)| {
-            let step = u64::from(area_step(*normal * scale));
-            let neighbours = part.edges.twin[3 * triangle..3 * triangle + 3].iter();
-            let bend = neighbours
-                .filter(|&&twin| twin != NONE)
-                .map(|&twin| {
-                    let other = normals[(twin / 3) as usize];
-                    let across = normal.cross(other).length_squared();
-                    across
-                        / (normal.length_squared() * other.length_squared()).max(f64::MIN_POSITIVE)
-                })
-                .fold(0.0, f64::max);
-            // Sign and exponent of a 32-bit number and 12 bits of its mantissa: numbers above zero
-            // compare as their bits do. Below the floor it is rounding.
-            let bend = if bend > LEVEL { (bend as f32).to_bits() >> 11 } else { 0 };
-            (step << 53) | (u64::from(bend) << 32) | triangle as u64
-        })
-        .collect();
-    keys.par_sort_unstable();
-    keys.into_iter().map(|key| key as u32).collect()
+    allowed >= 1.0 || cross.dot(plane.normal) >= (1.0 - allowed * allowed / 2.0) * twice_area
 }
