@@ -16,9 +16,10 @@ use std::sync::LazyLock;
 use glam::DVec2;
 
 pub(crate) use load::area_and_load;
+use moments::{Rows, moments, second_moments, sums};
 
 use super::far::RULES;
-use super::lanes::{LANES, Lane, total, totals, widest};
+use super::lanes::{LANES, Lane};
 use crate::geometry::polygon::ring_contains;
 use crate::model::Ring;
 
@@ -29,7 +30,7 @@ const POINTS: usize = 12;
 const PANEL: f64 = 0.8;
 /// Distance of the slip centre from the area's box, over the box's smaller half side, from which on
 /// the points of the area are taken.
-const OUTSIDE: f64 = 1.0;
+const OUTSIDE: f64 = 3.0;
 /// The area is cut where the pressure is `-CUT` of its greatest value, so that an edge of the
 /// polygon that lies exactly where the pressure ends is no tie. What it adds is of the order of
 /// the square.
@@ -47,6 +48,12 @@ const MORE: usize = 1;
 const SHIFT: f64 = 1e-8;
 /// Turn of an arc's tangent up to which it is one element \[rad\].
 const TURN: f64 = 0.4;
+/// Length of a chord over the rings' farthest coordinate up to which it is rounding: where an edge
+/// passes through the conic's tip, its crossing and the tip are one point, found twice.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+/// A chord's step along the axis through the tips over that across it, up to which it stands for its
+/// arc.
+const STEEP: f64 = 1e-5;
 
 /// `c + g . x + (l1 x1^2 + l2 x2^2) / 2`: no mixed term, the axes are the surface's own.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -251,24 +258,41 @@ impl Region {
                 (a.min(swap(x).x), b.max(swap(x).x))
             });
         let reach = |x: &f64| (low..=high).contains(x);
+        let farthest = rings.iter().flatten().map(|x| x.abs().max_element()).fold(0.0, f64::max);
         // Both branches of a cylinder's conic are lines, but for the square of the slope.
         let straight = l.x == 0.0 && g.x.abs() * (high - low) <= LINE * rest.abs();
-        let tips: Vec<f64> =
-            roots(rest, g.x, 0.5 * l.x).into_iter().flatten().filter(reach).collect();
+        let tips = roots(rest, g.x, 0.5 * l.x);
+        // Beside a tip places are told apart by their distance from the axis.
+        let opens = |x: f64| -(g.x + l.x * x) / l.y > 0.0;
+        let along = |at: &DVec2| {
+            let is_here = |tip: &f64| (at.x - tip).abs() <= ROUNDING * farthest;
+            let x = tips.into_iter().flatten().find(is_here).unwrap_or(at.x);
+            [x, if opens(x) { (at.y - m).abs() } else { -(at.y - m).abs() }]
+        };
         for side in [-1.0, 1.0] {
             let mut events: Vec<DVec2> =
                 crossings.iter().map(|&x| swap(x)).filter(|x| side * (x.y - m) >= 0.0).collect();
-            events.extend(tips.iter().map(|&x| DVec2::new(x, m)));
+            events.extend(tips.into_iter().flatten().filter(reach).map(|x| DVec2::new(x, m)));
             let crest = -g.x / l.x;
             if reach(&crest) && width(crest) > 0.0 {
                 events.push(DVec2::new(crest, m + side * width(crest).sqrt()));
             }
-            events.sort_by(|a, b| a.x.total_cmp(&b.x));
+            events.sort_by(|a, b| {
+                let ([x, y], [z, w]) = (along(a), along(b));
+                x.total_cmp(&z).then(y.total_cmp(&w))
+            });
             for pair in events.windows(2) {
-                let x = 0.5 * (pair[0].x + pair[1].x);
-                let w = width(x);
-                let middle = swap(DVec2::new(x, m + side * w.max(0.0).sqrt()));
-                if w > 0.0 && contains(rings, middle) {
+                let step = (pair[1] - pair[0]).abs();
+                if step.length() <= ROUNDING * farthest {
+                    continue;
+                }
+                let chord = 0.5 * (pair[0] + pair[1]);
+                let w = width(chord.x);
+                // Beside a tip rounding leaves nothing of the width, and the chord is near enough.
+                let steep = step.x < STEEP * step.y;
+                let y = if steep { chord.y } else { m + side * w.max(0.0).sqrt() };
+                let middle = swap(DVec2::new(chord.x, y));
+                if (steep || w > 0.0) && contains(rings, middle) {
                     let (a, b) = (swap(pair[0]), swap(pair[1]));
                     let inward = (b - a).perp().dot(u.slope(middle)) > 0.0;
                     let (a, b) = if inward { (a, b) } else { (b, a) };
@@ -297,13 +321,18 @@ impl Region {
         }
     }
 
-    /// An arc in pieces that turn little.
+    /// An arc in pieces that turn little and are short beside the ellipse's narrower half.
     fn push_arc(&mut self, a: DVec2, b: DVec2, depth: u32) {
         let (one, two) = (self.u.slope(a), self.u.slope(b));
         self.push(a, b, true);
+        let is_long = |element: &Element| {
+            element.arc.is_some_and(|arc| arc.bent.is_nan() || arc.bent > PANEL)
+        };
         if depth < 12
-            && one.angle_to(two).abs() > TURN
-            && let Some(element) = self.elements.pop_if(|element| (element.a, element.b) == (a, b))
+            && let Some(element) = self.elements.pop_if(|element| {
+                (element.a, element.b) == (a, b)
+                    && (one.angle_to(two).abs() > TURN || is_long(element))
+            })
         {
             let (middle, _) = self.at(&element, 0.5);
             self.push_arc(a, middle, depth + 1);
@@ -372,7 +401,7 @@ impl Region {
     /// The same points by fours.
     #[inline(always)]
     fn rows(&self) -> Rows<'_> {
-        Rows { region: self, elements: self.elements.iter(), at: None, across: &RULES[LANES] }
+        Rows::new(self)
     }
 
     /// The quadratic at a point of the region's axes.
@@ -422,6 +451,13 @@ impl Region {
         moments(self, gap)
     }
 
+    /// `int u q dA` for `q` of `1`, `x1`, `x2`, `x x grad gap` and `|x|^2`.
+    pub fn pressure_moments(&self, gap: &Quadratic) -> [f64; 5] {
+        let [[load, x1, x2, x11, x12, x22], _] = second_moments(self);
+        let turn = x1 * gap.g.y - x2 * gap.g.x + (gap.l.y - gap.l.x) * x12;
+        [load, x1, x2, turn, x11 + x22]
+    }
+
     /// `int u |v| dA` for the twist `(u1, u2, omega)` about the origin of the region's axes, any
     /// but zero.
     pub fn dissipation(&self, twist: [f64; 3]) -> Dissipation {
@@ -459,115 +495,38 @@ impl Region {
         self.edges(centre, BY).assemble(centre, omega)
     }
 
-    /// [`Self::dissipation`] of a translation: moments of the pressure.
+    /// [`Self::dissipation`] of a translation: moments of the pressure, and of the area.
     fn sliding<const BY: bool>(&self, v: DVec2, sum: &mut (Dissipation, [[f64; 3]; 3])) {
         let speed = v.length();
         let e = v / speed;
-        self.points(|x, area| {
-            let weight = area * self.u.value(x);
-            let tangent = [e.x, e.y, x.perp_dot(e)];
-            let normal = [e.y, -e.x, -x.dot(e)];
-            sum.0.value += weight * speed;
-            for i in 0..3 {
-                sum.0.gradient[i] += weight * tangent[i];
-                for j in 0..3 {
-                    sum.0.hessian[i][j] += weight / speed * normal[i] * normal[j];
-                }
-            }
-            if BY {
-                by_pressure(&mut sum.1, area, x, tangent);
-            }
-        });
-    }
-}
-
-/// Adds a point's share of the gradients for `1`, `x1` and `x2` in place of the pressure.
-#[inline(always)]
-fn by_pressure(by: &mut [[f64; 3]; 3], area: f64, x: DVec2, tangent: [f64; 3]) {
-    for (row, factor) in by.iter_mut().zip([area, area * x.x, area * x.y]) {
-        for (sum, tangent) in row.iter_mut().zip(tangent) {
-            *sum += factor * tangent;
+        let [pressure, area] = second_moments(self);
+        let [load, x1, x2, x11, x12, x22] = pressure;
+        let (first, along) =
+            (DVec2::new(x1, x2), DVec2::new(e.x * x11 + e.y * x12, e.x * x12 + e.y * x22));
+        let found = &mut sum.0;
+        found.value += load * speed;
+        let tangent = [load * e.x, load * e.y, first.perp_dot(e)];
+        found.gradient.iter_mut().zip(tangent).for_each(|(sum, more)| *sum += more);
+        // Across the motion, of `(e2, -e1, -x . e)`.
+        let (one, two) = (first.dot(e), along.dot(e));
+        let bend = [
+            [load * e.y * e.y, -load * e.y * e.x, -one * e.y],
+            [-load * e.y * e.x, load * e.x * e.x, one * e.x],
+            [-one * e.y, one * e.x, two],
+        ];
+        for (row, more) in found.hessian.iter_mut().zip(bend) {
+            row.iter_mut().zip(more).for_each(|(sum, more)| *sum += more / speed);
         }
-    }
-}
-
-/// Points of a region by fours: places along both axes, and weights.
-struct Rows<'a> {
-    region: &'a Region,
-    elements: std::slice::Iter<'a, Element>,
-    /// The element at hand, and nodes along it that are still to come.
-    at: Option<(&'a Element, std::slice::Iter<'static, (f64, f64)>)>,
-    across: &'static [(f64, f64)],
-}
-
-impl Iterator for Rows<'_> {
-    type Item = [Lane; 3];
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<[Lane; 3]> {
-        loop {
-            let Some((element, nodes)) = &mut self.at else {
-                let element = self.elements.next()?;
-                let along = element.arc.map_or(5, |arc| (enough(arc.bent) + 2).min(POINTS));
-                self.at = Some((element, RULES[along].iter()));
-                continue;
-            };
-            let Some(&(s, weight)) = nodes.next() else {
-                self.at = None;
-                continue;
-            };
-            let (x, dx) = self.region.at(element, s);
-            let (foot, turn) = self.region.foot(x, dx);
-            if turn != 0.0 {
-                let (turn, way) = (turn * weight, x - foot);
-                return Some([
-                    std::array::from_fn(|i| foot.x + self.across[i].0 * way.x),
-                    std::array::from_fn(|i| foot.y + self.across[i].0 * way.y),
-                    std::array::from_fn(|i| turn * self.across[i].1),
-                ]);
+        if BY {
+            let [one, x1, x2, x11, x12, x22] = area;
+            for (row, [f, x, y]) in
+                sum.1.iter_mut().zip([[one, x1, x2], [x1, x11, x12], [x2, x12, x22]])
+            {
+                let tangent = [f * e.x, f * e.y, x * e.y - y * e.x];
+                row.iter_mut().zip(tangent).for_each(|(sum, more)| *sum += more);
             }
         }
     }
-}
-
-widest! {
-    /// See [`Region::area_and_load`].
-    fn sums(region: &Region) -> (f64, f64) = sums_in
-}
-
-#[inline(always)]
-fn sums_in(region: &Region) -> (f64, f64) {
-    let (mut area, mut load) = ([0.0; LANES], [0.0; LANES]);
-    for [x, y, weights] in region.rows() {
-        for i in 0..LANES {
-            area[i] += weights[i];
-            load[i] += weights[i] * region.u.value(DVec2::new(x[i], y[i]));
-        }
-    }
-    (total(&area), total(&load))
-}
-
-widest! {
-    /// See [`Region::moments`].
-    fn moments(region: &Region, gap: &Quadratic) -> [[f64; 4]; 4] = moments_in
-}
-
-#[inline(always)]
-fn moments_in(region: &Region, gap: &Quadratic) -> [[f64; 4]; 4] {
-    let mut lanes = [[[0.0; LANES]; 4]; 4];
-    for [x, y, weights] in region.rows() {
-        for i in 0..LANES {
-            let (at, weight) = (DVec2::new(x[i], y[i]), weights[i]);
-            let values = [1.0, at.x, at.y, at.perp_dot(gap.slope(at))];
-            let factors = [weight * region.u.value(at), weight, weight * at.x, weight * at.y];
-            for row in 0..4 {
-                for column in 0..4 {
-                    lanes[row][column][i] += factors[row] * values[column];
-                }
-            }
-        }
-    }
-    [totals(&lanes[0]), totals(&lanes[1]), totals(&lanes[2]), totals(&lanes[3])]
 }
 
 fn contains(rings: &[Ring], x: DVec2) -> bool {
@@ -592,5 +551,6 @@ fn roots(c: f64, b: f64, a: f64) -> [Option<f64>; 2] {
 mod area;
 mod edge;
 mod load;
+mod moments;
 #[cfg(test)]
 mod tests;

@@ -193,6 +193,11 @@ impl Field {
         corners.fold(value(DVec2::ZERO), f64::min)
     }
 
+    /// Corners of the polygon in the pad plane.
+    pub(crate) fn corners(&self) -> impl Iterator<Item = DVec2> {
+        self.rings.iter().flatten().map(|x| self.origin + self.outward(*x))
+    }
+
     /// Area of the polygon [m^2].
     pub(crate) fn area(&self) -> f64 {
         let ring_area = |ring: &Ring| -> f64 {

@@ -37,7 +37,13 @@ pub(crate) fn posed(number: u64) -> Posed {
     let meridian = r * random.range(1.5, 8.0);
     let (axis, at, height) = (DVec2::X, DVec2::ZERO, 0.0);
     let barrel = Gap::Barrel { radius: r, meridian, axis, at, height };
-    let side = |gap: Gap| vec![rectangle([-x, -r], [x, r], gap)];
+    // Some pads end at the crest.
+    let top = match number / 8 % 8 {
+        6 => [x, 0.0],
+        7 => [0.0, r],
+        _ => [x, r],
+    };
+    let side = |gap: Gap| vec![rectangle([-x, -r], top, gap)];
     let flat = r * random.range(0.3, 0.8);
     let plane = vec![rectangle([-x, -flat], [x, flat], Gap::default())];
     let give = 0.5 * share * share * r;
@@ -327,8 +333,8 @@ fn agree_on_points(numbers: std::ops::Range<u64>, grid: usize) -> Seen {
 
 #[test]
 fn random_bodies_agree_with_forces_on_points() {
-    let seen = agree_on_points(0..200, 32);
-    assert!(seen.answered > 150 && seen.loose < 10, "{seen:?}");
+    let seen = agree_on_points(0..2_000, 32);
+    assert!(seen.answered > 1_500 && seen.loose < 100, "{seen:?}");
 }
 
 #[test]

@@ -120,6 +120,8 @@ fn disc(rings: &[Ring], u: &Quadratic) -> Option<(f64, f64)> {
 /// The way of a ring round the disc, outside of it.
 #[derive(Default)]
 struct Turns {
+    /// Where it began, if outside.
+    began: Option<DVec2>,
     /// Where it first came in.
     first: Option<DVec2>,
     /// Where it left last.
@@ -135,8 +137,9 @@ impl Turns {
     /// A straight way from `a` to `b` outside.
     #[inline(always)]
     fn pass(&mut self, a: DVec2, b: DVec2) {
-        if self.left.is_none() && self.first.is_some() {
-            self.left = Some(a);
+        match self.first {
+            Some(_) => self.left = self.left.or(Some(a)),
+            None => self.began = self.began.or(Some(a)),
         }
         let (over, under) = (a.y >= 0.0, b.y < 0.0);
         if over == under {
@@ -161,10 +164,11 @@ impl Turns {
 
     /// It is at its beginning again.
     fn close(self, sums: &mut Sums) {
-        match (self.left, self.first) {
+        // It may have gone out where it ends, at a corner on the circle.
+        match (self.left.or(self.began), self.first) {
             (Some(left), Some(first)) => turned(left, first, self.passes + self.before, sums),
-            (None, None) => turned(DVec2::X, DVec2::X, self.passes, sums),
-            _ => {}
+            (_, None) => turned(DVec2::X, DVec2::X, self.passes, sums),
+            (None, Some(_)) => {}
         }
     }
 }
@@ -245,8 +249,8 @@ fn plane(rings: &[Ring], u: &Quadratic) -> Option<(f64, f64)> {
     let mut sums = Sums::default();
     for ring in rings {
         let Some(&last) = ring.last() else { continue };
-        // Seen from a place on the line where it is zero, or from any if there is none.
-        let is_cut = ring.iter().any(|x| u.value(*x) < 0.0);
+        // Seen from a place on the line where it is zero, or from any if the ring does not reach it.
+        let is_cut = ring.iter().any(|x| u.value(*x) <= 0.0);
         let foot = if is_cut { last - u.g * (u.value(last) / steep) } else { last };
         let here = if is_cut { 0.0 } else { u.value(foot) };
         let place = |x: DVec2| (x - foot, u.value(x));

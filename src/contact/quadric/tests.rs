@@ -1,3 +1,8 @@
+use std::f64::consts::TAU;
+
+use proptest::collection::vec;
+use proptest::prelude::*;
+
 use super::*;
 
 fn rectangle(half: DVec2) -> Ring {
@@ -209,6 +214,122 @@ fn a_plane_agrees_with_the_planar_closed_forms() {
                 let off = (got.hessian[j][k] - wanted.hessian[j][k]).abs();
                 assert!(off < 1e-12 * (1.0 + c.length_squared()) * 12.0, "{c:?} {off:e}");
             }
+        }
+    }
+}
+
+/// An edge of the polygon through the crest, as a pad's edge on a sphere's pole: where the edge
+/// meets the conic may be its tip too.
+#[test]
+fn edges_through_the_crest_leave_sectors() {
+    let edges = [
+        (0.5, vec![[-2.0, -2.0], [2.0, -2.0], [2.0, 0.0], [-2.0, 0.0]]),
+        (0.5, vec![[0.0, -2.0], [2.0, -2.0], [2.0, 2.0], [0.0, 2.0]]),
+        (0.5, vec![[-2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]]),
+        (0.25, vec![[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]),
+        (0.125, vec![[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]]),
+        (0.625, vec![[0.0, 0.0], [0.0, 2.0], [-2.0, 2.0], [-2.0, -2.0], [2.0, -2.0]]),
+    ];
+    for (share, ring) in edges {
+        let ring: Ring = ring.into_iter().map(DVec2::from).collect();
+        for i in 0..100 {
+            let (radius, l) = (0.3 + 0.009_1 * f64::from(i), 4.0);
+            let u = Quadratic { c: 0.5 * l * radius * radius, g: DVec2::ZERO, l: DVec2::splat(-l) };
+            let region = Region::new(std::slice::from_ref(&ring), u);
+            let (area, load) = region.area_and_load();
+            let wanted = share * std::f64::consts::PI * radius * radius;
+            assert!((area / wanted - 1.0).abs() < 1e-8, "{radius} {area} {wanted}");
+            assert!((load / (0.25 * l * radius * radius * wanted) - 1.0).abs() < 1e-12, "{radius}");
+            for j in 0..6 {
+                let c = radius * (0.2 + 0.3 * f64::from(j)) * DVec2::from_angle(0.9 * f64::from(j));
+                let twist = [c.y, -c.x, 1.0];
+                let mut points = Default::default();
+                for element in &region.elements {
+                    let whole = [[0.0, 1.0]; 2];
+                    region.area_panel::<true>(element, twist, c, whole, 0, &mut points);
+                }
+                let (edges, by) = region.edges(c, true).assemble(c, 1.0);
+                assert!((edges.value / points.0.value - 1.0).abs() < 1e-11, "{radius} {c}");
+                let pairs = by.iter().flatten().zip(points.1.iter().flatten());
+                assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-9), "{radius} {c}");
+            }
+        }
+    }
+}
+
+/// Polygons with corners where something happens: on the conic, at its crest and tips, on tangents at
+/// its tips, and a rounding beside these.
+fn cornered() -> impl Strategy<Value = (Ring, Quadratic)> {
+    let corner = (0..12_u32, 0.0..TAU, 0..6_u32);
+    let bends = prop_oneof![
+        Just((1.0, 1.0)),
+        Just((0.3, 1.0)),
+        Just((1.0, 0.01)),
+        Just((0.0, 1.0)),
+        Just((-0.3, 1.0)),
+        Just((0.0, 0.0)),
+    ];
+    (vec(corner, 3..7), bends, prop_oneof![Just(DVec2::ZERO), Just(DVec2::new(0.01, 0.02))])
+        .prop_map(|(corners, (l1, l2), at)| {
+            let half = [l1, l2].map(|l: f64| if l == 0.0 { 1.0 } else { l.abs().sqrt().recip() });
+            let half = DVec2::from(half);
+            let place = |&(kind, angle, off): &(u32, f64, u32)| {
+                let unit = match kind {
+                    0 => DVec2::ZERO,
+                    1 => DVec2::X,
+                    2 => DVec2::Y,
+                    3 => -DVec2::X,
+                    4 => -DVec2::Y,
+                    5 => DVec2::ONE,
+                    6 => -DVec2::ONE,
+                    7 => DVec2::new(1.0, -1.0),
+                    8 => DVec2::new(-1.0, 1.0),
+                    9 => DVec2::from_angle(angle),
+                    10 => 2.0 * DVec2::from_angle(angle),
+                    _ => DVec2::from_angle(angle) * 0.5,
+                };
+                let off = match off {
+                    0 => DVec2::new(1e-16, -1e-16),
+                    1 => DVec2::new(0.0, 1e-12),
+                    _ => DVec2::ZERO,
+                };
+                at + unit * half + off
+            };
+            let mut ring: Ring = corners.iter().map(place).collect();
+            let middle = ring.iter().sum::<DVec2>() / ring.len() as f64;
+            ring.sort_by(|a, b| (a - middle).to_angle().total_cmp(&(b - middle).to_angle()));
+            let l = -DVec2::new(l1, l2);
+            let g = if l == DVec2::ZERO { DVec2::new(0.5, 0.0) } else { -l * at };
+            (ring, Quadratic { c: 0.5 + 0.5 * l.dot(at * at), g, l })
+        })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn both_ways_agree_at_corners(
+        (ring, u) in cornered(),
+        centres in vec((-2.0..2.0_f64, -2.0..2.0_f64), 4),
+    ) {
+        let rings = [ring];
+        let region = Region::new(&rings, u);
+        let (area, load) = region.area_and_load();
+        prop_assume!(area > 1e-3);
+        let wanted = area_and_load(&rings, &u);
+        prop_assert!((load / wanted.1 - 1.0).abs() < 1e-9, "{load} {wanted:?}");
+        for centre in centres {
+            let c = DVec2::from(centre);
+            let twist = [c.y, -c.x, 1.0];
+            let mut points = Default::default();
+            for element in &region.elements {
+                region.area_panel::<true>(element, twist, c, [[0.0, 1.0]; 2], 0, &mut points);
+            }
+            let (edges, by) = region.edges(c, true).assemble(c, 1.0);
+            let off = (edges.value / points.0.value - 1.0).abs();
+            prop_assert!(off < 1e-9, "{c} {edges:?} {points:?}");
+            let pairs = by.iter().flatten().zip(points.1.iter().flatten());
+            prop_assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-7), "{c} {by:?} {points:?}");
         }
     }
 }

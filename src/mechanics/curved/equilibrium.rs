@@ -5,10 +5,10 @@
 //! or none.
 
 use glam::DVec2;
-use nalgebra::Vector5;
+use nalgebra::{Vector3, Vector5};
 
-use super::face::{Face, Pressed};
-use super::joint::{Joint, Mode, Place, Reached};
+use super::face::{Carried, Face, Pressed};
+use super::joint::{Joint, Mode, Near, Place, Reached};
 use super::slip::{self, Slipping, Space};
 use crate::model::Wrench;
 
@@ -100,12 +100,19 @@ impl<'a> Problem<'a> {
         w
     }
 
+    /// What pressures bring, linear in what they carry: force along the pads and moment about the
+    /// closing axis, and the moment in the pad plane.
+    pub(super) fn brought(&self, one: &Carried, two: &Carried) -> (Vector3<f64>, DVec2) {
+        let half = 0.5 * self.distance;
+        let lever = |c: &Carried| DVec2::new(c[1] - half * c[3], c[2] - half * c[4]);
+        let slide = Vector3::new(-one[3] - two[3], -one[4] - two[4], one[5] + two[5]);
+        (slide, (lever(one) - lever(two)).perp())
+    }
+
     /// The moment in the pad plane that the pressure leaves over.
     pub(super) fn moment_beyond(&self, faces: [&Pressed<'_>; 2]) -> DVec2 {
-        let xi = |face: &Pressed<'_>| face.first - 0.5 * self.distance * face.slope;
-        let pressed = xi(faces[0]) - xi(faces[1]);
-        let outer = DVec2::new(self.wrench.moment.x, self.wrench.moment.y);
-        outer + DVec2::new(-pressed.y, pressed.x)
+        let (_, moment) = self.brought(&faces[0].carried(), &faces[1].carried());
+        self.wrench.moment.truncate() + moment
     }
 
     /// What friction would do with the pressure of a state if the force along the pads counted
@@ -206,8 +213,7 @@ impl<'a> Problem<'a> {
     /// Newton's step of the tilt.
     fn step(&self, state: &State<'a>, coupling: f64) -> Option<Vec<f64>> {
         let faces = [&state.faces[0], &state.faces[1]];
-        let give = faces[0].compression().max(faces[1].compression());
-        let joint = Joint::new(self, slip::length(faces), give).coupled(coupling);
+        let joint = Joint::new(self, &Near::new(faces)).coupled(coupling);
         let mut place = Place::new(faces);
         place.angles[..state.angles.len()].copy_from_slice(&state.angles);
         let mut mu = 1.0;
@@ -226,8 +232,7 @@ impl<'a> Problem<'a> {
         if self.held.is_empty() {
             return None;
         }
-        let give = pressed[0].compression().max(pressed[1].compression());
-        let joint = Joint::new(self, slip::length(pressed), give);
+        let joint = Joint::new(self, &Near::new(pressed));
         let solved = |place: &Place| match joint.newton(place, 0.0)? {
             Reached::Solution(found) => Some(found),
             Reached::Below(..) => None,

@@ -137,9 +137,15 @@ impl Face {
     /// The pressure that carries `load` at a tilt; `start`: a compression near that of the pad's plane.
     pub(super) fn carry(&self, load: f64, tilt: DVec2, start: Option<f64>) -> Option<Pressed<'_>> {
         let delta = self.carrying(load, tilt, start, EXACT)?;
-        let regions = self.regions(delta, tilt);
-        let area = regions.iter().map(|region| region.area_and_load().0).sum();
-        Some(self.measure(delta, tilt, regions, load, area))
+        let (area, _) = self.press(delta, tilt);
+        Some(self.measure(delta, tilt, self.regions(delta, tilt), load, area))
+    }
+
+    /// What a compression presses without tilt; `None` where that is nothing.
+    pub(super) fn pressed_by(&self, delta: f64) -> Option<Pressed<'_>> {
+        let (area, load) = self.press(delta, DVec2::ZERO);
+        let regions = || self.regions(delta, DVec2::ZERO);
+        (load > 0.0).then(|| self.measure(delta, DVec2::ZERO, regions(), load, area))
     }
 
     fn regions(&self, delta: f64, tilt: DVec2) -> Vec<Region> {
@@ -226,17 +232,21 @@ impl Face {
             tilted: DVec2::ZERO,
             second: 0.0,
         };
-        let (mut first, mut slope, mut second) = (DVec2::ZERO, DVec2::ZERO, 0.0);
-        let (mut turn, mut tilted) = (0.0, DVec2::ZERO);
-        pressed.each(|field, x, grade, p| {
-            first += p * x;
-            slope += p * grade;
-            second += p * x.length_squared();
-            turn -= p * x.perp_dot(grade);
-            tilted += p * self.sign * field.felt(tilt);
-        });
-        (pressed.first, pressed.slope, pressed.second) = (first, slope, second);
-        (pressed.turn, pressed.tilted) = (turn, tilted);
+        for (field, region) in self.fields.iter().zip(&pressed.regions) {
+            if region.is_empty() {
+                continue;
+            }
+            let [sums @ .., second] =
+                region.pressure_moments(&field.gap).map(|sum| self.stiffness * sum);
+            let [load, x1, x2, slope1, slope2, turn] = field.carried(&sums);
+            let (first, around) = (DVec2::new(x1, x2), field.origin);
+            pressed.first += first;
+            pressed.slope += DVec2::new(slope1, slope2);
+            pressed.turn += turn;
+            pressed.tilted += load * self.sign * field.felt(tilt);
+            // About the origin of the pad plane, from that of the surface's axes.
+            pressed.second += second + around.dot(2.0 * first - load * around);
+        }
         pressed
     }
 }
@@ -316,16 +326,18 @@ impl FaceDissipation {
 impl Pressed<'_> {
     /// Visits points of the pressed area: place, slope of the gap there, normal force of the point.
     pub(super) fn points(&self, mut visit: impl FnMut(DVec2, DVec2, f64)) {
-        self.each(|_, x, slope, p| visit(x, slope, p));
-    }
-
-    fn each(&self, mut visit: impl FnMut(&Field, DVec2, DVec2, f64)) {
         for (field, region) in self.face.fields.iter().zip(&self.regions) {
             region.points(|x, weight| {
                 let p = self.face.stiffness * weight * region.compression(x);
-                visit(field, field.origin + field.outward(x), field.slope(x), p);
+                visit(field.origin + field.outward(x), field.slope(x), p);
             });
         }
+    }
+
+    /// What the pressure carries.
+    pub(super) fn carried(&self) -> Carried {
+        let Self { load, first, slope, turn, .. } = *self;
+        Carried::new(load, first.x, first.y, slope.x, slope.y, turn)
     }
 
     /// Middle of pressure.

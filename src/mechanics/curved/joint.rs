@@ -9,7 +9,7 @@ use nalgebra::{Matrix3x5, SMatrix, SVector, Vector3, Vector5};
 
 use super::equilibrium::Problem;
 use super::face::{Carried, Pressed, Trial};
-use super::slip::Slipping;
+use super::slip::{self, Slipping};
 
 type Vector7 = SVector<f64, 7>;
 type Matrix7 = SMatrix<f64, 7, 7>;
@@ -65,6 +65,25 @@ pub(super) enum Reached<'a> {
     Below(Place, f64),
 }
 
+/// What is known of faces that are pressed about as the solution presses them.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Near {
+    /// Units of length and of compression \[m\].
+    pub(super) length: f64,
+    give: f64,
+    carried: [Carried; 2],
+}
+
+impl Near {
+    pub(super) fn new(faces: [&Pressed<'_>; 2]) -> Self {
+        Self {
+            length: slip::length(faces),
+            give: faces[0].compression().max(faces[1].compression()),
+            carried: faces.map(Pressed::carried),
+        }
+    }
+}
+
 /// The equations of one problem in their own units.
 pub(super) struct Joint<'p, 'a> {
     problem: &'p Problem<'a>,
@@ -82,6 +101,8 @@ pub(super) struct Joint<'p, 'a> {
     reach: f64,
     /// Share of the friction's lever `d/2` that counts.
     coupling: f64,
+    /// About the load along the motions, in units: with the pressure of the faces given.
+    about: Vector5<f64>,
 }
 
 /// The equations at some values of the unknowns.
@@ -119,9 +140,10 @@ const CONTRACTION: f64 = 0.25;
 const WITHIN: f64 = 2.0;
 
 impl<'p, 'a> Joint<'p, 'a> {
-    /// `length` and `give`: of the contact without tilt, units of length and compression.
-    pub(super) fn new(problem: &'p Problem<'a>, length: f64, give: f64) -> Self {
+    /// `near`: of faces without tilt, or of a state nearby.
+    pub(super) fn new(problem: &'p Problem<'a>, near: &Near) -> Self {
         let (space, distance) = (&problem.space, problem.distance);
+        let Near { length, give, carried: [one, two] } = near;
         let spin = 2.0 / distance.abs();
         let units = Vector5::new(1.0, 1.0, length.recip(), spin, spin);
         let basis = [0, 1].map(|k| space.basis(k, distance));
@@ -130,18 +152,21 @@ impl<'p, 'a> Joint<'p, 'a> {
             *tilt = *unit * e.perp();
         }
         let across = nalgebra::Matrix5::from_diagonal(&units);
-        Self {
+        let mut joint = Self {
             problem,
             scaled: basis.map(|basis| basis * across),
             basis,
             units,
             active: space.dimensions(),
             normal: problem.normal[0] + problem.normal[1],
-            give,
+            give: *give,
             tilts,
             reach: problem.faces[0].reach().max(problem.faces[1].reach()),
             coupling: 1.0,
-        }
+            about: Vector5::zeros(),
+        };
+        joint.about = joint.outer().0 + joint.effect(one, two).0;
+        joint
     }
 
     /// The same with a share of the friction's lever.
@@ -180,11 +205,7 @@ impl<'p, 'a> Joint<'p, 'a> {
     /// What pressures mean for the load along the motions, in units, and for the moment in the pad
     /// plane; linear in what they carry.
     fn effect(&self, one: &Carried, two: &Carried) -> (Vector5<f64>, DVec2) {
-        let half = 0.5 * self.problem.distance;
-        let lever = |c: &Carried| DVec2::new(c[1] - half * c[3], c[2] - half * c[4]);
-        let pressed = lever(one) - lever(two);
-        let moment = DVec2::new(-pressed.y, pressed.x);
-        let slide = Vector3::new(-one[3] - two[3], -one[4] - two[4], one[5] + two[5]);
+        let (slide, moment) = self.problem.brought(one, two);
         (self.along(slide, moment), moment)
     }
 
@@ -206,22 +227,16 @@ impl<'p, 'a> Joint<'p, 'a> {
         (self.along(Vector3::new(f.x, f.y, m.z), moment), moment)
     }
 
-    /// The power of the load from outside over the normal forces, for a motion of a [`Place`].
+    /// About the power of the load over the normal forces, for a motion of a [`Place`].
     pub(super) fn power(&self, motion: &Vector5<f64>) -> f64 {
-        self.asked().dot(&self.scaled(motion))
+        self.about.dot(&self.scaled(motion))
     }
 
-    /// Whether the body can roll on face `k`, but for what the pressure adds: the other one's slide
-    /// asks for the more friction.
+    /// Whether the body can roll on face `k`, about: the other one's slide asks for the more friction.
     pub(super) fn may_roll(&self, k: usize) -> bool {
         let none = [(Vector5::zeros(), DVec2::ZERO); 7];
-        let Friction { mu, resting, .. } = self.still(Mode::Rolls(k), &self.asked(), &none);
+        let Friction { mu, resting, .. } = self.still(Mode::Rolls(k), &self.about, &none);
         resting.x.hypot(resting.y) <= MAY_ROLL * mu * self.problem.normal[k]
-    }
-
-    /// The load from outside along the motions, in units.
-    fn asked(&self) -> Vector5<f64> {
-        self.outer().0
     }
 
     /// A motion in units.
@@ -395,7 +410,7 @@ impl<'p, 'a> Joint<'p, 'a> {
         (x[5], x[6]) = (place.delta[0] / self.give, place.delta[1] / self.give);
         let mut size = 1.0;
         if place.mode == Mode::Slips {
-            let (w, z) = (self.asked(), self.scaled(&place.motion));
+            let (w, z) = (&self.about, self.scaled(&place.motion));
             size = w.amax();
             let length = w.dot(&z) / size;
             if !(size > 0.0 && length > 0.0) {

@@ -8,6 +8,7 @@
 
 mod equilibrium;
 mod face;
+mod floor;
 mod inverse;
 mod joint;
 mod note;

@@ -8,7 +8,8 @@ use glam::DVec2;
 
 use super::equilibrium::Problem;
 use super::face::Pressed;
-use super::joint::{Found, Joint, Mode, Place, Reached};
+use super::floor::Floors;
+use super::joint::{Found, Joint, Mode, Near, Place, Reached};
 use super::space::{self, Kind, Rotation};
 use super::{Asked, Case, NO_LEVER, Pads, slip, strong};
 use crate::model::Wrench;
@@ -30,15 +31,18 @@ pub struct Screen<'a> {
     /// Squeezed without a load.
     pressed: [Pressed<'a>; 2],
     force: f64,
-    length: f64,
-    give: f64,
+    near: Near,
     /// Of the rotations held by the faces' roundness alone: which of the problem's held ones it is, its
     /// stiffness over the force, and its change with the pull.
     rolling: Vec<(usize, f64, f64)>,
+    /// Of many loads.
+    floors: Option<Floors>,
     /// States found so far, with what tells how a load presses.
     known: Vec<([f64; 3], Place)>,
 }
 
+/// Loads from which on floors are worth their pressing.
+const MANY: usize = 16;
 /// States kept.
 const MOST: usize = 64;
 /// Share of the limit of a strong coupling from which on a load is solved.
@@ -123,7 +127,7 @@ impl Pads {
             }
         }
         let faces = [&pressed[0], &pressed[1]];
-        let (length, normal) = (slip::length(faces), [force; 2]);
+        let normal = [force; 2];
         let wrench = &Wrench::default();
         let case = Case {
             faces: &self.faces,
@@ -135,8 +139,11 @@ impl Pads {
             asked: Asked::SCORE,
         };
         let problem = case.problem(is_free);
-        let give = pressed[0].compression().max(pressed[1].compression());
-        Some(Screen { problem, force, length, give, rolling, known: Vec::new(), pressed })
+        let pull = f64::max(-low, high);
+        let floors =
+            if wrenches.len() >= MANY { Floors::new(&problem, faces, force, pull) } else { None };
+        let (near, known) = (Near::new(faces), Vec::new());
+        Some(Screen { problem, force, near, rolling, floors, known, pressed })
     }
 }
 
@@ -202,7 +209,7 @@ impl Screen<'_> {
         let spins = self.problem.space.spins.iter();
         let spun: f64 = spins.map(|e| e.dot(moment).powi(2)).sum();
         let lever = 0.5 * self.problem.distance;
-        let turned = wrench.moment.z / self.length;
+        let turned = wrench.moment.z / self.near.length;
         // The pad pressed less slips first.
         let pressed = self.force - 0.5 * wrench.force.z.abs();
         (force.length_squared() + turned * turned + spun / (lever * lever)).sqrt() / pressed
@@ -217,6 +224,15 @@ impl Screen<'_> {
         (self.problem.normal, self.problem.wrench) = (normal, *wrench);
         for &(held, stiffness, by_pull) in &self.rolling {
             self.problem.rolling[held] = stiffness * self.force + by_pull * wrench.force.z;
+        }
+        if let Some(floors) = &self.floors {
+            if !strong(&self.problem, value / WEAK) && floors.below(&self.problem, value).is_some()
+            {
+                return Compared::Below;
+            }
+            if let Some(mu) = floors.rolls(&self.problem) {
+                return Compared::At(mu);
+            }
         }
         let Some((compared, place, most)) = self.reach(value) else { return Compared::Open };
         if strong(&self.problem, most / WEAK) || self.may_settle(&place) {
@@ -241,12 +257,29 @@ impl Screen<'_> {
 
     /// What tells how a load presses.
     fn presses(&self) -> [f64; 3] {
-        let moment = self.problem.wrench.moment.truncate() / self.length;
+        let moment = self.problem.wrench.moment.truncate() / self.near.length;
         [self.problem.wrench.force.z, moment.x, moment.y]
     }
 
+    /// Where the pressure resists no rotation it follows from the normal forces alone.
+    fn untilted(&self) -> Option<(Compared, Place, f64)> {
+        let Problem { faces, normal, distance, space, .. } = &self.problem;
+        let mut place = self.nearest();
+        let [one, two] =
+            [0, 1].map(|k| faces[k].carry(normal[k], DVec2::ZERO, Some(place.delta[k])));
+        let (one, two) = (one?, two?);
+        place.delta = [one.delta, two.delta];
+        let faces = [&one, &two];
+        let w = self.problem.along(faces, self.problem.moment_beyond(faces), DVec2::ZERO);
+        let mu = slip::solve(space, faces, *distance, w, None)?.mu;
+        Some((Compared::At(mu), place, mu))
+    }
+
     fn reach(&self, value: f64) -> Option<(Compared, Place, f64)> {
-        let joint = Joint::new(&self.problem, self.length, self.give);
+        if self.problem.held.is_empty() {
+            return self.untilted();
+        }
+        let joint = Joint::new(&self.problem, &self.near);
         let start = self.start(&joint);
         if let Some(answer) = self.rolls(&joint, &start) {
             return Some(answer);
@@ -275,15 +308,20 @@ impl Screen<'_> {
         if mode == Mode::Slips { Some(told(reached)) } else { self.rests(reached) }
     }
 
-    /// The state to begin at, from those of other loads.
-    fn start(&self, joint: &Joint<'_, '_>) -> Place {
+    /// The state of the load that presses most like this one.
+    fn nearest(&self) -> Place {
         let here = self.presses();
         let apart = |other: &[f64; 3]| -> f64 {
             other.iter().zip(&here).map(|(a, b)| (a - b) * (a - b)).sum()
         };
         let nearest = self.known.iter().min_by(|a, b| apart(&a.0).total_cmp(&apart(&b.0)));
-        let mut start = nearest
-            .map_or_else(|| Place::new([&self.pressed[0], &self.pressed[1]]), |(_, place)| *place);
+        nearest
+            .map_or_else(|| Place::new([&self.pressed[0], &self.pressed[1]]), |(_, place)| *place)
+    }
+
+    /// The state to begin at, from those of other loads.
+    fn start(&self, joint: &Joint<'_, '_>) -> Place {
+        let mut start = self.nearest();
         let slips = self.known.iter().filter(|(_, place)| place.mode == Mode::Slips);
         let moved = slips.map(|(_, place)| (joint.power(&place.motion), place.motion));
         let most = moved.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
@@ -321,3 +359,6 @@ fn told(reached: Reached<'_>) -> (Compared, Place, f64) {
         Reached::Below(place, most) => (Compared::Below, place, most),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -152,6 +152,77 @@ pub(super) fn rests(faces: [&Pressed<'_>; 2], k: usize, load: &Vector3<f64>, mu:
     problem.bears(k, load, mu * ALIKE)
 }
 
+/// The body rolls on face `k`: the other face, of normal force `load` and `first = int p x`, slides
+/// along the pad. `basis` as [`Space::basis`] has it, with so many spins.
+pub(super) fn rolling(
+    basis: &[Matrix3x5<f64>; 2],
+    spins: usize,
+    k: usize,
+    w: &Vector5<f64>,
+    (load, first): (f64, DVec2),
+) -> Option<Slipping> {
+    let mut zeta = Vector5::zeros();
+    for i in 0..spins {
+        // The spin about this axis with face k at rest.
+        let column = basis[k].column(3 + i);
+        let mut at_rest = Vector5::zeros();
+        at_rest[3 + i] = 1.0;
+        for j in 0..3 {
+            at_rest[j] = -column[j];
+        }
+        zeta += w.dot(&at_rest) * at_rest;
+    }
+    let slide = basis[1 - k] * zeta;
+    let along = DVec2::new(slide.x, slide.y);
+    let speed = along.length();
+    if speed == 0.0 {
+        return None;
+    }
+    let mu = w.dot(&zeta) / (load * speed);
+    let e = along / speed;
+    let sliding = mu * Vector3::new(load * e.x, load * e.y, first.perp_dot(e));
+    let resting = Vector3::new(w[0], w[1], w[2]) - sliding;
+    let mut shares = [sliding, resting];
+    if k == 0 {
+        shares.reverse();
+    }
+    let bounds = Bounds { lower: mu, upper: mu };
+    Some(Slipping { mu, zeta, shares, rolls_on: Some(k), bounds, evaluations: 0 })
+}
+
+/// What the friction of a face bears for certain, over `mu`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bearing {
+    /// Force in any direction through the middle of pressure \[N\].
+    load: f64,
+    /// That middle \[m\].
+    pub(super) centre: DVec2,
+    /// Force \[N\] and moment about the middle [N m] of a turn about it.
+    side: DVec2,
+    pub(super) turn: f64,
+}
+
+impl Bearing {
+    pub(super) fn of(face: &Pressed<'_>) -> Self {
+        let centre = face.centre();
+        let turn = face.support(&Vector3::new(centre.y, -centre.x, 1.0));
+        let side = DVec2::new(turn.x, turn.y);
+        Self { load: face.load, centre, side, turn: turn.z - centre.perp_dot(side) }
+    }
+
+    /// A friction at which the face bears a force along the pad and a moment about the closing axis.
+    pub(super) fn bears(&self, load: &Vector3<f64>) -> f64 {
+        let force = DVec2::new(load.x, load.y);
+        self.asks(force, (load.z - self.centre.perp_dot(force)) / self.turn)
+    }
+
+    /// A friction at which it bears a force through the middle of pressure and `turned` times what a
+    /// turn about it does, the turn's own force among the first.
+    pub(super) fn asks(&self, force: DVec2, turned: f64) -> f64 {
+        (force - turned * self.side).length() / self.load + turned.abs()
+    }
+}
+
 /// What holds the load `w` for certain: an upper bound of `mu` from a few supports.
 pub(super) fn enough(
     space: &Space,
@@ -357,18 +428,11 @@ impl<'a, 'b> Problem<'a, 'b> {
     /// Whether face `k` alone bears `load` at the friction `mu`: first by a bound.
     fn bears(&self, k: usize, load: &Vector3<f64>, mu: f64) -> bool {
         let face = self.faces[k];
-        let (force, centre) = (DVec2::new(load.x, load.y), face.centre());
-        if force.length() > mu * face.load {
+        if load.x.hypot(load.y) > mu * face.load {
             return false;
         }
-        let moment = load.z - centre.perp_dot(force);
-        // Made up of a slide and of a turn about the middle of pressure.
-        let turn = face.support(&Vector3::new(centre.y, -centre.x, 1.0));
         self.evaluations.set(self.evaluations.get() + 1);
-        let side = DVec2::new(turn.x, turn.y);
-        let turned = moment / (turn.z - centre.perp_dot(side));
-        let slid = force - turned * side;
-        if slid.length() / face.load + turned.abs() <= mu {
+        if Bearing::of(face).bears(load) <= mu {
             return true;
         }
         self.alone(k, load).is_some_and(|(alone, _)| alone <= mu)
@@ -386,44 +450,14 @@ impl<'a, 'b> Problem<'a, 'b> {
         (alone <= TIED * answer.mu).then_some(Slipping { bounds, ..answer })
     }
 
-    /// The body rolls on face `k`: the other face slides along the pad. The answer if `k` carries
-    /// the rest of the load at no more friction ([`Self::rests`]).
+    /// [`rolling`] on face `k`: the answer if `k` carries the rest of the load at no more friction
+    /// ([`Self::rests`]).
     fn rolling(&self, space: &Space, k: usize, distance: f64, w: &Vector5<f64>) -> Option<Rolling> {
-        let other = 1 - k;
-        let mut zeta = Vector5::zeros();
-        for i in 0..space.spins.len() {
-            // The spin about this axis with face k at rest.
-            let column = self.basis[k].column(3 + i);
-            let mut at_rest = Vector5::zeros();
-            at_rest[3 + i] = 1.0;
-            for j in 0..3 {
-                at_rest[j] = -column[j];
-            }
-            zeta += w.dot(&at_rest) * at_rest;
-        }
-        let slide = self.basis[other] * zeta;
-        let along = DVec2::new(slide.x, slide.y);
-        let speed = along.length();
-        if speed == 0.0 || distance == 0.0 {
+        let other = self.faces[1 - k];
+        if distance == 0.0 {
             return None;
         }
-        let face = self.faces[other];
-        let mu = w.dot(&zeta) / (face.load * speed);
-        let e = along / speed;
-        let sliding = mu * Vector3::new(face.load * e.x, face.load * e.y, face.first.perp_dot(e));
-        let resting = Vector3::new(w[0], w[1], w[2]) - sliding;
-        let mut shares = [sliding, resting];
-        if k == 0 {
-            shares.reverse();
-        }
-        let answer = Slipping {
-            mu,
-            zeta,
-            shares,
-            rolls_on: Some(k),
-            bounds: Bounds { lower: mu, upper: mu },
-            evaluations: 0,
-        };
+        let answer = rolling(&self.basis, space.spins.len(), k, w, (other.load, other.first))?;
         Some(Rolling { answer, on: k })
     }
 

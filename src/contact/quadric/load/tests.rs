@@ -203,3 +203,39 @@ fn whole_and_half_spots() {
     let beside = square(0.2).into_iter().map(|x| x + DVec2::new(-1.3, 0.0)).collect();
     assert_eq!(area_and_load(&[beside], &u), (0.0, 0.0));
 }
+
+/// A sliver along the flat side of a slender ellipse: its arc turns little, but is long beside the
+/// ellipse's narrower half.
+#[test]
+fn a_long_flat_arc_is_cut() {
+    let ring = vec![
+        DVec2::new(7.517, 0.4486290194871658),
+        DVec2::new(-2.2613, -2.231434907556965),
+        DVec2::new(8.8632, -1.4442071219433044),
+    ];
+    let u = Quadratic {
+        c: 3.522021467356128,
+        g: DVec2::new(-0.0581923, 2.754402094443526),
+        l: DVec2::new(-0.1778, -7.708792951357613),
+    };
+    let rings = [ring];
+    let (region, lines) = (Region::new(&rings, u).area_and_load(), by_lines(&rings, &u));
+    assert!(closed(&rings, &u).is_none());
+    assert!((region.1 / lines.1 - 1.0).abs() < 1e-12, "{region:?} {lines:?}");
+}
+
+/// A ring that leaves the disc at its last corner, which lies on the circle.
+#[test]
+fn a_corner_on_the_circle_is_in_or_out() {
+    let ring = vec![DVec2::new(-1.0 + 1e-16, -1.0), DVec2::ZERO, DVec2::new(-1.0, 0.0)];
+    let u = Quadratic { c: 0.5, g: DVec2::ZERO, l: DVec2::splat(-1.0) };
+    for first in 0..3 {
+        let mut ring = ring.clone();
+        ring.rotate_left(first);
+        let (area, load) = area_and_load(&[ring], &u);
+        assert!(
+            (area - PI / 8.0).abs() < 1e-12 && (load - PI / 32.0).abs() < 1e-12,
+            "{area} {load}"
+        );
+    }
+}

@@ -1,0 +1,88 @@
+use glam::DVec3;
+use proptest::prelude::*;
+
+use super::*;
+use crate::contact::surface::{Piece, Surfaces};
+use crate::model::{Gap, Wrench};
+
+/// Both faces alike, of a cylinder, a ball, a cone or planes, with their distance.
+fn surfaces(kind: u32, half: [f64; 2], off: f64) -> (Surfaces, f64) {
+    let radius = 0.01;
+    let (axis, at, height) = (DVec2::X, DVec2::ZERO, 0.0);
+    let gap = match kind {
+        0 => Gap::Cylinder { radius, axis, at, height },
+        1 => Gap::Sphere { radius, at, height },
+        2 => Gap::Cone { radius, slope: 2e-3, axis, at, height },
+        _ => Gap::default(),
+    };
+    let [x, y] = half;
+    let outer = [(-x, -y), (x, -y), (x, y), (-x, y)].map(|(a, b)| DVec2::new(a + off, b)).to_vec();
+    let piece = Piece { outer, holes: Vec::new(), gap };
+    let (face_i, face_ii) = (vec![piece.clone()], vec![piece]);
+    (Surfaces { face_i, face_ii, stiffness: [5e9, 3e9], layer: None }, 2.0 * radius)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// What the floors leave out is held at less, and what they say rolls has that friction.
+    #[test]
+    fn what_is_below_is_below(
+        kind in 0..4_u32,
+        half in [0.004..0.012_f64, 0.006..0.01_f64],
+        off in -0.004..0.004_f64,
+        loads in prop::collection::vec(
+            (prop::array::uniform3(-1.0..1.0_f64), prop::array::uniform3(-1.0..1.0_f64)), MANY,
+        ),
+        size in 0.5..40.0_f64,
+        share in 0.2..3.0_f64,
+    ) {
+        let (surfaces, distance) = surfaces(kind, half, off);
+        let pads = Pads::new(&surfaces).unwrap();
+        let force = 200.0;
+        let wrenches: Vec<Wrench> = loads
+            .into_iter()
+            .map(|(f, m)| Wrench {
+                force: size * DVec3::from(f),
+                moment: 0.01 * size * DVec3::from(m),
+            })
+            .collect();
+        let mut screen = pads.screen(distance, force, &wrenches).unwrap();
+        for wrench in &wrenches {
+            let Some(mu) = pads.score(distance, force, wrench).mu_s else { continue };
+            match screen.compare(wrench, share * mu) {
+                Compared::Below => prop_assert!(share > 1.0, "{mu} is not below {}", share * mu),
+                Compared::At(found) => prop_assert!((found / mu - 1.0).abs() < 1e-9, "{found} {mu}"),
+                Compared::Open => {}
+            }
+        }
+    }
+}
+
+/// Most loads far below the value never reach Newton's method.
+#[test]
+fn floors_take_most_loads() {
+    for kind in 0..2 {
+        let (surfaces, distance) = surfaces(kind, [0.01, 0.008], 0.0);
+        let pads = Pads::new(&surfaces).unwrap();
+        let wrenches: Vec<Wrench> = (0..200)
+            .map(|i| {
+                let turn = |by: f64| (by * f64::from(i)).sin();
+                let force = 4.0 * DVec3::new(turn(1.3), turn(2.1), turn(0.7));
+                Wrench { force, moment: 0.02 * DVec3::new(turn(3.1), turn(1.9), turn(2.7)) }
+            })
+            .collect();
+        let mut screen = pads.screen(distance, 200.0, &wrenches).unwrap();
+        let mut taken = 0;
+        for wrench in &wrenches {
+            let mu = pads.score(distance, 200.0, wrench).mu_s.unwrap();
+            let normal = [200.0 + 0.5 * wrench.force.z, 200.0 - 0.5 * wrench.force.z];
+            (screen.problem.normal, screen.problem.wrench) = (normal, *wrench);
+            let below =
+                screen.floors.as_ref().and_then(|floors| floors.below(&screen.problem, 2.0 * mu));
+            assert!(below.is_none_or(|below| below >= mu));
+            taken += usize::from(below.is_some());
+        }
+        assert!(taken > 150, "{kind}: {taken}");
+    }
+}
