@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod curved;
+mod cut;
 mod faceted;
 mod fit;
 mod formats;
