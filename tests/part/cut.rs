@@ -207,6 +207,27 @@ fn rounded_and_noisy_round_faces_are_found_however_facets_are_cut() {
     }
 }
 
+/// Too few corners to show noise: only the step of the coordinates tells how far they may lie off.
+#[test]
+fn short_arcs_of_rounded_coordinates_are_found_however_strips_are_cut() {
+    for strips in [11, 12, 13] {
+        let mut outline = arc(DVec2::ZERO, 20.0, -PI / 12.0, PI / 12.0, strips);
+        outline.extend([DVec2::new(10.0, 14.0), DVec2::new(-15.0, 14.0)]);
+        outline.extend([DVec2::new(-15.0, -14.0), DVec2::new(10.0, -14.0)]);
+        let solid = posed(Solid::extrude(&outline, 130.0), 0.0, 1e-3);
+        let round = |part: &Part| -> Faces {
+            told(part).into_iter().filter(|face| face.0 != "plane").collect()
+        };
+        let whole = part(&solid);
+        let first = round(&whole);
+        assert!(first.len() == 1 && first[0].0 == "cylinder", "{strips}: {first:?}");
+        for (how, cut) in cuts(&solid) {
+            let what = format!("{strips} strips cut {how}");
+            assert_same_of(&what, &whole, (first.clone(), round(&part(&cut))), 1e-4);
+        }
+    }
+}
+
 #[test]
 fn a_gear_with_a_keyed_bore_is_the_same_however_it_is_cut() {
     let Some(file) = reference("parts/gen/gen_spurgear_m2_z24.stl") else { return };
