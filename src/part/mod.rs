@@ -59,6 +59,7 @@ pub struct Mesh {
 
 impl Mesh {
     /// The three corners of triangle `index` \[m\].
+    #[inline]
     pub fn corners(&self, index: u32) -> [DVec3; 3] {
         let [a, b, c] = self.triangles[index as usize];
         [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]

@@ -29,36 +29,69 @@ fn by_place(a: DVec3, b: DVec3) -> Ordering {
     a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z))
 }
 
-/// Sorts vertices by place and triangles by their vertices, the lowest one first in each. The same
-/// triangles in another order, with another corner first, or with their vertices numbered
-/// otherwise, give the same mesh.
+/// Steps along each axis of the curve through all places: 2^21, three of which fit 64 bits.
+const STEPS: f64 = (1 << 21) as f64;
+
+/// Spreads the lowest 21 bits to every third one.
+fn spread(x: u64) -> u64 {
+    let x = (x | x << 32) & 0x001f_0000_0000_ffff;
+    let x = (x | x << 16) & 0x001f_0000_ff00_00ff;
+    let x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
+    let x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
+    (x | x << 2) & 0x1249_2492_4924_9249
+}
+
+/// Sorts vertices along a curve that fills the part's box (Morton's), on which near ones stay near
+/// in memory, and triangles by their vertices, the lowest one first in each. The same triangles in
+/// another order, with another corner first, or with their vertices numbered otherwise, give the
+/// same mesh.
 pub(super) fn sort(soup: &mut Soup) {
-    let mut vertices: Vec<(DVec3, u32)> = soup.vertices.iter().copied().zip(0..).collect();
-    vertices.par_sort_unstable_by(|a, b| by_place(a.0, b.0));
-    let mut rank = vec![0_u32; vertices.len()];
-    for (&(_, vertex), number) in vertices.iter().zip(0..) {
+    let points = &soup.vertices;
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for &point in points {
+        (low, high) = (low.min(point), high.max(point));
+    }
+    let scale = (STEPS - 1.0) / (high - low).max_element().max(f64::MIN_POSITIVE);
+    let key = |point: DVec3| {
+        let [x, y, z] = ((point - low) * scale).to_array().map(|steps| spread(steps as u64));
+        x | y << 1 | z << 2
+    };
+    let mut order: Vec<(u64, u32)> = points.iter().map(|&point| key(point)).zip(0..).collect();
+    order.par_sort_unstable_by(|a, b| {
+        let places = || by_place(points[a.1 as usize], points[b.1 as usize]);
+        a.0.cmp(&b.0).then_with(places)
+    });
+    let mut rank = vec![0_u32; points.len()];
+    for (&(_, vertex), number) in order.iter().zip(0..) {
         rank[vertex as usize] = number;
     }
-    soup.vertices.clear();
-    soup.vertices.extend(vertices.iter().map(|entry| entry.0));
-    let mut sorted: Vec<([u32; 3], u32)> = soup
-        .triangles
-        .iter()
-        .zip(0_u32..)
-        .map(|(triangle, number)| {
-            let mut triangle = triangle.map(|vertex| rank[vertex as usize]);
-            let lowest = (0..3).min_by_key(|&corner| triangle[corner]).unwrap_or(0);
-            triangle.rotate_left(lowest);
-            // Fits: MAX_TRIANGLES leaves room for half-edges.
-            (triangle, 3 * number + lowest as u32)
-        })
-        .collect();
-    sorted.par_sort_unstable();
+    soup.vertices = order.iter().map(|entry| points[entry.1 as usize]).collect();
+    // By the lowest vertex first: few triangles share one.
+    let mut next = vec![0_u32; rank.len() + 1];
+    for triangle in &mut soup.triangles {
+        *triangle = triangle.map(|vertex| rank[vertex as usize]);
+        next[triangle[0].min(triangle[1]).min(triangle[2]) as usize + 1] += 1;
+    }
+    for vertex in 1..next.len() {
+        next[vertex] += next[vertex - 1];
+    }
+    let mut sorted = vec![([0_u32; 3], 0_u32); soup.triangles.len()];
+    for (triangle, number) in soup.triangles.iter().zip(0_u32..) {
+        let mut triangle = *triangle;
+        let lowest = (0..3).min_by_key(|&corner| triangle[corner]).unwrap_or(0);
+        triangle.rotate_left(lowest);
+        let slot = &mut next[triangle[0] as usize];
+        // Fits: MAX_TRIANGLES leaves room for half-edges.
+        sorted[*slot as usize] = (triangle, 3 * number + lowest as u32);
+        *slot += 1;
+    }
+    let shared = |a: &([u32; 3], u32), b: &([u32; 3], u32)| a.0[0] == b.0[0];
+    sorted.chunk_by_mut(shared).for_each(<[_]>::sort_unstable);
     for (triangle, entry) in soup.triangles.iter_mut().zip(&sorted) {
         *triangle = entry.0;
     }
     soup.given.set_places(Places {
-        vertices: vertices.into_iter().map(|entry| entry.1).collect(),
+        vertices: order.into_iter().map(|entry| entry.1).collect(),
         triangles: sorted.into_iter().map(|entry| entry.1).collect(),
     });
 }

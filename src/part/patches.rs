@@ -5,9 +5,11 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
+use super::Mesh;
 use super::given::GivenFaces;
-use super::regions::{Flatness, is_flat, twice_normal};
+use super::regions::{Flatness, Sums, is_flat, twice_normal};
 use super::repair::Repaired;
 use super::topology::NONE;
 use crate::geometry::UnionFind;
@@ -22,6 +24,8 @@ const EDGE: f64 = 0.25;
 /// Factor above the largest area from which its steps of two are counted, so that rounding does not
 /// part equal areas at a step.
 const EQUAL: f64 = 1.001;
+/// Triangles from which on what a patch adds up to is kept.
+const MANY: usize = 8;
 
 /// The mesh's triangles in flat patches.
 pub(super) struct Patches {
@@ -31,6 +35,8 @@ pub(super) struct Patches {
     begins: Vec<u32>,
     /// Patch of each triangle.
     of: Vec<u32>,
+    /// What the triangles of larger patches add up to.
+    sums: FxHashMap<u32, Sums>,
 }
 
 impl Patches {
@@ -43,15 +49,38 @@ impl Patches {
         for (half, _) in level.iter().enumerate().filter(|entry| *entry.1) {
             sets.join(half / 3, part.edges.twin[half] as usize / 3);
         }
-        let mut members: Vec<(u32, u32)> =
-            (0..count).map(|triangle| (sets.root(triangle) as u32, triangle as u32)).collect();
-        members.sort_unstable();
-        let mut patches =
-            Self { order: Vec::with_capacity(count), begins: vec![0], of: vec![0; count] };
-        for set in members.chunk_by(|a, b| a.0 == b.0) {
-            let triangles: Vec<u32> = set.iter().map(|entry| entry.1).collect();
-            if is_flat(part, &triangles, flatness) {
-                patches.add(&triangles);
+        drop(level);
+        // The triangles of each set one after the other, the sets by their first ones.
+        let roots: Vec<u32> = (0..count).map(|triangle| sets.root(triangle) as u32).collect();
+        let mut ends = vec![0_u32; count + 1];
+        roots.iter().for_each(|&root| ends[root as usize + 1] += 1);
+        for root in 1..ends.len() {
+            ends[root] += ends[root - 1];
+        }
+        let mut members = vec![0_u32; count];
+        for (&root, triangle) in roots.iter().zip(0..) {
+            let slot = &mut ends[root as usize];
+            members[*slot as usize] = triangle;
+            *slot += 1;
+        }
+        let mut patches = Self {
+            order: Vec::with_capacity(count),
+            begins: vec![0],
+            of: vec![0; count],
+            sums: FxHashMap::default(),
+        };
+        let same = |a: &u32, b: &u32| roots[*a as usize] == roots[*b as usize];
+        for triangles in members.chunk_by(same) {
+            if let [_] = triangles {
+                patches.add(triangles);
+                continue;
+            }
+            let sums = Sums::of(&part.mesh, triangles);
+            if is_flat(part, triangles, &sums, flatness) {
+                if triangles.len() >= MANY {
+                    patches.sums.insert(patches.begins.len() as u32 - 1, sums);
+                }
+                patches.add(triangles);
             } else {
                 // A gentle bend, cut finely.
                 triangles.chunks(1).for_each(|triangle| patches.add(triangle));
@@ -67,15 +96,23 @@ impl Patches {
         self.begins.push(self.order.len() as u32);
     }
 
+    /// Adds a patch to the sums of a region.
+    pub(super) fn add_to(&self, sums: &mut Sums, mesh: &Mesh, patch: u32) {
+        match self.sums.get(&patch) {
+            Some(own) => sums.join(own),
+            None => sums.add_all(mesh, self.triangles(patch)),
+        }
+    }
+
+    /// The patch of a triangle.
+    pub(super) fn of(&self, triangle: u32) -> u32 {
+        self.of[triangle as usize]
+    }
+
     /// The triangles of a patch.
     pub(super) fn triangles(&self, patch: u32) -> &[u32] {
         let at = |index: u32| self.begins[index as usize] as usize;
         &self.order[at(patch)..at(patch + 1)]
-    }
-
-    /// The triangles of the patch of a triangle.
-    pub(super) fn about(&self, triangle: u32) -> &[u32] {
-        self.triangles(self.of[triangle as usize])
     }
 
     /// Patches by falling area, in steps of a factor of two from the largest; within a step the one
@@ -86,6 +123,9 @@ impl Patches {
         let vectors: Vec<DVec3> = (0..self.begins.len() as u32 - 1)
             .into_par_iter()
             .map(|patch| {
+                if let Some(sums) = self.sums.get(&patch) {
+                    return 2.0 * sums.vector;
+                }
                 let triangles = self.triangles(patch).iter();
                 triangles.map(|&triangle| twice_normal(part.mesh.corners(triangle))).sum()
             })
@@ -146,7 +186,7 @@ fn insert(lowest: &mut [u32; 3], number: u32) {
     lowest.sort_unstable();
 }
 
-/// Whether the triangles on both sides of each half-edge are level.
+/// Whether the triangles on both sides of each half-edge are level: told at the first half of an edge.
 fn level(part: &Repaired, given: &GivenFaces) -> Vec<bool> {
     let count = part.mesh.triangles.len() as u32;
     // The unit normal, and how far rounding of the corners tilts it.
@@ -156,9 +196,10 @@ fn level(part: &Repaired, given: &GivenFaces) -> Vec<bool> {
             let corners = part.mesh.corners(triangle);
             let [a, b, c] = corners;
             let cross = twice_normal(corners);
-            let longest = (b - a).length().max((c - b).length()).max((a - c).length());
-            let tilt = 2.0 * part.noise * longest / cross.length();
-            (tilt < MOST).then(|| (cross.normalize(), tilt))
+            let [ab, bc, ca] = [b - a, c - b, a - c].map(|edge| edge.length_squared());
+            let length = cross.length();
+            let tilt = 2.0 * part.noise * ab.max(bc).max(ca).sqrt() / length;
+            (tilt < MOST).then(|| (cross / length, tilt))
         })
         .collect();
     part.edges
@@ -167,7 +208,10 @@ fn level(part: &Repaired, given: &GivenFaces) -> Vec<bool> {
         .enumerate()
         .map(|(half, &twin)| {
             let triangle = half / 3;
-            if twin == NONE || given.of(triangle as u32) != given.of(twin / 3) {
+            if twin == NONE
+                || (twin as usize) < half
+                || given.of(triangle as u32) != given.of(twin / 3)
+            {
                 return false;
             }
             match (normals[triangle], normals[twin as usize / 3]) {

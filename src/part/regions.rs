@@ -48,10 +48,10 @@ impl Plane {
 /// Area-weighted sums over triangles: area, normal, first and second moments about a reference near
 /// the region.
 #[derive(Debug, Clone, Copy)]
-struct Sums {
+pub(super) struct Sums {
     reference: DVec3,
     area: f64,
-    vector: DVec3,
+    pub vector: DVec3,
     first: DVec3,
     /// Second moments xx, yy, zz and yz, zx, xy.
     squares: DVec3,
@@ -84,6 +84,36 @@ impl Sums {
         let weight = area / 12.0;
         self.squares += weight * (a * a + b * b + c * c + sum * sum);
         self.products += weight * (cyclic(a) + cyclic(b) + cyclic(c) + cyclic(sum));
+    }
+
+    pub(super) fn add_all(&mut self, mesh: &Mesh, triangles: &[u32]) {
+        for &triangle in triangles {
+            let corners = mesh.corners(triangle);
+            let cross = twice_normal(corners);
+            self.add(corners, cross, cross.length() / 2.0);
+        }
+    }
+
+    /// Of triangles, about a corner of the first.
+    pub(super) fn of(mesh: &Mesh, triangles: &[u32]) -> Self {
+        let mut sums = Self::new(mesh.corners(triangles[0])[0]);
+        sums.add_all(mesh, triangles);
+        sums
+    }
+
+    /// Adds the sums over others, about another reference.
+    pub(super) fn join(&mut self, other: &Self) {
+        let d = other.reference - self.reference;
+        self.area += other.area;
+        self.vector += other.vector;
+        self.first += other.first + other.area * d;
+        self.squares += other.squares + 2.0 * d * other.first + other.area * d * d;
+        let mixed = DVec3::new(
+            d.y * other.first.z + d.z * other.first.y,
+            d.z * other.first.x + d.x * other.first.z,
+            d.x * other.first.y + d.y * other.first.x,
+        );
+        self.products += other.products + mixed + other.area * cyclic(d);
     }
 
     fn centre(&self) -> DVec3 {
@@ -144,6 +174,7 @@ impl Regions {
     }
 }
 
+#[inline]
 pub(super) fn twice_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
@@ -189,14 +220,11 @@ fn grow_from<'a>(
     for face in &given.all {
         let Stated::Plane { origin, normal } = face.surface else { continue };
         let mut sums = Sums::new(origin);
+        sums.add_all(mesh, &face.triangles);
         let begin = order.len();
-        for &triangle in &face.triangles {
-            let corners = mesh.corners(triangle);
-            let cross = twice_normal(corners);
-            sums.add(corners, cross, cross.length() / 2.0);
-            region_of[triangle as usize] = regions.len() as u32;
-            order.push(triangle);
-        }
+        order.extend(&face.triangles);
+        let number = regions.len() as u32;
+        face.triangles.iter().for_each(|&triangle| region_of[triangle as usize] = number);
         let plane = Plane { normal, offset: normal.dot(origin), tilt: 0.0 };
         let centre = sums.centre();
         let centre = centre - normal * normal.dot(centre - origin);
@@ -210,12 +238,12 @@ fn grow_from<'a>(
         let own = given.of(seed);
         let corners = mesh.corners(seed);
         let mut sums = Sums::new(corners[0]);
-        for &triangle in &order[begin..] {
-            let corners = mesh.corners(triangle);
-            let cross = twice_normal(corners);
-            sums.add(corners, cross, cross.length() / 2.0);
-            region_of[triangle as usize] = number;
+        if std::ptr::eq(start, patches.triangles(patches.of(seed))) {
+            patches.add_to(&mut sums, mesh, patches.of(seed));
+        } else {
+            sums.add_all(mesh, &order[begin..]);
         }
+        order[begin..].iter().for_each(|&triangle| region_of[triangle as usize] = number);
         let Some(mut plane) = sums.fit(uncertainty) else {
             // Not even a direction: alone, without area.
             let plane = Plane { normal: DVec3::Z, offset: corners[0].z, tilt: 0.0 };
@@ -245,8 +273,10 @@ fn grow_from<'a>(
                         if given.of(other) != own {
                             continue;
                         }
-                        let piece = patches.about(other);
-                        if take(mesh, piece, &plane, flatness, &mut sums) {
+                        let patch = patches.of(other);
+                        let piece = patches.triangles(patch);
+                        if lie_in(mesh, piece, &plane, flatness) {
+                            patches.add_to(&mut sums, mesh, patch);
                             piece.iter().for_each(|&other| region_of[other as usize] = number);
                             order.extend(piece);
                         } else {
@@ -267,9 +297,11 @@ fn grow_from<'a>(
                 if region_of[other as usize] != NONE {
                     return false;
                 }
-                let piece = patches.about(other);
-                let taken = take(mesh, piece, &plane, flatness, &mut sums);
+                let patch = patches.of(other);
+                let piece = patches.triangles(patch);
+                let taken = lie_in(mesh, piece, &plane, flatness);
                 if taken {
+                    patches.add_to(&mut sums, mesh, patch);
                     piece.iter().for_each(|&other| region_of[other as usize] = number);
                     order.extend(piece);
                 }
@@ -334,50 +366,19 @@ pub(super) fn gathered(
 /// The middle of the area of triangles in a plane through `origin` that is known.
 pub(super) fn middle(mesh: &Mesh, triangles: &[u32], origin: DVec3, normal: DVec3) -> DVec3 {
     let mut sums = Sums::new(origin);
-    for &triangle in triangles {
-        let corners = mesh.corners(triangle);
-        let cross = twice_normal(corners);
-        sums.add(corners, cross, cross.length() / 2.0);
-    }
+    sums.add_all(mesh, triangles);
     let centre = sums.centre();
     centre - normal * normal.dot(centre - origin)
 }
 
-/// Whether triangles lie in one plane.
-pub(super) fn is_flat(part: &Repaired, triangles: &[u32], flatness: Flatness) -> bool {
-    let mesh = &part.mesh;
-    if triangles.len() < 2 {
-        return true;
-    }
-    let mut sums = Sums::new(mesh.corners(triangles[0])[0]);
-    for &triangle in triangles {
-        let corners = mesh.corners(triangle);
-        let cross = twice_normal(corners);
-        sums.add(corners, cross, cross.length() / 2.0);
-    }
+/// Whether triangles that add up to `sums` lie in one plane.
+pub(super) fn is_flat(part: &Repaired, triangles: &[u32], sums: &Sums, flatness: Flatness) -> bool {
     let plane = sums.fit(flatness.uncertainty);
-    plane.is_some_and(|plane| {
-        triangles.iter().all(|&triangle| lies_in(mesh.corners(triangle), &plane, flatness))
-    })
+    plane.is_some_and(|plane| lie_in(&part.mesh, triangles, &plane, flatness))
 }
 
-/// Adds the triangles of a patch to the sums if all of them lie in the plane.
-fn take(
-    mesh: &Mesh,
-    triangles: &[u32],
-    plane: &Plane,
-    flatness: Flatness,
-    sums: &mut Sums,
-) -> bool {
-    if !triangles.iter().all(|&triangle| lies_in(mesh.corners(triangle), plane, flatness)) {
-        return false;
-    }
-    for &triangle in triangles {
-        let corners = mesh.corners(triangle);
-        let cross = twice_normal(corners);
-        sums.add(corners, cross, cross.length() / 2.0);
-    }
-    true
+fn lie_in(mesh: &Mesh, triangles: &[u32], plane: &Plane, flatness: Flatness) -> bool {
+    triangles.iter().all(|&triangle| lies_in(mesh.corners(triangle), plane, flatness))
 }
 
 /// Whether a triangle lies in the plane.
