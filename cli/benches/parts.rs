@@ -113,80 +113,6 @@ fn whole_program(arguments: &[&str]) -> (f64, Option<f64>) {
     (start.elapsed().as_secs_f64(), peak)
 }
 
-/// A closed surface over turns and rows of corners, from one end to the other.
-fn lathe(rows: u32, ends: [DVec3; 2], at: impl Fn(f64, f64) -> DVec3) -> Part {
-    const AROUND: u32 = 64;
-    let turn = |k: u32| std::f64::consts::TAU * f64::from(k) / f64::from(AROUND);
-    let along = |row: u32| f64::from(row) / f64::from(rows - 1);
-    let corners = (0..rows).flat_map(|row| (0..AROUND).map(move |k| (k, row)));
-    let mut vertices: Vec<DVec3> = corners.map(|(k, row)| at(turn(k), along(row))).collect();
-    let low = vertices.len() as u32;
-    vertices.extend(ends);
-    let mut triangles = Vec::new();
-    for k in 0..AROUND {
-        let next = (k + 1) % AROUND;
-        for row in 0..rows - 1 {
-            let [a, b] = [k, next].map(|k| row * AROUND + k);
-            triangles.extend([[a, b, b + AROUND], [a, b + AROUND, a + AROUND]]);
-        }
-        let top = (rows - 1) * AROUND;
-        triangles.extend([[next, k, low], [top + k, top + next, low + 1]]);
-    }
-    Part::from_triangles("part", &vertices, &triangles).unwrap()
-}
-
-/// Rates on curved faces, the search for their sites included, beside those between planes.
-fn curved_rates() {
-    let ellipsoid = |half: DVec3| {
-        lathe(41, [DVec3::NEG_Z * half.z, DVec3::Z * half.z], move |turn, along| {
-            let (sine, cosine) = (3.0 * (along - 0.5)).sin_cos();
-            half * DVec3::new(cosine * turn.cos(), cosine * turn.sin(), sine)
-        })
-    };
-    // Straight from end to end, or bent outwards.
-    let round = |radii: [f64; 2], bulge: f64| {
-        lathe(
-            2 + 30 * u32::from(bulge > 0.0),
-            [DVec3::ZERO, DVec3::Z * 0.06],
-            move |turn, along| {
-                let radius =
-                    radii[0] + (radii[1] - radii[0]) * along + bulge * along * (1.0 - along);
-                DVec3::new(radius * turn.cos(), radius * turn.sin(), 0.06 * along)
-            },
-        )
-    };
-    let read = |name: &str| Part::read(&shipped(name), &ReadOptions::default()).unwrap();
-    let parts = [
-        ("L bracket, planes", read("l_bracket.stl")),
-        ("pocket plate, planes", read("pocket_plate.stl")),
-        ("cylinder", round([0.015, 0.015], 0.0)),
-        ("frustum", round([0.016, 0.014], 0.0)),
-        ("barrel", round([0.012, 0.012], 0.02)),
-        ("ball", ellipsoid(DVec3::splat(0.02))),
-        ("egg", ellipsoid(DVec3::new(0.014, 0.014, 0.020))),
-        ("ellipsoid", ellipsoid(DVec3::new(0.010, 0.015, 0.022))),
-    ];
-    let gripper = gripper::find("robotiq-2f85").unwrap();
-    for spacing in [None, Some(1e-3)] {
-        println!("\ncurved faces, robotiq-2f85, one thread, grid of {spacing:?} m");
-        for (name, part) in &parts {
-            let options = ProposeOptions::default().with_spacing(spacing).with_curved(Some(true));
-            let (spent, (candidates, grips)) = seconds(
-                || (),
-                |()| {
-                    let mut proposer = Proposer::new(part, &gripper, &options).unwrap();
-                    proposer.by_ref().for_each(drop);
-                    (proposer.tally().candidates, proposer.tally().grips)
-                },
-            );
-            println!(
-                "{name:<22} {candidates:>8} candidates {grips:>8} grips {:>8.2} us a candidate",
-                1e6 * spent / candidates as f64
-            );
-        }
-    }
-}
-
 fn main() {
     let most: usize = std::env::var("GRIPFAST_TRIANGLES")
         .ok()
@@ -252,8 +178,6 @@ fn main() {
             );
         }
     }
-
-    one.install(curved_rates);
 
     println!("\nthe whole program, all threads: gripfast plan with one load, a million candidates");
     let path = folder.path().join("part.stl");

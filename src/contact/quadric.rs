@@ -77,6 +77,30 @@ impl Quadratic {
         self.g + self.l * x
     }
 
+    /// Greatest value within rings.
+    pub(crate) fn greatest(&self, rings: &[Ring]) -> f64 {
+        let mut most = f64::NEG_INFINITY;
+        for ring in rings {
+            let Some(&last) = ring.last() else { continue };
+            let mut a = last;
+            for &b in ring {
+                // Along an edge it may be greatest between its ends.
+                let step = b - a;
+                let bend = self.l.dot(step * step);
+                let t = if bend < 0.0 { -self.slope(a).dot(step) / bend } else { 0.0 };
+                most = most.max(self.value(b)).max(self.value(a + t.clamp(0.0, 1.0) * step));
+                a = b;
+            }
+        }
+        // Or at its own crest; one that is a line crosses an edge.
+        if self.l.max_element() < 0.0 {
+            let top = -self.g / self.l;
+            let is_within = rings.iter().filter(|ring| ring_contains(ring, top)).count() % 2 == 1;
+            most = if is_within { most.max(self.value(top)) } else { most };
+        }
+        most
+    }
+
     /// Greatest value that it can have within the ring, or more.
     fn bound(&self, ring: &[DVec2]) -> f64 {
         let along = |g: f64, l: f64, x: f64| g * x + 0.5 * l * x * x;
@@ -289,7 +313,7 @@ impl Region {
                 let chord = 0.5 * (pair[0] + pair[1]);
                 let w = width(chord.x);
                 // Beside a tip rounding leaves nothing of the width, and the chord is near enough.
-                let steep = step.x < STEEP * step.y;
+                let steep = step.x < (STEEP * step.y).max(ROUNDING * farthest);
                 let y = if steep { chord.y } else { m + side * w.max(0.0).sqrt() };
                 let middle = swap(DVec2::new(chord.x, y));
                 if (steep || w > 0.0) && contains(rings, middle) {
@@ -387,9 +411,9 @@ impl Region {
         }
     }
 
-    /// Calls `visit` with points of the area and their weights, right for polynomials of `x` up to
-    /// the fourth degree besides `u` on straight pieces; weights may be negative where the area is
-    /// not convex.
+    /// Calls `visit` with points of the area and their weights, right for polynomials of `x` besides `u`:
+    /// up to the second degree where `u` is linear, else up to the fourth on straight pieces; weights may
+    /// be negative where the area is not convex.
     pub fn points(&self, mut visit: impl FnMut(DVec2, f64)) {
         for [x, y, weights] in self.rows() {
             for i in 0..LANES {
@@ -486,6 +510,10 @@ impl Region {
         let near = OUTSIDE * omega.abs() * self.half.min_element();
         let centre = DVec2::new(-u2, u1) / omega;
         if outside.length_squared() > near * near {
+            if self.u.l == DVec2::ZERO {
+                self.triangles::<BY>(twist, centre, &mut sum);
+                return sum;
+            }
             let whole = [[0.0, 1.0]; 2];
             for element in &self.elements {
                 self.area_panel::<BY>(element, twist, centre, whole, 0, &mut sum);

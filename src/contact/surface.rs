@@ -6,7 +6,8 @@ use glam::{DAffine2, DMat2, DVec2};
 
 use super::quadric::{Quadratic, Region, area_and_load};
 use crate::geometry::{
-    Bounds2, clip_ring_convex, intersect_convex, is_convex, ring_area, transform, within_window,
+    Bounds2, clip_convex, clip_ring_convex, intersect_convex, is_convex, ring_area, transform,
+    within_window,
 };
 use crate::model::{Patch, Polygon, Ring};
 
@@ -43,7 +44,7 @@ pub(crate) fn mapped(gap: &Gap, map: &DAffine2) -> Gap {
 }
 
 /// A piece made ready: in the surface's own axes.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Field {
     /// Origin of the surface's axes in the pad plane.
     pub(crate) origin: DVec2,
@@ -183,6 +184,11 @@ impl Field {
         }
     }
 
+    /// Greatest compression without tilt at one of the pad's plane \[m\].
+    pub(crate) fn greatest(&self, delta: f64) -> f64 {
+        self.compression(delta, DVec2::ZERO).greatest(&self.rings)
+    }
+
     /// Smallest gap less tilt over the polygon's corners and the axes' origin: about where contact
     /// begins.
     pub(crate) fn nearest(&self, tilt: DVec2) -> f64 {
@@ -191,6 +197,11 @@ impl Field {
             |x: DVec2| self.gap.value(x) - tilt.dot(self.origin) - felt.dot(self.outward(x));
         let corners = self.rings.iter().flatten().map(|x| value(*x));
         corners.fold(value(DVec2::ZERO), f64::min)
+    }
+
+    /// Slopes of the gap at the polygon's corners, in the pad plane: the steepest is among them.
+    pub(crate) fn slopes(&self) -> impl Iterator<Item = DVec2> {
+        self.rings.iter().flatten().map(|x| self.slope(*x))
     }
 
     /// Corners of the polygon in the pad plane.
@@ -401,10 +412,9 @@ pub(crate) fn cut(piece: &Piece, window: &[DVec2]) -> Patch {
         outer.len() >= 3 && ring_area(outer) > 1e-9 * size * size
     };
     if piece.holes.is_empty() {
-        let clipped = || vec![clip_ring_convex(&piece.outer, window)];
         let found = match is_convex(&piece.outer) {
-            true if window.len() <= FEW_SIDES => Some(clipped()),
-            true => within_window(&piece.outer, window).or_else(|| Some(clipped())),
+            true if window.len() <= FEW_SIDES => Some(vec![clip_ring_convex(&piece.outer, window)]),
+            true => Some(vec![clip_convex(window, &piece.outer)]),
             false => within_window(&piece.outer, window).map(|mut rings| {
                 rings.iter_mut().for_each(begin);
                 rings

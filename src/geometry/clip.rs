@@ -6,6 +6,7 @@
 
 use glam::{DVec2, DVec3};
 
+use super::polygon::{Bounds2, straightened};
 use crate::model::Ring;
 
 /// The points with `normal . x + offset >= 0`: also the form in which a pressure plane is not
@@ -20,11 +21,13 @@ pub struct HalfPlane {
 
 impl HalfPlane {
     /// `normal . point + offset`.
+    #[inline]
     pub fn value(&self, point: DVec2) -> f64 {
         self.normal.dot(point) + self.offset
     }
 
     /// The half-plane at the left of the directed line from `a` to `b`.
+    #[inline]
     pub fn left_of(a: DVec2, b: DVec2) -> Self {
         let normal = (b - a).perp();
         Self { normal, offset: -normal.dot(a) }
@@ -102,6 +105,35 @@ pub fn clip_ring_convex(ring: &[DVec2], convex: &[DVec2]) -> Ring {
     current
 }
 
+/// The part of a convex counter-clockwise polygon inside another one: of the many sides of an outline
+/// the few that may cut.
+pub(crate) fn clip_convex(ring: &[DVec2], convex: &[DVec2]) -> Ring {
+    let (mut current, mut next) = (ring.to_vec(), Vec::with_capacity(ring.len() + 8));
+    let bounds = Bounds2::of(ring);
+    let (middle, size) = (bounds.centre(), 0.5 * bounds.size());
+    let Some(&last) = convex.last() else { return Ring::new() };
+    let (mut a, mut is_whole) = (last, true);
+    for &b in convex {
+        let half = HalfPlane::left_of(a, b);
+        a = b;
+        // Of the box: a side of no length has no value, and cuts nothing.
+        let (value, most) = (half.value(middle), half.normal.abs().dot(size));
+        if value < -most {
+            return Ring::new();
+        }
+        if value < most * BOX {
+            clip_ring_half_plane_into(&current, &half, &mut next);
+            std::mem::swap(&mut current, &mut next);
+            is_whole = false;
+        }
+    }
+    // A corner on a side is met twice.
+    if is_whole { current } else { straightened(&current) }
+}
+
+/// Size of a box beyond which no rounding lets a side cut it.
+const BOX: f64 = 1.0 + 1e-9;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -122,6 +154,35 @@ mod tests {
             square
         );
         assert!(clip_ring_half_plane(&[], &half).is_empty());
+    }
+
+    /// As by every side, one after the other.
+    #[test]
+    fn convex_outlines_clip_each_other() {
+        let circle = |count: u32, half: DVec2, middle: DVec2| -> Ring {
+            let step = std::f64::consts::TAU / f64::from(count);
+            (0..count).map(|k| middle + half * DVec2::from_angle(step * f64::from(k))).collect()
+        };
+        let mut areas = [0; 3];
+        for k in 0..400_u32 {
+            let part = |n: u32| (f64::from(k * n) * 0.618_034).fract();
+            let ring = circle(48, DVec2::new(0.2 + part(1), 0.2 + part(2)), DVec2::ZERO);
+            let middle = 3.0 * DVec2::new(part(3) - 0.5, part(5) - 0.5);
+            let other = circle(3 + k % 30, DVec2::splat(0.1 + 1.5 * part(7)), middle);
+            let [found, wanted] = [clip_convex(&ring, &other), clip_ring_convex(&ring, &other)]
+                .map(|x| ring_area(&x));
+            assert!((found - wanted).abs() < 1e-9, "{k}: {found} {wanted}");
+            areas[if found == 0.0 {
+                0
+            } else {
+                1 + usize::from(found > 0.999 * ring_area(&ring))
+            }] += 1;
+        }
+        assert!(areas.iter().all(|count| *count > 20), "{areas:?}");
+        // Sides on sides.
+        let square = rectangle(DVec2::ONE);
+        assert_eq!(ring_area(&clip_convex(&square, &square)), 1.0);
+        assert!(clip_convex(&square, &[]).is_empty());
     }
 
     #[test]

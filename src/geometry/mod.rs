@@ -15,6 +15,7 @@ pub mod sphere;
 mod union_find;
 mod window;
 
+pub(crate) use clip::clip_convex;
 pub use clip::{
     HalfPlane, clip_ring_axis, clip_ring_convex, clip_ring_half_plane, clip_ring_half_plane_into,
     clip_rings_half_plane,

@@ -18,7 +18,7 @@ type Contour = Vec<[f64; 2]>;
 
 /// Pieces of an intersection or union with less area than this share of their bounding square are
 /// rounding, not shape: pads lie flush with edges whose coordinates carry the 6e-8 of 32-bit files.
-const SLIVER: f64 = 1e-6;
+pub(crate) const SLIVER: f64 = 1e-6;
 /// The same where shapes are only put in order, which must not lose a true sliver: the grid's own
 /// rounding.
 const SLIVER_INPUT: f64 = 1e-13;

@@ -6,6 +6,9 @@ use nalgebra::{Matrix6, Vector6};
 /// Coefficients that the points do not determine (relative eigenvalue) are zero.
 const UNDETERMINED: f64 = 1e-10;
 
+/// Pivot over the greatest sum from which on all six are determined.
+const CLEAR: f64 = 1e-5;
+
 /// A height `z = height + slope . x + x . bend x / 2` over a plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Paraboloid {
@@ -75,20 +78,57 @@ fn solve(
     if points.clone().count() < 3 || size <= 0.0 {
         return None;
     }
-    let (mut matrix, mut right) = (Matrix6::zeros(), Vector6::zeros());
+    let (mut sums, mut right) = ([[0.0; 6]; 6], [0.0; 6]);
     for (point, weight) in points {
         let x = point.truncate() / size;
         let bend = curved * DVec3::new(0.5 * x.x * x.x, x.x * x.y, 0.5 * x.y * x.y);
-        let row = Vector6::new(1.0, x.x, x.y, bend.x, bend.y, bend.z);
-        matrix += weight * row * row.transpose();
-        right += weight * point.z * row;
+        let row = [1.0, x.x, x.y, bend.x, bend.y, bend.z];
+        for i in 0..6 {
+            let weighted = weight * row[i];
+            (0..=i).for_each(|j| sums[i][j] += weighted * row[j]);
+            right[i] += weighted * point.z;
+        }
     }
+    if let Some(found) = solve_definite(&sums, right) {
+        return Some((found, size));
+    }
+    let matrix = Matrix6::from_fn(|i, j| sums[i.max(j)][i.min(j)]);
+    let right = Vector6::from(right);
     let eigen = matrix.symmetric_eigen();
     let most = eigen.eigenvalues.amax();
     let determined = |value: f64| if value > UNDETERMINED * most { 1.0 / value } else { 0.0 };
     let inverse = Matrix6::from_diagonal(&eigen.eigenvalues.map(determined));
     let found = eigen.eigenvectors * inverse * eigen.eigenvectors.transpose() * right;
     Some((found.into(), size))
+}
+
+/// The solution of a symmetric system by its lower half (Cholesky); `None` unless it is so far from
+/// singular that rounding hardly tells.
+fn solve_definite(lower: &[[f64; 6]; 6], mut right: [f64; 6]) -> Option<[f64; 6]> {
+    let mut factor = [[0.0; 6]; 6];
+    let most = (0..6).map(|i| lower[i][i]).fold(0.0, f64::max);
+    for i in 0..6 {
+        for j in 0..i {
+            let known: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
+            factor[i][j] = (lower[i][j] - known) / factor[j][j];
+        }
+        let known: f64 = (0..i).map(|k| factor[i][k] * factor[i][k]).sum();
+        let pivot = lower[i][i] - known;
+        // A row of points, and what is not asked for, has none.
+        if pivot.is_nan() || pivot <= CLEAR * most {
+            return None;
+        }
+        factor[i][i] = pivot.sqrt();
+    }
+    for i in 0..6 {
+        let known: f64 = (0..i).map(|k| factor[i][k] * right[k]).sum();
+        right[i] = (right[i] - known) / factor[i][i];
+    }
+    for i in (0..6).rev() {
+        let known: f64 = (i + 1..6).map(|k| factor[k][i] * right[k]).sum();
+        right[i] = (right[i] - known) / factor[i][i];
+    }
+    Some(right)
 }
 
 #[cfg(test)]
@@ -115,6 +155,29 @@ mod tests {
         let ([low, high], axis) = found.principal();
         assert!((low + high - 85.0).abs() < 1e-6 && (low * high - (1650.0 - 49.0)).abs() < 1e-4);
         assert!((truth.bend * axis - low * axis).length() < 1e-6);
+    }
+
+    /// What points determine well is what the system's eigenvalues say.
+    #[test]
+    fn both_ways_to_solve_agree() {
+        let points = (0..25).map(|k| {
+            let x = DVec2::from_angle(2.4 * f64::from(k)) * 0.2 * f64::from(k).sqrt();
+            (x.extend((3.0 * x.x).sin() + x.y * x.y), 1.0 + 0.1 * x.y)
+        });
+        let (found, size) = solve(points.clone(), 1.0).unwrap();
+        let (mut matrix, mut right) = (Matrix6::zeros(), Vector6::zeros());
+        for (point, weight) in points {
+            let x = point.truncate() / size;
+            let row = Vector6::new(1.0, x.x, x.y, 0.5 * x.x * x.x, x.x * x.y, 0.5 * x.y * x.y);
+            matrix += weight * row * row.transpose();
+            right += weight * point.z * row;
+        }
+        let wanted = matrix.try_inverse().unwrap() * right;
+        assert!((Vector6::from(found) - wanted).amax() < 1e-12, "{found:?} {wanted}");
+        // A row of points determines three.
+        let mut lower = [[0.0; 6]; 6];
+        (0..6).for_each(|i| lower[i][i] = if i < 3 { 1.0 } else { 1e-7 });
+        assert_eq!(solve_definite(&lower, [1.0; 6]), None);
     }
 
     #[test]

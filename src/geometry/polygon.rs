@@ -31,10 +31,11 @@ impl Bounds2 {
 
     /// The smallest rectangle around `points`.
     pub fn of<'a>(points: impl IntoIterator<Item = &'a DVec2>) -> Self {
-        points.into_iter().fold(Self::EMPTY, |sum, &point| Self {
-            min: sum.min.min(point),
-            max: sum.max.max(point),
-        })
+        let Self { mut min, mut max } = Self::EMPTY;
+        for &point in points {
+            (min, max) = (min.min(point), max.max(point));
+        }
+        Self { min, max }
     }
 
     /// The smallest rectangle around both.
@@ -50,6 +51,7 @@ impl Bounds2 {
     }
 
     /// Whether the closed rectangles share a point.
+    #[inline]
     pub fn meets(self, other: Self) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
@@ -206,6 +208,29 @@ pub(crate) fn crosses_right(a: DVec2, b: DVec2, point: DVec2) -> bool {
     robust::orient2d(coordinate(low), coordinate(high), coordinate(point)) > 0.0
 }
 
+/// Distance of a corner from the line between its neighbours, as a share of the ring's size, up to which
+/// it is rounding.
+const ON_LINE: f64 = 1e-10;
+
+/// A ring without corners on straight lines: what the chords of a round end are, seen from the side.
+pub(crate) fn straightened(ring: &[DVec2]) -> Ring {
+    let least = ON_LINE * Bounds2::of(ring).size().max_element();
+    let mut kept: Ring = Vec::with_capacity(ring.len());
+    let Some(&last) = ring.last() else { return kept };
+    for (index, &corner) in ring.iter().enumerate() {
+        let before = kept.last().copied().unwrap_or(last);
+        // Of two at one place, first and last, one stays.
+        let after = ring.get(index + 1).or_else(|| kept.first()).copied().unwrap_or(last);
+        let (along, way) = (after - before, corner - before);
+        let is_on_line = along.perp_dot(way).abs() <= least * along.length()
+            && (0.0..=along.length_squared()).contains(&along.dot(way));
+        if !is_on_line {
+            kept.push(corner);
+        }
+    }
+    if kept.len() < 3 { ring.to_vec() } else { kept }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -218,6 +243,36 @@ mod tests {
         };
         normalise(&mut polygon);
         polygon
+    }
+
+    #[test]
+    fn corners_on_lines_are_none() {
+        let at = |x: f64, y: f64| DVec2::new(x, y);
+        // One on a side, one twice, and one a hair off a side; then one that stands out.
+        let ring = [
+            at(0., 0.),
+            at(1., 0.),
+            at(3., 0.),
+            at(3., 2.),
+            at(3., 2.),
+            at(1., 2. + 1e-11),
+            at(0., 2.),
+        ];
+        let corners = [at(0., 0.), at(3., 0.), at(3., 2.), at(0., 2.)];
+        assert_eq!(straightened(&ring), corners);
+        let mut out = corners.to_vec();
+        out.insert(1, at(1.0, -1e-8));
+        assert_eq!(straightened(&out), out);
+        // One that is there twice, first and last, in either order.
+        for other in [at(1e-17, -1e-17), at(-1e-17, 1e-17), at(0., 0.)] {
+            for (first, last) in [(corners[0], other), (other, corners[0])] {
+                let ring = [first, corners[1], corners[2], corners[3], last];
+                assert!((ring_area(&straightened(&ring)) - 6.0).abs() < 1e-9, "{ring:?}");
+            }
+        }
+        // A way back along itself stays.
+        let spike = [at(0., 0.), at(2., 0.), at(1., 0.), at(1., 1.)];
+        assert_eq!(ring_area(&straightened(&spike)), ring_area(&spike));
     }
 
     #[test]

@@ -24,8 +24,11 @@ pub(crate) fn within_window(ring: &[DVec2], window: &[DVec2]) -> Option<Vec<Ring
         return Some(Vec::new());
     }
     let next = |index: usize| ring[if index + 1 == ring.len() { 0 } else { index + 1 }];
+    let sides: Vec<HalfPlane> = (0..window.len())
+        .map(|side| HalfPlane::left_of(window[before(side, window)], window[side]))
+        .collect();
     let parts: Vec<Option<Inside>> =
-        ring.iter().enumerate().map(|(index, &a)| inside(a, next(index), window, bounds)).collect();
+        ring.iter().enumerate().map(|(index, &a)| inside(a, next(index), &sides, bounds)).collect();
     let enters = |part: &Option<Inside>| part.as_ref().is_some_and(|part| part.from > 0.0);
     let Some(first) = parts.iter().position(enters) else {
         let whole = |part: &Option<Inside>| part.as_ref().is_some_and(|part| part.to >= 1.0);
@@ -84,16 +87,13 @@ struct Inside {
 
 /// By the sides one after the other (Cyrus and Beck 1978).
 #[inline]
-fn inside(a: DVec2, b: DVec2, window: &[DVec2], bounds: Bounds2) -> Option<Inside> {
+fn inside(a: DVec2, b: DVec2, window: &[HalfPlane], bounds: Bounds2) -> Option<Inside> {
     if a.min(b).cmpgt(bounds.max).any() || a.max(b).cmplt(bounds.min).any() {
         return None;
     }
     let mut found = Inside { from: 0.0, to: 1.0, sides: [0; 2] };
-    let mut corner = window[window.len() - 1];
-    for (side, &next) in window.iter().enumerate() {
-        let half = HalfPlane::left_of(corner, next);
+    for (side, half) in window.iter().enumerate() {
         let (value_a, value_b) = (half.value(a), half.value(b));
-        corner = next;
         let (a_is_in, b_is_in) = (value_a >= 0.0, value_b >= 0.0);
         if a_is_in != b_is_in {
             let t = value_a / (value_a - value_b);

@@ -7,6 +7,7 @@
 mod crest;
 mod freeform;
 mod net;
+mod opposite;
 mod places;
 mod planes;
 mod relief;
@@ -15,6 +16,7 @@ mod rows;
 mod shapes;
 mod skyline;
 mod special;
+mod survey;
 mod tapers;
 
 use glam::{DMat3, DVec2, DVec3};

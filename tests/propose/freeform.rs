@@ -252,6 +252,65 @@ fn a_prism_of_constant_width_is_gripped_all_round() {
     assert!(turns.len() >= 9, "{turns:?}");
 }
 
+/// At the flat crest of a superellipse no paraboloid stands for the face: its facets do. The two of a
+/// strip along the prism are one piece, so that pads along it touch the same.
+#[test]
+fn strips_of_a_flat_crest_are_one_piece_each() {
+    let power = |x: f64| x.abs().powf(2.0 / 3.0).copysign(x);
+    let mesh =
+        prism(0.05, 96, |turn| DVec2::new(0.020 * power(turn.cos()), 0.014 * power(turn.sin())));
+    let (grips, _) = grips(&part(&mesh), &options());
+    let over: Vec<&Grip> = grips.iter().filter(|grip| grip.surfaces.is_some()).collect();
+    assert!(over.len() >= 100, "{}", over.len());
+    let mut most = 0;
+    for grip in &over {
+        let [across, along] = [DVec3::Y, DVec3::X].map(|axis| closing(grip).dot(axis).abs());
+        assert!(across.max(along) > 0.9999, "{}", closing(grip));
+        assert!((grip.width / if across > along { 0.028 } else { 0.040 } - 1.0).abs() < 1e-6);
+        let surfaces = grip.surfaces.as_ref().unwrap();
+        for pieces in [&surfaces.face_i, &surfaces.face_ii] {
+            let slopes: Vec<DVec2> = pieces
+                .iter()
+                .map(|piece| match piece.gap {
+                    Gap::Plane { slope, .. } => slope,
+                    ref other => panic!("{other:?}"),
+                })
+                .collect();
+            for (k, slope) in slopes.iter().enumerate() {
+                assert!(slopes[..k].iter().all(|known| known.distance(*slope) > 1e-6));
+            }
+            assert!(pieces.iter().all(|piece| piece.holes.is_empty()));
+            most = most.max(pieces.len());
+        }
+    }
+    assert!(most >= 4, "{most}");
+    // Whichever way strips are cut into triangles.
+    let (vertices, mut triangles) = mesh;
+    for index in (0..triangles.len() - 1).step_by(2) {
+        let [[a, b, c], [_, _, d]] = [triangles[index], triangles[index + 1]];
+        if a + 96 == d && b + 96 == c {
+            (triangles[index], triangles[index + 1]) = ([a, b, d], [b, c, d]);
+        }
+    }
+    let (others, _) = self::grips(&part(&(vertices, triangles)), &options());
+    assert_eq!(others.len(), grips.len());
+    let lie = |grip: &Grip| {
+        let contact = &grip.contact;
+        let area = |patch: &[gripfast::model::Polygon]| gripfast::geometry::patch_area(patch);
+        [grip.width, area(&contact.face_i), area(&contact.face_ii)]
+    };
+    for one in &grips {
+        let same = others.iter().any(|other| {
+            let [pose, own] = [other, one].map(|grip| &grip.part_from_grip);
+            let [a, b] = [lie(one), lie(other)];
+            pose.origin.distance(own.origin) < 1e-6
+                && (pose.rotation.x_axis - own.rotation.x_axis).length() < 1e-5
+                && (0..3).all(|k| (a[k] / b[k] - 1.0).abs() < 1e-5)
+        });
+        assert!(same, "{:?}", one.part_from_grip);
+    }
+}
+
 #[test]
 fn an_oval_bottle_is_gripped_across_its_body() {
     let row = 0.002;

@@ -1,5 +1,7 @@
 //! The rule for slip centres off the area: points of the area itself.
 
+use std::sync::LazyLock;
+
 use glam::DVec2;
 
 use super::{BLOCKS, Dissipation, Element, MORE, PANEL, POINTS, Region, enough};
@@ -55,21 +57,162 @@ impl Region {
         twist: [f64; 3],
         range: [[f64; 2]; 2],
         counts: [usize; 2],
-        (sum, by): &mut (Dissipation, [[f64; 3]; 3]),
+        sum: &mut (Dissipation, [[f64; 3]; 3]),
     ) {
         let rules = (&RULES[counts[0]][..], &BLOCKS[counts[1].div_ceil(LANES)][..]);
-        let lanes = add_nodes(self, element, twist, range, rules, BY);
-        let s = totals(&lanes);
-        sum.value += s[0];
-        for i in 0..3 {
-            sum.gradient[i] += s[1 + i];
+        add(&add_nodes(self, element, twist, range, rules, BY), sum);
+    }
+
+    /// Points of an area with straight sides, by triangles from one of its corners.
+    pub(super) fn triangles<const BY: bool>(
+        &self,
+        twist: [f64; 3],
+        centre: DVec2,
+        sum: &mut (Dissipation, [[f64; 3]; 3]),
+    ) {
+        let Some(first) = self.elements.first() else { return };
+        let base = first.a;
+        let mut triangles =
+            Triangles { list: [Triangle::default(); MOST], count: 0, lanes: [[0.0; LANES]; 19] };
+        for Element { a, b, .. } in &self.elements {
+            if *a != base && *b != base {
+                self.triangle::<BY>([base, *a, *b], (twist, centre), 0, &mut triangles);
+            }
         }
-        let [a, b, c, d, e, f] = [s[4], s[5], s[6], s[7], s[8], s[9]];
-        for (row, more) in sum.hessian.iter_mut().zip([[a, b, c], [b, d, e], [c, e, f]]) {
-            row.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+        triangles.flush::<BY>(self, twist);
+        add(&triangles.lanes, sum);
+    }
+
+    /// A triangle, cut until the slip centre is far from each part.
+    fn triangle<const BY: bool>(
+        &self,
+        [a, b, c]: [DVec2; 3],
+        about: ([f64; 3], DVec2),
+        depth: u32,
+        triangles: &mut Triangles,
+    ) {
+        let [one, two, three] = [(b - a).length(), (c - b).length(), (a - c).length()];
+        let longest = one.max(two).max(three);
+        let distance = ((a + b + c) / 3.0 - about.1).length();
+        if longest > PANEL * distance && depth < 40 {
+            let [far, from, to] = match longest {
+                side if side == one => [c, a, b],
+                side if side == two => [a, b, c],
+                _ => [b, c, a],
+            };
+            let middle = 0.5 * (from + to);
+            self.triangle::<BY>([far, from, middle], about, depth + 1, triangles);
+            self.triangle::<BY>([far, middle, to], about, depth + 1, triangles);
+            return;
         }
-        for (sum, more) in by.iter_mut().flatten().zip(&s[10..]) {
-            *sum += more;
+        let points = enough(longest / (distance - 0.5 * longest).max(0.5 * longest));
+        if triangles.count == MOST {
+            triangles.flush::<BY>(self, about.0);
+        }
+        triangles.list[triangles.count] = Triangle { a, sides: [b - a, c - a], points };
+        triangles.count += 1;
+    }
+}
+
+/// Adds the totals of lanes.
+fn add(lanes: &Lanes, (sum, by): &mut (Dissipation, [[f64; 3]; 3])) {
+    let s = totals(lanes);
+    sum.value += s[0];
+    for i in 0..3 {
+        sum.gradient[i] += s[1 + i];
+    }
+    let [a, b, c, d, e, f] = [s[4], s[5], s[6], s[7], s[8], s[9]];
+    for (row, more) in sum.hessian.iter_mut().zip([[a, b, c], [b, d, e], [c, e, f]]) {
+        row.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+    }
+    for (sum, more) in by.iter_mut().flatten().zip(&s[10..]) {
+        *sum += more;
+    }
+}
+
+/// A corner and the sides from it, with the points that it takes along each.
+#[derive(Debug, Clone, Copy, Default)]
+struct Triangle {
+    a: DVec2,
+    sides: [DVec2; 2],
+    points: usize,
+}
+
+/// Triangles taken together, so that one call serves many.
+const MOST: usize = 16;
+
+/// What is still to be summed of an area.
+struct Triangles {
+    list: [Triangle; MOST],
+    count: usize,
+    lanes: Lanes,
+}
+
+impl Triangles {
+    fn flush<const BY: bool>(&mut self, region: &Region, twist: [f64; 3]) {
+        add_triangles(region, twist, &self.list[..self.count], &mut self.lanes, BY);
+        self.count = 0;
+    }
+}
+
+/// Gauss rules for triangles with as many nodes across as the index says, and one more from the corner,
+/// where the width grows too: shares of the sides and weights over twice the area, by fours.
+pub(super) static CORNERS: LazyLock<[Vec<[Lane; 3]>; POINTS + 1]> = LazyLock::new(|| {
+    std::array::from_fn(|n| {
+        let out = RULES[(n + MORE).min(POINTS)].iter();
+        let nodes: Vec<[f64; 3]> = out
+            .flat_map(|&(t, w)| {
+                RULES[n].iter().map(move |&(s, v)| [t * (1.0 - s), t * s, t * w * v])
+            })
+            .collect();
+        let lane = |nodes: &[[f64; 3]]| {
+            // Those that are not there have no weight.
+            let of = |k: usize| std::array::from_fn(|i| nodes.get(i).map_or(0.0, |node| node[k]));
+            [of(0), of(1), of(2)]
+        };
+        nodes.chunks(LANES).map(lane).collect()
+    })
+});
+
+widest! {
+    /// What the points of triangles add.
+    fn add_triangles(region: &Region, twist: [f64; 3], triangles: &[Triangle], lanes: &mut Lanes, by: bool) -> () = triangles_in
+}
+
+#[inline(always)]
+fn triangles_in(
+    region: &Region,
+    twist: [f64; 3],
+    triangles: &[Triangle],
+    lanes: &mut Lanes,
+    by: bool,
+) {
+    for triangle in triangles {
+        let rule = &CORNERS[triangle.points];
+        if by {
+            triangle_of::<true>(region, twist, triangle, rule, lanes);
+        } else {
+            triangle_of::<false>(region, twist, triangle, rule, lanes);
+        }
+    }
+}
+
+#[inline(always)]
+fn triangle_of<const BY: bool>(
+    region: &Region,
+    twist: [f64; 3],
+    Triangle { a, sides: [one, two], .. }: &Triangle,
+    rule: &[[Lane; 3]],
+    lanes: &mut Lanes,
+) {
+    let twice = one.perp_dot(*two);
+    for [first, second, weights] in rule {
+        for i in 0..LANES {
+            let at = DVec2::new(
+                a.x + first[i] * one.x + second[i] * two.x,
+                a.y + first[i] * one.y + second[i] * two.y,
+            );
+            add_point::<BY>(region, twist, at, twice * weights[i], lanes, i);
         }
     }
 }
@@ -124,37 +267,50 @@ fn nodes_of<const BY: bool>(
                 let far = t[0] + nodes[i] * (t[1] - t[0]);
                 let at = DVec2::new(foot.x + far * way.x, foot.y + far * way.y);
                 let area = turn * weights[i];
-                let weight = area * region.u.value(at);
-                let (v1, v2) = (u1 - omega * at.y, u2 + omega * at.x);
-                let speed = (v1 * v1 + v2 * v2).sqrt();
-                let inverse = 1.0 / speed;
-                let (e1, e2) = (inverse * v1, inverse * v2);
-                let (turned, along) = (at.x * e2 - at.y * e1, at.x * e1 + at.y * e2);
-                let bend = weight * inverse;
-                lanes[0][i] += weight * speed;
-                lanes[1][i] += weight * e1;
-                lanes[2][i] += weight * e2;
-                lanes[3][i] += weight * turned;
-                lanes[4][i] += bend * e2 * e2;
-                lanes[5][i] -= bend * e2 * e1;
-                lanes[6][i] -= bend * e2 * along;
-                lanes[7][i] += bend * e1 * e1;
-                lanes[8][i] += bend * e1 * along;
-                lanes[9][i] += bend * along * along;
-                if BY {
-                    let (first, second) = (area * at.x, area * at.y);
-                    lanes[10][i] += area * e1;
-                    lanes[11][i] += area * e2;
-                    lanes[12][i] += area * turned;
-                    lanes[13][i] += first * e1;
-                    lanes[14][i] += first * e2;
-                    lanes[15][i] += first * turned;
-                    lanes[16][i] += second * e1;
-                    lanes[17][i] += second * e2;
-                    lanes[18][i] += second * turned;
-                }
+                add_point::<BY>(region, [u1, u2, omega], at, area, &mut lanes, i);
             }
         }
     }
     lanes
+}
+
+/// Adds a point with its share of the area to lane `i`.
+#[inline(always)]
+fn add_point<const BY: bool>(
+    region: &Region,
+    [u1, u2, omega]: [f64; 3],
+    at: DVec2,
+    area: f64,
+    lanes: &mut Lanes,
+    i: usize,
+) {
+    let weight = area * region.u.value(at);
+    let (v1, v2) = (u1 - omega * at.y, u2 + omega * at.x);
+    let speed = (v1 * v1 + v2 * v2).sqrt();
+    let inverse = 1.0 / speed;
+    let (e1, e2) = (inverse * v1, inverse * v2);
+    let (turned, along) = (at.x * e2 - at.y * e1, at.x * e1 + at.y * e2);
+    let bend = weight * inverse;
+    lanes[0][i] += weight * speed;
+    lanes[1][i] += weight * e1;
+    lanes[2][i] += weight * e2;
+    lanes[3][i] += weight * turned;
+    lanes[4][i] += bend * e2 * e2;
+    lanes[5][i] -= bend * e2 * e1;
+    lanes[6][i] -= bend * e2 * along;
+    lanes[7][i] += bend * e1 * e1;
+    lanes[8][i] += bend * e1 * along;
+    lanes[9][i] += bend * along * along;
+    if BY {
+        let (first, second) = (area * at.x, area * at.y);
+        lanes[10][i] += area * e1;
+        lanes[11][i] += area * e2;
+        lanes[12][i] += area * turned;
+        lanes[13][i] += first * e1;
+        lanes[14][i] += first * e2;
+        lanes[15][i] += first * turned;
+        lanes[16][i] += second * e1;
+        lanes[17][i] += second * e2;
+        lanes[18][i] += second * turned;
+    }
 }

@@ -2,12 +2,85 @@
 
 use glam::DVec2;
 
+use super::area::CORNERS;
 use super::{Element, POINTS, Quadratic, Region, enough};
 use crate::contact::far::RULES;
 use crate::contact::lanes::{LANES, Lane, total, totals, widest};
 
 /// Points of a region by fours: places along both axes, and weights.
-pub(super) struct Rows<'a> {
+pub(super) enum Rows<'a> {
+    /// Between the boundary and the line of [`Region::foot`].
+    Strips(Strips<'a>),
+    /// Of an area with straight sides under a linear quadratic: right for what is of the second degree
+    /// besides it.
+    Corners(Corners<'a>),
+}
+
+impl<'a> Rows<'a> {
+    #[inline(always)]
+    pub(super) fn new(region: &'a Region) -> Self {
+        match region.elements.first() {
+            Some(first) if region.u.l == DVec2::ZERO => Self::Corners(Corners {
+                base: first.a,
+                elements: region.elements.iter(),
+                at: ([DVec2::ZERO; 2], [].iter()),
+            }),
+            _ => Self::Strips(Strips {
+                region,
+                elements: region.elements.iter(),
+                at: None,
+                across: &RULES[LANES],
+            }),
+        }
+    }
+}
+
+impl Iterator for Rows<'_> {
+    type Item = [Lane; 3];
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<[Lane; 3]> {
+        match self {
+            Self::Strips(strips) => strips.next(),
+            Self::Corners(corners) => corners.next(),
+        }
+    }
+}
+
+/// Triangles from a corner.
+pub(super) struct Corners<'a> {
+    base: DVec2,
+    elements: std::slice::Iter<'a, Element>,
+    /// Both sides of the triangle at hand, and nodes that are still to come.
+    at: ([DVec2; 2], std::slice::Iter<'static, [Lane; 3]>),
+}
+
+/// Nodes across for a third degree, that of the pressure's second moments.
+const CUBIC: usize = 2;
+
+impl Corners<'_> {
+    #[inline(always)]
+    fn next(&mut self) -> Option<[Lane; 3]> {
+        loop {
+            let ([one, two], nodes) = &mut self.at;
+            if let Some([first, second, weights]) = nodes.next() {
+                let (base, twice) = (self.base, one.perp_dot(*two));
+                return Some([
+                    std::array::from_fn(|i| base.x + first[i] * one.x + second[i] * two.x),
+                    std::array::from_fn(|i| base.y + first[i] * one.y + second[i] * two.y),
+                    std::array::from_fn(|i| twice * weights[i]),
+                ]);
+            }
+            let Element { a, b, .. } = self.elements.next()?;
+            if *a != self.base && *b != self.base {
+                self.at = ([*a - self.base, *b - self.base], CORNERS[CUBIC].iter());
+            }
+        }
+    }
+}
+
+/// Strips between the boundary and a line.
+pub(super) struct Strips<'a> {
     region: &'a Region,
     elements: std::slice::Iter<'a, Element>,
     /// The element at hand, and nodes along it that are still to come.
@@ -15,16 +88,7 @@ pub(super) struct Rows<'a> {
     across: &'static [(f64, f64)],
 }
 
-impl<'a> Rows<'a> {
-    #[inline(always)]
-    pub(super) fn new(region: &'a Region) -> Self {
-        Self { region, elements: region.elements.iter(), at: None, across: &RULES[LANES] }
-    }
-}
-
-impl Iterator for Rows<'_> {
-    type Item = [Lane; 3];
-
+impl Strips<'_> {
     #[inline(always)]
     fn next(&mut self) -> Option<[Lane; 3]> {
         loop {

@@ -257,6 +257,22 @@ fn edges_through_the_crest_leave_sectors() {
     }
 }
 
+/// A corner a rounding beyond the conic's tip, from which one edge goes in and one goes out.
+#[test]
+fn nothing_is_pressed_beside_a_tip() {
+    let corners = [(-1.9260241374843337, 5.038072728429128), (0.01, 10.020000000001)];
+    for last in [(-0.4004488883540869, 19.59429873596726), (-0.4, 12.0), (-2.0, 11.0)] {
+        let rings = [[corners[0], corners[1], last].map(DVec2::from).to_vec()];
+        let u = Quadratic { c: 0.499948, g: DVec2::new(0.01, 2e-4), l: DVec2::new(-1.0, -0.01) };
+        let (found, wanted) = (Region::new(&rings, u).area_and_load(), area_and_load(&rings, &u));
+        assert!((found.1 / wanted.1 - 1.0).abs() < 1e-10, "{found:?} {wanted:?}");
+        let region = Region::new(&rings, u);
+        // Its boundary ends where it begins.
+        let ends: DVec2 = region.elements.iter().map(|element| element.b - element.a).sum();
+        assert!(ends.length() < 1e-12, "{ends} {:?}", region.elements);
+    }
+}
+
 /// Polygons with corners where something happens: on the conic, at its crest and tips, on tangents at
 /// its tips, and a rounding beside these.
 fn cornered() -> impl Strategy<Value = (Ring, Quadratic)> {
@@ -330,6 +346,125 @@ proptest! {
             prop_assert!(off < 1e-9, "{c} {edges:?} {points:?}");
             let pairs = by.iter().flatten().zip(points.1.iter().flatten());
             prop_assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-7), "{c} {by:?} {points:?}");
+        }
+    }
+}
+
+/// On a grid of points, and where an area under pressure has it.
+#[test]
+fn the_greatest_value_is_that_of_points() {
+    let ring = |shift: DVec2, size: f64| -> Ring {
+        let step = std::f64::consts::TAU / 7.0;
+        let corner = |k: u32| {
+            shift + size * (1.0 + 0.3 * f64::from(k % 3)) * DVec2::from_angle(step * f64::from(k))
+        };
+        (0..7).map(corner).collect()
+    };
+    for k in 0..60_u32 {
+        let part = |n: u32| (f64::from(k * n + n) * 0.618_034).fract() - 0.5;
+        let outer = ring(DVec2::new(part(1), part(2)), 1.0);
+        let mut hole = ring(DVec2::new(part(1), part(2)), 0.4);
+        hole.reverse();
+        let rings = if k % 2 == 0 { vec![outer] } else { vec![outer, hole] };
+        let bends =
+            [DVec2::new(-1.0, -2.0), DVec2::new(0.0, -1.0), DVec2::ZERO, DVec2::new(0.5, -1.0)];
+        let g = 2.0 * DVec2::new(part(3), part(5));
+        let u = Quadratic { c: 0.4, g, l: bends[k as usize % 4] };
+        let found = u.greatest(&rings);
+        let mut most = f64::NEG_INFINITY;
+        for i in -500..=500 {
+            for j in -500..=500 {
+                let x = 0.004 * DVec2::new(f64::from(i), f64::from(j));
+                if u.value(x) > most
+                    && rings.iter().filter(|ring| ring_contains(ring, x)).count() == 1
+                {
+                    most = u.value(x);
+                }
+            }
+        }
+        assert!((-1e-12..0.03).contains(&(found - most)), "{k}: {found} {most}");
+        let region = Region::new(&rings, u).greatest();
+        assert!((found.max(0.0) - region).abs() < 1e-8, "{k}: {found} {region}");
+    }
+}
+
+/// Points of a part of an element, by parts that are small beside their distance from the centre.
+fn many(
+    region: &Region,
+    element: &Element,
+    twist: [f64; 3],
+    centre: DVec2,
+    [s, t]: [[f64; 2]; 2],
+    sum: &mut Sums,
+) {
+    let place = |s: f64, t: f64| {
+        let (x, dx) = region.at(element, s);
+        region.foot(x, dx).0.lerp(x, t)
+    };
+    let middle = |r: [f64; 2]| 0.5 * (r[0] + r[1]);
+    let distance = (place(middle(s), middle(t)) - centre).length();
+    let along = place(s[0], t[1]).distance(place(s[1], t[1]));
+    let across = place(middle(s), t[0]).distance(place(middle(s), t[1]));
+    if along.max(across) < 0.2 * distance {
+        return region.area_sums::<true>(element, twist, [s, t], [12; 2], sum);
+    }
+    let halves = |r: [f64; 2]| [[r[0], middle(r)], [middle(r), r[1]]];
+    for part in halves(if along > across { s } else { t }) {
+        let range = if along > across { [part, t] } else { [s, part] };
+        many(region, element, twist, centre, range, sum);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    /// What a facet's triangles give is what the strips along its sides give, each by many points:
+    /// facets in any shape, slivers among them, whole or cut where the pressure ends.
+    #[test]
+    fn triangles_of_a_facet_are_its_strips(
+        corners in vec(0.0..TAU, 3..8),
+        narrow in 0.0..2.5_f64,
+        (angle, slope, c) in (0.0..TAU, 0.0..2.0_f64, 0.0..1.5_f64),
+        (away, towards) in (0.5..8.0_f64, 0.0..TAU),
+    ) {
+        let mut corners = corners;
+        corners.sort_by(f64::total_cmp);
+        let thin = DVec2::new(1.0, 10.0_f64.powf(-narrow));
+        let ring: Ring = corners.iter().map(|&x| thin * DVec2::from_angle(x)).collect();
+        let u = Quadratic { c, g: slope * DVec2::from_angle(angle) / thin, l: DVec2::ZERO };
+        let region = Region::new(std::slice::from_ref(&ring), u);
+        let (area, load) = region.area_and_load();
+        prop_assume!(area > 1e-3 * thin.y && load > 1e-3 * thin.y);
+        // Beside the box, from as near as triangles are taken for on.
+        let reach = region.half + OUTSIDE * region.half.min_element();
+        let c = region.middle + 2.0_f64.sqrt() * reach * away.exp2() * DVec2::from_angle(towards);
+        for sign in [1.0, -1.0] {
+            let twist = [c.y, -c.x, 1.0].map(|x| sign * x);
+            let (mut got, mut wanted): (Sums, Sums) = Default::default();
+            region.triangles::<true>(twist, c, &mut got);
+            for element in &region.elements {
+                many(&region, element, twist, c, [[0.0, 1.0]; 2], &mut wanted);
+            }
+            let mut values = Sums::default();
+            region.triangles::<false>(twist, c, &mut values);
+            prop_assert_eq!(values.0, got.0);
+            let speed = wanted.0.value / load;
+            // Slivers are small differences of strips in their box.
+            let rounding = f64::EPSILON * 4.0 * region.half.element_product() / area;
+            let within = 4e-14 + 8.0 * rounding;
+            let near = |a: f64, b: f64, size: f64| (a - b).abs() <= within * size;
+            let (found, other) = (got.0, wanted.0);
+            prop_assert!(near(found.value, other.value, other.value), "{found:?} {other:?}");
+            let far = 1.0 + region.middle.length() + region.half.length();
+            for i in 0..3 {
+                prop_assert!(near(found.gradient[i], other.gradient[i], far * load), "{i} {} {} {}", found.gradient[i], other.gradient[i], far * load);
+                for j in 0..3 {
+                    let size = far * far * load / speed;
+                    prop_assert!(near(found.hessian[i][j], other.hessian[i][j], 25.0 * size), "{i} {j} {} {} {size}", found.hessian[i][j], other.hessian[i][j]);
+                    let size = far * far * area;
+                    prop_assert!(near(got.1[i][j], wanted.1[i][j], 25.0 * size), "by {i} {j} {} {} {size}", got.1[i][j], wanted.1[i][j]);
+                }
+            }
         }
     }
 }

@@ -153,7 +153,7 @@ impl<'a> Problem<'a> {
             (None, moment)
         } else {
             let w = self.along(faces, moment, DVec2::ZERO);
-            let near = near.and_then(|state| state.slip.as_ref());
+            let near = near.and_then(|state| state.slip).map(|slip| (slip.zeta, slip.rolls_on));
             let slip = slip::solve(&self.space, faces, self.distance, w, near)?;
             let couple = slip.shares[0] - slip.shares[1];
             (Some(slip), moment + coupling * half * DVec2::new(couple.y, -couple.x))

@@ -67,6 +67,8 @@ pub(super) struct FaceDissipation {
 const STEPS: u32 = 200;
 /// Share of a force that rounding may leave.
 const ROUNDING: f64 = 1e-13;
+/// Share of it from which one step is enough but for the rounding.
+const NEAR: f64 = 1e-7;
 /// Share of it below which nothing is gained.
 const EXACT: f64 = 2e-16;
 
@@ -163,6 +165,11 @@ impl Face {
         self.stiffness * regions.iter().map(Region::greatest).fold(0.0, f64::max)
     }
 
+    /// Greatest compression without tilt at one of the pad's plane \[m\].
+    pub(super) fn compressed(&self, delta: f64) -> f64 {
+        self.fields.iter().map(|field| field.greatest(delta)).fold(0.0, f64::max)
+    }
+
     /// The compression of [`Self::carry`] without tilt.
     pub(super) fn squeeze(&self, load: f64) -> Option<f64> {
         self.carrying(load, DVec2::ZERO, None, EXACT)
@@ -202,6 +209,10 @@ impl Face {
                     && error.abs() <= ROUNDING * load
             {
                 return Some(delta);
+            }
+            // The step from so near leaves the square of it.
+            if within > EXACT && error.abs() <= NEAR * load {
+                return Some(delta - error / (self.stiffness * area));
             }
             if best.is_none_or(|(_, least)| error.abs() < least) {
                 best = Some((delta, error.abs()));
@@ -279,10 +290,9 @@ impl<'a> Trial<'a> {
             if region.is_empty() {
                 continue;
             }
-            let local = local(field);
-            let (found, rows) = region.dissipation_by_pressure((local * v).into());
-            sum.add(&local, &found);
-            let rows = rows.map(|row| local.tr_mul(&Vector3::from(row)));
+            let (found, rows) = region.dissipation_by_pressure(local(field, v));
+            sum.add(field, &found);
+            let rows = rows.map(|row| back(field, row));
             by[0] += rows[0];
             for (sum, direction) in by[1..].iter_mut().zip(directions) {
                 let (one, rise) = self.face.rise(field, *direction);
@@ -295,27 +305,31 @@ impl<'a> Trial<'a> {
 }
 
 /// A twist of the pad plane in a surface's own axes.
-fn local(field: &Field) -> Matrix3<f64> {
+fn local(field: &Field, v: &Vector3<f64>) -> [f64; 3] {
     let (o, e) = (field.origin, field.axis);
-    Matrix3::new(
-        e.x,
-        e.y,
-        e.y * o.x - e.x * o.y, //
-        -e.y,
-        e.x,
-        e.y * o.y + e.x * o.x, //
-        0.0,
-        0.0,
-        1.0,
-    )
+    let (u1, u2) = (v.x - v.z * o.y, v.y + v.z * o.x);
+    [e.x * u1 + e.y * u2, e.x * u2 - e.y * u1, v.z]
+}
+
+/// What does work on such a twist, for one of the pad plane.
+fn back(field: &Field, [g1, g2, g3]: [f64; 3]) -> Vector3<f64> {
+    let (o, e) = (field.origin, field.axis);
+    let (f1, f2) = (e.x * g1 - e.y * g2, e.y * g1 + e.x * g2);
+    Vector3::new(f1, f2, g3 + o.x * f2 - o.y * f1)
 }
 
 impl FaceDissipation {
-    fn add(&mut self, local: &Matrix3<f64>, found: &Dissipation) {
+    fn add(&mut self, field: &Field, found: &Dissipation) {
         self.value += found.value;
-        self.gradient += local.tr_mul(&Vector3::from(found.gradient));
-        let bend = Matrix3::from_fn(|i, j| found.hessian[i][j]);
-        self.hessian += local.tr_mul(&bend) * local;
+        self.gradient += back(field, found.gradient);
+        // Once for the rows, once for the columns.
+        let rows = found.hessian.map(|row| back(field, row));
+        for j in 0..3 {
+            let column = back(field, [rows[0][j], rows[1][j], rows[2][j]]);
+            for i in 0..3 {
+                self.hessian[(i, j)] += column[i];
+            }
+        }
     }
 
     fn times(self, k: f64) -> Self {
@@ -411,8 +425,7 @@ impl Pressed<'_> {
         }
         for (field, region) in self.face.fields.iter().zip(&self.regions) {
             if !region.is_empty() {
-                let local = local(field);
-                sum.add(&local, &region.dissipation((local * v).into()));
+                sum.add(field, &region.dissipation(local(field, v)));
             }
         }
         sum.times(self.face.stiffness)

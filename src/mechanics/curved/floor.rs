@@ -10,6 +10,12 @@
 //! what turns the part is the load's moment and the couple of the two faces' friction, each at most `mu`
 //! times its normal force. As long as the friction that the floor asks for at `mu` is below `mu`, the
 //! solution, which grows from that without a couple, cannot pass it.
+//!
+//! What the faces carry without tilt is known at a few normal forces and taken along lines between
+//! them. The pressure between two of them lies between theirs everywhere; where both press, it differs
+//! from the line's by one number, elsewhere by no more than the compressions do, and both carry the same
+//! force: in sum, `int |p - line| dA` is at most twice the rise of the compression times the growth of the
+//! area, and that times a lever is what any moment can be off.
 
 use glam::DVec2;
 use nalgebra::Vector5;
@@ -17,15 +23,35 @@ use nalgebra::Vector5;
 use super::equilibrium::Problem;
 use super::face::{Carried, Face, Pressed};
 use super::slip::{self, Bearing, Slipping};
+use crate::contact::surface::Field;
 
 /// The faces at a few depths, ready for many loads.
 #[derive(Debug)]
 pub(super) struct Floors {
     levels: Vec<Level>,
-    /// Least and greatest normal force \[N\].
-    range: [f64; 2],
-    /// What each face carries at these without tilt; linear in between.
+    /// By rising normal force.
+    spans: Vec<Span>,
+    reach: [Reach; 2],
+}
+
+/// Both faces under normal forces from one to another, without tilt.
+#[derive(Debug)]
+struct Span {
+    /// These forces \[N\].
+    force: [f64; 2],
+    /// What each face carries under the first and the second.
     carried: [[Carried; 2]; 2],
+    /// What its friction bears under the first.
+    bears: [Bearing; 2],
+    /// Most force that lies elsewhere than on the line between both \[N\].
+    bent: [f64; 2],
+}
+
+/// Farthest place of a face \[m\] and its steepest slope.
+#[derive(Debug, Clone, Copy)]
+struct Reach {
+    place: f64,
+    slope: f64,
 }
 
 /// The faces pressed by so much less.
@@ -44,6 +70,8 @@ const PULL: f64 = 0.8;
 const CHANGE: f64 = 1e-3;
 /// What may be left of a line in the normal force, over it: far below [`SLACK`] of a load.
 const LINE: f64 = 1e-12;
+/// Steps of the normal force over which what it carries is no line.
+const KNOTS: u32 = 12;
 /// Share of a bound that covers what is left of those lines and rounding.
 const SLACK: f64 = 1e-6;
 /// Difference of slopes that are one, and of directions.
@@ -51,52 +79,71 @@ const ALIKE: [f64; 2] = [1e-9, 1e-6];
 
 impl Floors {
     /// For pulls of up to `pull` \[N\] on the pads of a problem under its gripping force `force`, which
-    /// alone presses the faces as `squeezed`; `None` where the floors say nothing: two held axes, pieces that lean differently along the tilt, or a
-    /// pressure whose middle wanders with the force.
+    /// alone presses the faces as `squeezed`; `None` where the floors say nothing: two held axes, or one
+    /// and pieces that lean differently along the tilt, or a pressure whose middle wanders with the force.
     pub(super) fn new(
         problem: &Problem<'_>,
         squeezed: [&Pressed<'_>; 2],
         force: f64,
         pull: f64,
     ) -> Option<Self> {
+        let Problem { faces, held, rolling, .. } = problem;
         let change = 0.5 * pull.max(2.0 * CHANGE * force);
-        if change > PULL * force
-            || problem.held.len() > 1
-            || problem.rolling.iter().any(|x| *x != 0.0)
-        {
+        if change > PULL * force || held.len() > 1 || rolling.iter().any(|x| *x != 0.0) {
             return None;
         }
-        let range = [force - change, force + change];
-        let mut carried = [[Carried::zeros(); 2]; 2];
-        let mut least = Vec::new();
-        for (k, face) in problem.faces.into_iter().enumerate() {
-            let at = |force: f64| face.carry(force, DVec2::ZERO, None);
-            let (low, high) = (at(range[0])?, at(range[1])?);
-            carried[k] = [&low, &high].map(Pressed::carried);
-            let reach = face.reach();
-            let bend = 0.5 * (carried[k][0] + carried[k][1]) - squeezed[k].carried();
+        let at = |force: f64| {
+            let one = faces[0].carry(force, DVec2::ZERO, Some(squeezed[0].delta))?;
+            Some([one, faces[1].carry(force, DVec2::ZERO, Some(squeezed[1].delta))?])
+        };
+        let mut pressed = vec![(force - change, at(force - change)?)];
+        let last = at(force + change)?;
+        let is_line = |k: usize| {
+            let bend =
+                0.5 * (pressed[0].1[k].carried() + last[k].carried()) - squeezed[k].carried();
+            let reach = faces[k].reach();
             let sizes = [1.0, reach, reach, 1.0, 1.0, reach];
-            if bend.iter().zip(sizes).any(|(bend, size)| bend.abs() > LINE * force * size) {
+            bend.iter().zip(sizes).all(|(bend, size)| bend.abs() <= LINE * force * size)
+        };
+        let is_line = is_line(0) && is_line(1);
+        if !is_line {
+            if !held.is_empty() {
                 return None;
             }
-            least.push(low);
+            for k in 1..KNOTS {
+                let force = force + change * (2.0 * f64::from(k) / f64::from(KNOTS) - 1.0);
+                pressed.push((force, at(force)?));
+            }
         }
-        let [one, two] = &least[..] else { return None };
-        let levels = match problem.held.first() {
-            None => vec![Level { faces: [one, two].map(Bearing::of), moment: f64::INFINITY }],
+        pressed.push((force + change, last));
+        let spans = pressed.windows(2).map(|pair| {
+            let [(low, from), (high, to)] = pair else { unreachable!("pairs") };
+            let bent = |k: usize| if is_line { 0.0 } else { from[k].apart(&to[k]) };
+            Span {
+                force: [*low, *high],
+                carried: [0, 1].map(|k| [from[k].carried(), to[k].carried()]),
+                bears: [0, 1].map(|k| Bearing::of(&from[k])),
+                bent: [bent(0), bent(1)],
+            }
+        });
+        let spans = spans.collect();
+        let levels = match held.first() {
+            None => Vec::new(),
             Some(axis) => {
                 let along = axis.perp();
-                let reach = [problem.faces[0].tilted(along)?, problem.faces[1].tilted(along)?];
+                let [one, two] = &pressed[0].1;
+                let reach = [faces[0].tilted(along)?, faces[1].tilted(along)?];
                 DROPS.iter().filter_map(|drop| level([one, two], along, reach, *drop)).collect()
             }
         };
-        Some(Self { levels, range, carried })
+        let reach = faces.map(|face| Reach { place: face.reach(), slope: face.steepest() });
+        Some(Self { levels, spans, reach })
     }
 
     /// A friction that holds the problem's load for certain, if it is below `value`.
     pub(super) fn below(&self, problem: &Problem<'_>, value: f64) -> Option<f64> {
         let Problem { normal, distance, held, space, .. } = problem;
-        let Load { slide, turn, moment, .. } = self.load(problem)?;
+        let Load { slide, turn, moment, bears, off, .. } = self.load(problem)?;
         let (half, all) = (0.5 * distance, normal[0] + normal[1]);
         // The difference of the faces' forces follows from the spins; along the rest it is as that of the
         // normal forces.
@@ -106,23 +153,33 @@ impl Floors {
             apart -= (across.dot(apart) + axis.dot(moment) / half) * across;
         }
         let forces = [0.5 * (slide + apart), 0.5 * (slide - apart)];
-        // Of friction at the value, what is not across the held axis' lever.
-        let free = |k: usize| {
-            let known = held.first().filter(|_| !space.spins.is_empty());
-            let across = known.map_or(0.0, |axis| axis.dot(forces[k]));
-            (value * normal[k]).powi(2) - across * across
+        let bears = match held.first() {
+            None => bears,
+            Some(axis) => {
+                // Of friction at the value, what is not across the held axis' lever.
+                let free = |k: usize| {
+                    let across = if space.spins.is_empty() { 0.0 } else { axis.dot(forces[k]) };
+                    (value * normal[k]).powi(2) - across * across
+                };
+                if free(0).min(free(1)) < 0.0 {
+                    return None;
+                }
+                let couple = half.abs() * (free(0).sqrt() + free(1).sqrt());
+                let tilts = axis.dot(moment).abs() + couple;
+                let level = self.levels.iter().find(|level| tilts <= level.moment)?;
+                level.faces.each_ref()
+            }
         };
-        if free(0).min(free(1)) < 0.0 {
-            return None;
-        }
-        let tilts = held.first().map_or(0.0, |axis| {
-            axis.dot(moment).abs() + half.abs() * (free(0).sqrt() + free(1).sqrt())
-        });
-        let level = self.levels.iter().find(|level| tilts <= level.moment)?;
-        let [one, two] = &level.faces;
+        let [one, two] = bears;
         let left = turn - one.centre.perp_dot(forces[0]) - two.centre.perp_dot(forces[1]);
         let turned = left / (one.turn + two.turn);
-        let asked = |k: usize| level.faces[k].asks(forces[k], turned);
+        // What the lines leave open of a face's force, and of the turn.
+        let force_off = off.force + space.spins.len() as f64 * off.moment / half.abs();
+        let levers = one.centre.length() + two.centre.length();
+        let turned_off = (off.turn + levers * force_off) / (one.turn + two.turn);
+        let asked = |k: usize| {
+            bears[k].asks(forces[k], turned) + bears[k].asks_at_most(force_off, turned_off)
+        };
         let enough = asked(0).max(asked(1)) * (1.0 + SLACK);
         (enough < value).then_some(enough)
     }
@@ -130,11 +187,10 @@ impl Floors {
     /// The friction of a body that surely rolls on one face, where nothing can tilt.
     pub(super) fn rolls(&self, problem: &Problem<'_>) -> Option<f64> {
         let Problem { normal, distance, held, space, .. } = problem;
-        if !held.is_empty() || space.spins.is_empty() {
+        if !held.is_empty() || space.spins.is_empty() || self.spans.len() > 1 {
             return None;
         }
-        let Load { slide, turn, moment, first } = self.load(problem)?;
-        let faces = &self.levels.first()?.faces;
+        let Load { slide, turn, moment, first, bears, .. } = self.load(problem)?;
         let basis = [0, 1].map(|k| space.basis(k, *distance));
         let mut w = Vector5::new(slide.x, slide.y, turn, 0.0, 0.0);
         for (i, axis) in space.spins.iter().enumerate() {
@@ -144,20 +200,26 @@ impl Floors {
             let slides = (normal[1 - k], first[1 - k]);
             let Slipping { mu, shares, .. } =
                 slip::rolling(&basis, space.spins.len(), k, &w, slides)?;
-            (faces[k].bears(&shares[k]) <= mu * (1.0 - SLACK)).then_some(mu)
+            (bears[k].bears(&shares[k]) <= mu * (1.0 - SLACK)).then_some(mu)
         })
     }
 
     /// `None` where the normal forces are beyond those looked at.
-    fn load(&self, problem: &Problem<'_>) -> Option<Load> {
-        let Problem { normal, wrench, .. } = problem;
-        let [low, high] = self.range;
-        if normal.iter().any(|n| *n < low || *n > high) {
-            return None;
-        }
+    fn load(&self, problem: &Problem<'_>) -> Option<Load<'_>> {
+        let Problem { normal, wrench, distance, .. } = problem;
+        let span = |k: usize| {
+            self.spans.iter().find(|span| normal[k] >= span.force[0] && normal[k] <= span.force[1])
+        };
+        let spans = [span(0)?, span(1)?];
+        let mut off = Off::default();
         let [one, two] = [0, 1].map(|k| {
-            let share = (normal[k] - low) / (high - low);
-            self.carried[k][0].lerp(&self.carried[k][1], share)
+            let Span { force: [low, high], carried, bent, .. } = spans[k];
+            let Reach { place, slope } = self.reach[k];
+            off.force += bent[k] * slope;
+            off.turn += bent[k] * slope * place;
+            off.moment += bent[k] * (place + 0.5 * distance.abs() * slope);
+            let [from, to] = &carried[k];
+            from.lerp(to, (normal[k] - low) / (high - low))
         });
         let (brought, moment) = problem.brought(&one, &two);
         Some(Load {
@@ -165,12 +227,14 @@ impl Floors {
             turn: wrench.moment.z + brought.z,
             moment: wrench.moment.truncate() + moment,
             first: [&one, &two].map(|c| DVec2::new(c[1], c[2])),
+            bears: [0, 1].map(|k| &spans[k].bears[k]),
+            off,
         })
     }
 }
 
 /// What friction and tilt have to bear, with what the pressure without tilt brings.
-struct Load {
+struct Load<'a> {
     /// Force along the pads \[N\].
     slide: DVec2,
     /// Moment about the closing axis, and in the pad plane [N m].
@@ -178,6 +242,18 @@ struct Load {
     moment: DVec2,
     /// `int p x` of both faces [N m].
     first: [DVec2; 2],
+    /// What the friction of both faces bears without tilt under no more than their normal forces.
+    bears: [&'a Bearing; 2],
+    off: Off,
+}
+
+/// By how much a load may be off.
+#[derive(Debug, Default)]
+struct Off {
+    /// In force along the pads \[N\], moment about the closing axis and in the pad plane [N m].
+    force: f64,
+    turn: f64,
+    moment: f64,
 }
 
 /// Both faces pressed by the share `drop` of their compression less than `least`, or by a smaller one;
@@ -192,7 +268,21 @@ fn level(least: [&Pressed<'_>; 2], along: DVec2, reach: [f64; 2], drop: f64) -> 
     Some(Level { faces: [0, 1].map(|k| Bearing::of(&floors[k])), moment: tilt * stiffness })
 }
 
+impl Pressed<'_> {
+    /// Most force of a pressure without tilt between this one and `more` that lies elsewhere than on the
+    /// line between both \[N\].
+    fn apart(&self, more: &Pressed<'_>) -> f64 {
+        2.0 * self.face.stiffness * (more.delta - self.delta) * (more.area - self.area)
+    }
+}
+
 impl Face {
+    /// Its steepest slope.
+    fn steepest(&self) -> f64 {
+        let slopes = self.fields.iter().flat_map(Field::slopes);
+        slopes.map(DVec2::length).fold(0.0, f64::max)
+    }
+
     /// Greatest change of the compression per tilt along a direction \[m\]; `None` where a piece bends
     /// along it, or where they lean along it by different slopes.
     fn tilted(&self, along: DVec2) -> Option<f64> {

@@ -220,7 +220,15 @@ impl Pads {
     /// Compressions at the pads' planes \[m\], as [`Self::squeezed`] tells.
     pub(crate) fn deltas(&self, force: f64) -> Option<[f64; 2]> {
         let [one, two] = &self.faces;
-        Some([one.squeeze(force)?, two.squeeze(force)?])
+        let first = one.squeeze(force)?;
+        // Under pads alike on a part that is the same on both sides.
+        let is_same = one.fields == two.fields && one.stiffness == two.stiffness;
+        Some([first, if is_same { first } else { two.squeeze(force)? }])
+    }
+
+    /// Greatest compression of either face at compressions `deltas` of the pads' planes \[m\].
+    pub(crate) fn compressed(&self, deltas: [f64; 2]) -> f64 {
+        self.faces[0].compressed(deltas[0]).max(self.faces[1].compressed(deltas[1]))
     }
 
     /// Compressions at the pads' planes \[m\] under a squeeze with `force` \[N\], looked for from `near`

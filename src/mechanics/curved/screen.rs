@@ -53,6 +53,8 @@ const SAME_AXIS: f64 = 1e-6;
 const LINEAR: f64 = 1e-7;
 /// Share of the layers' give, squeezed without a load, from which on a part may settle.
 const SETTLES: f64 = 0.4;
+/// Share of a bound that covers rounding.
+const ROUNDING: f64 = 1e-9;
 /// Share of the limit of a strong coupling up to which friction hardly moves the pressure, and the
 /// growth of a bound that covers what it does: its lever moves the middle of pressure by less than a
 /// twentieth of the contact's width.
@@ -262,7 +264,7 @@ impl Screen<'_> {
     }
 
     /// Where the pressure resists no rotation it follows from the normal forces alone.
-    fn untilted(&self) -> Option<(Compared, Place, f64)> {
+    fn untilted(&self, value: f64) -> Option<(Compared, Place, f64)> {
         let Problem { faces, normal, distance, space, .. } = &self.problem;
         let mut place = self.nearest();
         let [one, two] =
@@ -271,13 +273,29 @@ impl Screen<'_> {
         place.delta = [one.delta, two.delta];
         let faces = [&one, &two];
         let w = self.problem.along(faces, self.problem.moment_beyond(faces), DVec2::ZERO);
-        let mu = slip::solve(space, faces, *distance, w, None)?.mu;
-        Some((Compared::At(mu), place, mu))
+        let enough = slip::enough(space, faces, *distance, w)?;
+        if enough * (1.0 + ROUNDING) < value {
+            return Some((Compared::Below, place, enough));
+        }
+        // From the motion that the load moves most.
+        let moved = self.known.iter().filter(|(_, place)| place.mode != Mode::Off);
+        let moved = moved.map(|(_, place)| (w.dot(&place.motion), place));
+        let start = moved.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, place)| {
+            let on = if let Mode::Rolls(k) = place.mode { Some(k) } else { None };
+            (place.motion, on)
+        });
+        let slip = slip::solve(space, faces, *distance, w, start)?;
+        let power = w.dot(&slip.zeta);
+        if slip.mu > 0.0 && power > 0.0 {
+            place.mode = slip.rolls_on.map_or(Mode::Slips, Mode::Rolls);
+            place.motion = slip.zeta * (slip.mu / power);
+        }
+        Some((Compared::At(slip.mu), place, slip.mu))
     }
 
     fn reach(&self, value: f64) -> Option<(Compared, Place, f64)> {
         if self.problem.held.is_empty() {
-            return self.untilted();
+            return self.untilted(value);
         }
         let joint = Joint::new(&self.problem, &self.near);
         let start = self.start(&joint);

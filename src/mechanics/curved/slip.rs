@@ -94,14 +94,14 @@ const TIED: f64 = 1.0 + 1e-6;
 /// How near its bounds must be for an answer found from a neighbour's without a look at the creases.
 const SURE: f64 = 1e-12;
 
-/// Solves for the load `w` along the space; the faces are `distance` apart. `start`: the answer for
-/// nearly the same pressure and load.
+/// Solves for the load `w` along the space; the faces are `distance` apart. `start`: motion and face at
+/// rest for nearly the same pressure and load.
 pub(super) fn solve(
     space: &Space,
     faces: [&Pressed<'_>; 2],
     distance: f64,
     w: Vector5<f64>,
-    start: Option<&Slipping>,
+    start: Option<(Vector5<f64>, Option<usize>)>,
 ) -> Option<Slipping> {
     let problem = Problem::new(space, faces, distance);
     if w.amax() == 0.0 {
@@ -110,10 +110,10 @@ pub(super) fn solve(
         let zeta = Vector5::zeros();
         return Some(Slipping { mu: 0.0, zeta, shares, rolls_on: None, bounds, evaluations: 0 });
     }
-    let zeta = start.map(|near| &near.zeta);
+    let (zeta, near) = (start.as_ref().map(|(zeta, _)| zeta), start.map(|(_, rolls_on)| rolls_on));
     // Newton's method from the neighbour's motion.
     let mut moving = None;
-    match start.map(|near| near.rolls_on) {
+    match near {
         Some(None) => {
             moving = problem.interior(&w, zeta);
             let sure = |answer: &Slipping| answer.bounds.upper <= answer.mu * (1.0 + SURE);
@@ -133,7 +133,7 @@ pub(super) fn solve(
     if let Some(rolling) = candidates.iter().flatten().find(|rolling| problem.rests(rolling)) {
         return Some(problem.counted(rolling.answer));
     }
-    if start.is_none_or(|near| near.rolls_on.is_some()) {
+    if near.is_none_or(|rolls_on| rolls_on.is_some()) {
         moving = problem.interior(&w, zeta);
     }
     moving
@@ -220,6 +220,11 @@ impl Bearing {
     /// turn about it does, the turn's own force among the first.
     pub(super) fn asks(&self, force: DVec2, turned: f64) -> f64 {
         (force - turned * self.side).length() / self.load + turned.abs()
+    }
+
+    /// What changes of a force \[N\] and of `turned` by no more than these can ask for.
+    pub(super) fn asks_at_most(&self, force: f64, turned: f64) -> f64 {
+        (force + turned * self.side.length()) / self.load + turned
     }
 }
 

@@ -72,15 +72,18 @@ pub(super) fn rotations(faces: [&Pressed<'_>; 2], distance: f64) -> [Rotation; 2
     }
     // Free motions that go with a rotation: three translations and the turn about x3.
     let (rest, turns) = ([0, 1, 2, 5], [3, 4]);
-    let mut inner = Matrix4::zeros();
-    let mut mixed = Matrix4x2::zeros();
-    let mut own = Matrix2::zeros();
-    for point in &points {
-        let outer = point.p * point.c * point.c.transpose();
-        inner += Matrix4::from_fn(|i, j| outer[(rest[i], rest[j])]);
-        mixed += Matrix4x2::from_fn(|i, j| outer[(rest[i], turns[j])]);
-        own += Matrix2::from_fn(|i, j| outer[(turns[i], turns[j])]);
+    let mut sums = [[0.0; 6]; 6];
+    for Point { c, p, .. } in &points {
+        for i in 0..6 {
+            for j in i..6 {
+                sums[i][j] += p * c[i] * c[j];
+            }
+        }
     }
+    let sum = |i: usize, j: usize| sums[i.min(j)][i.max(j)];
+    let inner = Matrix4::from_fn(|i, j| sum(rest[i], rest[j]));
+    let mixed = Matrix4x2::from_fn(|i, j| sum(rest[i], turns[j]));
+    let own = Matrix2::from_fn(|i, j| sum(turns[i], turns[j]));
     // Each coordinate in units of its own size; those that do nothing drop out.
     let units = Matrix4::from_diagonal(
         &inner.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 }),

@@ -5,7 +5,7 @@ use glam::{DMat2, DMat3, DVec2, DVec3};
 use rustc_hash::FxHashSet;
 
 use super::net::{Facing, Net};
-use super::relief::FACING;
+use super::survey::FACING;
 use crate::geometry::Paraboloid;
 use crate::geometry::polygon::{Bounds2, outer};
 use crate::gripper::Layer;
@@ -98,8 +98,8 @@ pub(super) struct Crests<'a> {
     pub(super) mesh: &'a Mesh,
     pub(super) net: &'a Net,
     pub(super) axes_from_part: DMat3,
-    /// Corners of the mesh in the axes, or none.
-    pub(super) points: Vec<DVec3>,
+    /// Heights of the mesh's corners along the direction \[m\].
+    pub(super) heights: &'a [f64],
     pub(super) pad: Pad,
 }
 
@@ -256,17 +256,15 @@ impl Crests<'_> {
         let mut is_of_face = false;
         let mut seen: Vec<(f64, u32)> = Vec::new();
         for &triangle in &face.triangles {
-            let corners = match &self.points[..] {
-                [] => self.mesh.corners(triangle).map(|corner| self.axes_from_part * corner),
-                points => self.mesh.triangles[triangle as usize].map(|id| points[id as usize]),
-            };
-            let corners = corners.map(|point| DVec3::new(point.x, point.y, side * point.z));
-            let gaps = corners.map(|corner| height - corner.z);
-            let least = gaps.into_iter().fold(f64::INFINITY, f64::min);
-            let flat = corners.map(DVec3::truncate);
+            let [a, b, c] = self.mesh.triangles[triangle as usize];
+            let gaps = [a, b, c].map(|id| height - side * self.heights[id as usize]);
+            let least = gaps[0].min(gaps[1]).min(gaps[2]);
             if least > cover.level {
                 continue;
             }
+            let corners = self.mesh.corners(triangle).map(|corner| self.axes_from_part * corner);
+            let corners = corners.map(|point| DVec3::new(point.x, point.y, side * point.z));
+            let flat = corners.map(DVec3::truncate);
             let [a, b, c] = corners;
             let normal = (b - a).cross(c - a);
             // The mirror image of the other side has the corners the other way round.

@@ -1,7 +1,6 @@
 //! The corners of faces of free form: normals, bends, and the way from one to the next.
 
 use glam::{DMat3, DVec2, DVec3};
-use rustc_hash::FxHashMap;
 
 use crate::geometry::Paraboloid;
 use crate::part::{CurvedFace, Mesh};
@@ -28,7 +27,9 @@ pub(super) struct Net {
     /// Corners beside corner `k`: `beside[first[k]..first[k + 1]]`.
     first: Vec<u32>,
     beside: Vec<u32>,
-    fits: FxHashMap<u32, Option<Local>>,
+    /// The surfaces about corners so far, and for each corner its place among them and one, or nought.
+    fits: Vec<Option<Local>>,
+    fit_of: Vec<u32>,
 }
 
 /// The surface about a corner in its own axes.
@@ -69,7 +70,8 @@ impl Net {
             faces: Vec::new(),
             first: vec![0],
             beside: Vec::new(),
-            fits: FxHashMap::default(),
+            fits: Vec::new(),
+            fit_of: Vec::new(),
         };
         for face in faces {
             let mut index: Vec<u32> = face
@@ -111,6 +113,7 @@ impl Net {
                 net.first.push(net.beside.len() as u32);
             }
         }
+        net.fit_of.resize(net.points.len(), 0);
         net
     }
 
@@ -156,13 +159,15 @@ impl Net {
         }
     }
 
-    fn local(&mut self, corner: u32) -> Option<Local> {
-        if let Some(known) = self.fits.get(&corner) {
-            return *known;
+    fn local(&mut self, corner: u32) -> Option<&Local> {
+        let mut known = self.fit_of[corner as usize];
+        if known == 0 {
+            let local = self.fit(corner);
+            self.fits.push(local);
+            known = self.fits.len() as u32;
+            self.fit_of[corner as usize] = known;
         }
-        let local = self.fit(corner);
-        self.fits.insert(corner, local);
-        local
+        self.fits[known as usize - 1].as_ref()
     }
 
     fn fit(&self, corner: u32) -> Option<Local> {
@@ -203,7 +208,7 @@ impl Net {
 
     /// The place near a corner where the surface faces a direction, for a grip of a `width`.
     pub(super) fn facing(&mut self, corner: u32, direction: DVec3, width: f64) -> Option<Facing> {
-        let Local { axes, form, principal, size } = self.local(corner)?;
+        let Local { axes, form, principal, size } = *self.local(corner)?;
         let towards = axes * direction;
         if towards.z < NEAR {
             return None;
@@ -233,30 +238,42 @@ impl Net {
 }
 
 /// Corners by their normals.
-pub(super) struct Normals(FxHashMap<[i32; 3], Vec<u32>>);
+pub(super) struct Normals {
+    /// Of cell `k`: `corners[first[k]..first[k + 1]]`.
+    first: Vec<u32>,
+    corners: Vec<u32>,
+}
 
 impl Normals {
     /// Distance within which all are found: of unit vectors 12.6 degrees apart.
     const CELL: f64 = 0.22;
+    /// Cells along an axis, with one beyond either end.
+    const CELLS: i32 = 12;
 
     pub(super) fn new(corners: &[u32], net: &Net) -> Self {
-        let mut cells: FxHashMap<[i32; 3], Vec<u32>> = FxHashMap::default();
-        for &corner in corners {
-            cells.entry(Self::cell(net.normals[corner as usize])).or_default().push(corner);
-        }
-        Self(cells)
+        let cell = |corner: u32| Self::cell(net.normals[corner as usize]) as u32;
+        let mut sorted: Vec<(u32, u32)> = corners.iter().map(|&id| (cell(id), id)).collect();
+        // Those of one cell stay in order.
+        sorted.sort_by_key(|(cell, _)| *cell);
+        let cells = 0..=Self::CELLS.pow(3) as u32;
+        let first = cells.map(|cell| sorted.partition_point(|one| one.0 < cell) as u32).collect();
+        Self { first, corners: sorted.into_iter().map(|(_, corner)| corner).collect() }
     }
 
-    fn cell(normal: DVec3) -> [i32; 3] {
-        (normal / Self::CELL).floor().as_ivec3().to_array()
+    fn cell(normal: DVec3) -> i32 {
+        let [x, y, z] = ((normal / Self::CELL).floor().as_ivec3() + Self::CELLS / 2).to_array();
+        (x * Self::CELLS + y) * Self::CELLS + z
     }
 
     /// Corners whose normals may be that near to `normal`, and others.
     pub(super) fn near(&self, normal: DVec3) -> impl Iterator<Item = u32> + '_ {
-        let [x, y, z] = Self::cell(normal);
-        let around = (-1..=1).flat_map(move |i| {
-            (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [x + i, y + j, z + k]))
-        });
-        around.filter_map(|cell| self.0.get(&cell)).flatten().copied()
+        let middle = Self::cell(normal);
+        (-1..=1).flat_map(|x| (-1..=1).map(move |y| (x * Self::CELLS + y) * Self::CELLS)).flat_map(
+            move |row| {
+                // Three cells one after the other.
+                let [from, to] = [-1, 2].map(|z| self.first[(middle + row + z) as usize] as usize);
+                self.corners[from..to].iter().copied()
+            },
+        )
     }
 }

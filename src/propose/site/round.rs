@@ -9,9 +9,10 @@ use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
 
-use super::relief::{LEVEL, Relief, Survey, is_free};
+use super::relief::Relief;
 use super::shapes::{project, stretches};
 use super::skyline::Skyline;
+use super::survey::{LEVEL, Survey, is_free};
 use super::tapers::upright;
 use super::{Base, Finder, SAME_PLANE, Site, axes, lie};
 use crate::error::Result;

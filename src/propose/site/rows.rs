@@ -6,17 +6,18 @@
 
 use glam::DVec2;
 
-use super::relief::{Relief, Survey};
+use super::relief::Relief;
 use super::round::{Outcomes, Round};
-use super::shapes::to_site;
+use super::shapes::{common, to_site};
+use super::survey::Survey;
 use super::tapers::{STEEPEST, Surface, Taper, WIDEST};
 use super::{Finder, SAME_PLANE, Site, axes};
 use crate::error::Result;
 use crate::geometry::polygon::{self, Bounds2};
-use crate::geometry::{HalfPlane, clip_ring_half_plane, intersect_convex, overlay, support};
+use crate::geometry::{HalfPlane, clip_ring_half_plane, support};
 use crate::gripper::{Gripper, Jaw, Layer};
-use crate::mechanics::curved::{Pads, Squeezed};
-use crate::model::{Frame, Patch, Piece, Ring, Surfaces};
+use crate::mechanics::curved::Pads;
+use crate::model::{Frame, Patch, Piece, Polygon, Ring, Surfaces};
 use crate::part::{FacePair, PairKind, PlanarFace};
 use crate::propose::options::{ProposeOptions, Rejection};
 use crate::propose::stroke::Stroke;
@@ -273,8 +274,8 @@ impl Finder<'_> {
         let high = if taper.surface == Surface::Bore { y + above } else { top };
         let under =
             window(DVec2::new(min.x - self.size, y - below), DVec2::new(max.x + self.size, high));
-        let overlap = overlay::intersect(&relief.pressed[0], &relief.pressed[1]);
-        let overlap = intersect_convex(&under, &overlap);
+        let overlap = common(&relief.pressed[0], &relief.pressed[1]);
+        let overlap = common(&[Polygon { outer: under, holes: Vec::new() }], &overlap);
         let middle = level * taper.bounds.centre().x + taper.uphill * y;
         let local: Patch =
             overlap.iter().map(|shape| to_site(shape, middle, level.to_angle())).collect();
@@ -339,7 +340,8 @@ impl Finder<'_> {
         (y, top): (f64, f64),
         layer: Layer,
     ) -> std::result::Result<Option<[f64; 2]>, Rejection> {
-        let squeezed = |lean: f64| -> Option<[Squeezed; 2]> {
+        let force = self.options.force_on(self.gripper);
+        let pads = |lean: f64| -> Option<Pads> {
             let under = |pad: &Ring| -> Vec<Piece> {
                 let mut outer = pad.clone();
                 for (sense, end) in [(1.0, taper.bounds.max.y), (-1.0, taper.bounds.min.y)] {
@@ -350,22 +352,22 @@ impl Finder<'_> {
                 vec![Piece { outer, holes: Vec::new(), gap: taper.gap(y, top, lean) }]
             };
             let [face_i, face_ii] = posture.pads.each_ref().map(under);
-            let surfaces =
-                Surfaces { face_i, face_ii, stiffness: [layer.stiffness; 2], layer: None };
-            Pads::new(&surfaces).ok()?.squeezed(self.options.force_on(self.gripper))
+            let stiffness = [layer.stiffness; 2];
+            Pads::new(&Surfaces { face_i, face_ii, stiffness, layer: None }).ok()
         };
-        let Some(found) = squeezed(1.0) else { return Ok(None) };
-        let greatest = |faces: &[Squeezed; 2]| {
-            faces.iter().map(|face| face.greatest_pressure).fold(0.0, f64::max) / layer.stiffness
-        };
-        let compression = greatest(&found);
+        let Some(leaning) = pads(1.0) else { return Ok(None) };
+        let Some(deltas) = leaning.deltas(force) else { return Ok(None) };
+        let limit = LAYER_SHARE * layer.reach();
+        let compression = leaning.compressed(deltas);
         // Twice what it would be without: then all of the pad touches.
-        if compression > LAYER_SHARE * layer.reach()
-            && squeezed(0.0).is_some_and(|even| compression > 2.0 * greatest(&even))
-        {
+        let even = || {
+            let pads = pads(0.0)?;
+            Some(pads.compressed(pads.deltas(force)?))
+        };
+        if compression > limit && even().is_some_and(|even| compression > 2.0 * even) {
             return Err(Rejection::LeansTooMuch);
         }
-        Ok(Some(found.map(|face| face.delta)))
+        Ok(Some(deltas))
     }
 }
 

@@ -115,11 +115,14 @@ fn by_lines(rings: &[Ring], u: &Quadratic) -> (f64, f64) {
     (area, load)
 }
 
+/// Rounding of sums whose terms are at most that much larger than what they come to.
+const ROUNDING: f64 = 20.0 * f64::EPSILON / SLIVER;
+
 /// Equal loads, and equal areas but for what the points of a sliver count more.
 fn agree((area, load): (f64, f64), (other, wanted): (f64, f64), is_closed: bool) -> bool {
-    let within = if is_closed { 1e-12 } else { 1e-6 };
+    let within = if is_closed { ROUNDING } else { 1e-6 };
     (area - other).abs() <= within * (other + 1e-2)
-        && (load - wanted).abs() <= 1e-12 * (wanted + 1e-2)
+        && (load - wanted).abs() <= ROUNDING * (wanted + 1e-2)
 }
 
 fn is_closed(rings: &[Ring], u: &Quadratic) -> bool {

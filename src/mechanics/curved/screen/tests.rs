@@ -5,7 +5,22 @@ use super::*;
 use crate::contact::surface::{Piece, Surfaces};
 use crate::model::{Gap, Wrench};
 
-/// Both faces alike, of a cylinder, a ball, a cone or planes, with their distance.
+/// A ball by its facets, of which each touches it in its middle.
+fn facets(radius: f64, [x, y]: [f64; 2], off: f64) -> Vec<Piece> {
+    let side = |k: i32, half: f64| half * (f64::from(k) / 6.0);
+    let cells = (-6..6).flat_map(|i| (-6..6).map(move |j| (i, j)));
+    let cell = |(i, j): (i32, i32)| {
+        let outer: Vec<DVec2> = [(0, 0), (1, 0), (1, 1), (0, 1)]
+            .map(|(a, b)| DVec2::new(side(i + a, x) + off, side(j + b, y)))
+            .to_vec();
+        let at = 0.25 * outer.iter().sum::<DVec2>();
+        let gap = Gap::Plane { height: -0.5 * at.length_squared() / radius, slope: at / radius };
+        Piece { outer, holes: Vec::new(), gap }
+    };
+    cells.map(cell).collect()
+}
+
+/// Both faces alike, of a cylinder, a ball, a cone, planes or a ball's facets, with their distance.
 fn surfaces(kind: u32, half: [f64; 2], off: f64) -> (Surfaces, f64) {
     let radius = 0.01;
     let (axis, at, height) = (DVec2::X, DVec2::ZERO, 0.0);
@@ -18,7 +33,8 @@ fn surfaces(kind: u32, half: [f64; 2], off: f64) -> (Surfaces, f64) {
     let [x, y] = half;
     let outer = [(-x, -y), (x, -y), (x, y), (-x, y)].map(|(a, b)| DVec2::new(a + off, b)).to_vec();
     let piece = Piece { outer, holes: Vec::new(), gap };
-    let (face_i, face_ii) = (vec![piece.clone()], vec![piece]);
+    let pieces = if kind == 4 { facets(radius, half, off) } else { vec![piece] };
+    let (face_i, face_ii) = (pieces.clone(), pieces);
     (Surfaces { face_i, face_ii, stiffness: [5e9, 3e9], layer: None }, 2.0 * radius)
 }
 
@@ -28,7 +44,7 @@ proptest! {
     /// What the floors leave out is held at less, and what they say rolls has that friction.
     #[test]
     fn what_is_below_is_below(
-        kind in 0..4_u32,
+        kind in 0..5_u32,
         half in [0.004..0.012_f64, 0.006..0.01_f64],
         off in -0.004..0.004_f64,
         loads in prop::collection::vec(
@@ -62,8 +78,8 @@ proptest! {
 /// Most loads far below the value never reach Newton's method.
 #[test]
 fn floors_take_most_loads() {
-    for kind in 0..2 {
-        let (surfaces, distance) = surfaces(kind, [0.01, 0.008], 0.0);
+    for (kind, off) in [(0, 0.0), (1, 0.0), (4, 0.0), (4, 0.001)] {
+        let (surfaces, distance) = surfaces(kind, [0.01, 0.008], off);
         let pads = Pads::new(&surfaces).unwrap();
         let wrenches: Vec<Wrench> = (0..200)
             .map(|i| {
