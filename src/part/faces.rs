@@ -5,12 +5,14 @@ use glam::{DMat3, DVec2, DVec3};
 use super::curves::{self, Curves};
 use super::facets::Facets;
 use super::fitted::{self, Tolerance};
-use super::given::{GivenFace, GivenFaces};
+use super::given::{GivenFace, GivenFaces, Stated};
 use super::noise::{self, Noise};
+use super::order;
 use super::orient::Role;
 use super::regions::{self, Flatness, Regions};
 use super::repair::Repaired;
-use super::{CurvedFace, FaceSource, PlanarFace, boundary};
+use super::topology::NONE;
+use super::{CurvedFace, FaceSource, PlanarFace, Residual, boundary};
 use crate::geometry::polygon::{Moments, patch_moments};
 use crate::model::Frame;
 
@@ -25,6 +27,27 @@ const FLOOR: f64 = 5e-7;
 /// the diagonal.
 const NARROWEST: f64 = 5e-4;
 
+/// A planar face before its outline is known.
+struct Flat {
+    triangles: Vec<u32>,
+    stated: Option<StatedFlat>,
+}
+
+/// What the file states of a plane, or a fit gave.
+struct StatedFlat {
+    /// A point of it \[m\], and its normal out of the material.
+    plane: (DVec3, DVec3),
+    source: FaceSource,
+    fit: Option<Residual>,
+}
+
+impl StatedFlat {
+    fn of(face: &GivenFace) -> Option<Self> {
+        let Stated::Plane { origin, normal } = face.surface else { return None };
+        Some(Self { plane: (origin, normal), source: face.source(), fit: face.fit })
+    }
+}
+
 /// All planar faces of the part by falling area, and the curved ones: those that the file states
 /// ([`GivenFaces`]), among the other triangles those that are recognised, and last what is left and
 /// smooth (`free_faces`). There facets of curved
@@ -37,6 +60,25 @@ pub(super) fn faces(
     faceted: bool,
     fit: Option<f64>,
 ) -> (Vec<PlanarFace>, Vec<CurvedFace>) {
+    let (mut flats, mut curved) = recognised(part, faceted, fit);
+    let number = order::restore(part);
+    let flat = flats.iter_mut().map(|face| &mut face.triangles);
+    for triangles in flat.chain(curved.iter_mut().map(|face| &mut face.triangles)) {
+        triangles.iter_mut().for_each(|triangle| *triangle = number[*triangle as usize]);
+        triangles.sort_unstable();
+    }
+    for face in &mut curved {
+        face.shell = part.shell_of[face.triangles[0] as usize];
+    }
+    numbered(outline(part, flats), curved)
+}
+
+/// Which triangles make planar faces, and the curved faces by falling area.
+fn recognised(
+    part: &mut Repaired,
+    faceted: bool,
+    fit: Option<f64>,
+) -> (Vec<Flat>, Vec<CurvedFace>) {
     let [fine, rough] = [0, 1].map(|level| {
         let factor = [1.0, 2.0][level];
         Flatness {
@@ -71,23 +113,12 @@ pub(super) fn faces(
             fine.distance * 1e6
         ));
     }
-    if let Some(noise) = noise::measure(part, &given, &regions) {
-        let taken = if is_rough { rough } else { fine }.distance;
-        let Noise { share, distance } = noise;
-        let tolerance = noise.tolerance(1e-3) * 1e3;
-        part.health.warnings.push(format!(
-            "flat faces are noisy: on {:.0} % of the surface corners lie {:.1} um (root mean square) off the planes that fit them, {:.1} times the {:.2} um \
-             up to which they count as flat, so planes have fallen into single triangles and grips on them are missing or tilted; export the part \
-             from its CAD model, or fit planes and round faces to corners within {tolerance} mm",
-            share * 100.0,
-            distance * 1e6,
-            distance / taken,
-            taken * 1e6
-        ));
-    }
+    let noise = noise::measure(part, &given, &regions);
+    let taken = if is_rough { rough } else { fine }.distance;
     if faceted {
         facets.is_facet.fill(false);
-        return (outline(part, &given, &regions, &facets), Vec::new());
+        part.health.warnings.extend(noise.map(|noise| noisy(noise, taken)));
+        return (flats(part, &given, &regions, &facets), Vec::new());
     }
     let Curves { faces: curved, is_curved, flats } =
         curves::curved_faces(part, &regions, &facets.borders, &given, floor);
@@ -97,13 +128,29 @@ pub(super) fn faces(
     for flat in flats {
         facets.is_facet[flat as usize] = false;
     }
-    let planar = outline(part, &given, &regions, &facets);
+    let planar = self::flats(part, &given, &regions, &facets);
     let mut is_taken = vec![false; part.mesh.triangles.len()];
     let triangles = planar.iter().map(|face| &face.triangles);
     let triangles = triangles.chain(curved.iter().map(|face| &face.triangles)).flatten();
     triangles.for_each(|&triangle| is_taken[triangle as usize] = true);
     let free = curves::free_faces(part, &regions, &is_taken);
-    numbered(planar, curved.into_iter().chain(free).collect())
+    part.health.warnings.extend(noise.map(|noise| noisy(noise, taken)));
+    (planar, curved.into_iter().chain(free).collect())
+}
+
+/// What is said where noise has broken planes up; `taken`: distance within which corners count as
+/// flat \[m\].
+fn noisy(noise: Noise, taken: f64) -> String {
+    format!(
+        "flat faces are noisy: on {:.0} % of the surface corners lie {:.1} um (root mean square) off the planes that fit them, {:.1} times the {:.2} um \
+         up to which they count as flat, so planes have fallen into single triangles and grips on them are missing or tilted; export the part \
+         from its CAD model, or fit planes and round faces to corners within {} mm",
+        noise.share * 100.0,
+        noise.distance * 1e6,
+        noise.distance / taken,
+        taken * 1e6,
+        noise.tolerance(1e-3) * 1e3
+    )
 }
 
 /// Curved faces have the numbers after those of the planar ones.
@@ -122,40 +169,58 @@ fn fitted_faces(
     part: &Repaired,
     given: &GivenFaces,
     flatness: Flatness,
-) -> (Vec<PlanarFace>, Vec<CurvedFace>) {
+) -> (Vec<Flat>, Vec<CurvedFace>) {
     let regions = regions::grow(part, given, flatness);
     let mut facets = Facets::new(part, given, &regions);
     for (index, is_facet) in facets.is_facet.iter_mut().enumerate() {
         *is_facet |= given.face(regions.triangles(index)[0]).is_none();
     }
-    numbered(outline(part, given, &regions, &facets), curves::given_faces(part, given))
+    (flats(part, given, &regions, &facets), curves::given_faces(part, given))
 }
 
-/// The faces among the regions, with boundaries, sorted and numbered.
-fn outline(
-    part: &Repaired,
-    given: &GivenFaces,
-    regions: &Regions,
-    facets: &Facets,
-) -> Vec<PlanarFace> {
-    let tolerance = simplify_tolerance(part);
-    let mut faces: Vec<PlanarFace> = Vec::new();
+/// The planar faces among the regions.
+fn flats(part: &Repaired, given: &GivenFaces, regions: &Regions, facets: &Facets) -> Vec<Flat> {
+    let mut flats = Vec::new();
     for (index, region) in regions.all.iter().enumerate() {
         let triangles = regions.triangles(index);
-        let stated = given.face(triangles[0]).filter(|face| face.is_plane());
-        let is_given = stated.is_some();
+        let stated = given.face(triangles[0]).and_then(StatedFlat::of);
         let is_narrow =
             4.0 * region.area < NARROWEST * part.diagonal * facets.borders.perimeter[index];
-        if facets.is_facet[index] || (is_narrow && !is_given) {
+        if facets.is_facet[index] || (is_narrow && stated.is_none()) {
             continue;
         }
-        let mut frame = face_frame(region.plane.normal, region.centre);
+        flats.push(Flat { triangles: triangles.to_vec(), stated });
+    }
+    flats
+}
+
+/// The planar faces with their boundaries, sorted and numbered.
+fn outline(part: &Repaired, flats: Vec<Flat>) -> Vec<PlanarFace> {
+    let tolerance = simplify_tolerance(part);
+    let mut of = vec![NONE; part.mesh.triangles.len()];
+    for (flat, number) in flats.iter().zip(0..) {
+        flat.triangles.iter().for_each(|&triangle| of[triangle as usize] = number);
+    }
+    let mut faces: Vec<PlanarFace> = Vec::new();
+    for (flat, number) in flats.into_iter().zip(0..) {
+        let Flat { triangles, stated } = flat;
+        let (order, normal, centre) = match &stated {
+            Some(StatedFlat { plane: (origin, normal), .. }) => {
+                let centre = regions::middle(&part.mesh, &triangles, *origin, *normal);
+                (triangles.clone(), *normal, centre)
+            }
+            None => match regions::gathered(part, &triangles, number, &mut of) {
+                Some((order, plane, centre)) => (order, plane.normal, centre),
+                None => continue,
+            },
+        };
+        let mut frame = face_frame(normal, centre);
         let rings = |frame: &Frame| {
             boundary::polygons(
                 &part.mesh,
                 &part.edges.twin,
-                triangles,
-                |t| regions.of[t as usize] == index as u32,
+                &order,
+                |triangle| of[triangle as usize] == number,
                 frame,
                 tolerance,
             )
@@ -171,19 +236,17 @@ fn outline(
             polygon.outer.iter_mut().for_each(shift);
             polygon.holes.iter_mut().flatten().for_each(shift);
         }
-        let mut triangles = triangles.to_vec();
-        triangles.sort_unstable();
         let shell = part.shell_of[triangles[0] as usize];
         faces.push(PlanarFace {
             id: 0,
-            normal: region.plane.normal,
-            offset: region.plane.normal.dot(frame.origin),
+            normal,
+            offset: normal.dot(frame.origin),
             area,
             centroid: frame.origin,
             part_from_face: frame,
             polygons,
             triangles,
-            source: stated.map_or(FaceSource::Mesh, GivenFace::source),
+            source: stated.as_ref().map_or(FaceSource::Mesh, |face| face.source),
             fit: stated.and_then(|face| face.fit),
             shell,
             reachable: part.shells[shell as usize].role == Role::Body,

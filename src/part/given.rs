@@ -10,6 +10,7 @@ use rustc_hash::FxHashMap;
 #[cfg(feature = "step")]
 use super::curves::Axis;
 use super::curves::{Kind, Profile, Surface};
+use super::order::Places;
 use super::repair::Repaired;
 use super::topology::NONE;
 use super::{FaceSource, Mesh, Residual};
@@ -139,11 +140,13 @@ impl Stated {
     }
 }
 
-/// Which face of the file each triangle belongs to. Empty where the file states none.
+/// What is known of each triangle from the file: which face it belongs to (empty where the file
+/// states none), and where it stands.
 #[derive(Debug, Default)]
 pub(super) struct Given {
     of: Vec<u32>,
     surfaces: Vec<Stated>,
+    places: Places,
 }
 
 impl Given {
@@ -167,12 +170,26 @@ impl Given {
         }
     }
 
+    /// What belongs to the triangles follows them to other `places`.
+    pub(super) fn set_places(&mut self, places: Places) {
+        if !self.of.is_empty() {
+            let origins = places.triangles.iter();
+            self.of = origins.map(|&origin| self.of[origin as usize / 3]).collect();
+        }
+        self.places = places;
+    }
+
+    /// Where vertices and triangles stood in the file.
+    pub(super) fn take_places(&mut self) -> Places {
+        std::mem::take(&mut self.places)
+    }
+
     /// Removes all triangles of `mesh` but those, by number and corners, that `keep` takes.
     pub(super) fn retain(&mut self, mesh: &mut Mesh, keep: impl Fn(usize, [u32; 3]) -> bool) {
-        if !self.of.is_empty() {
+        for of in [&mut self.of, &mut self.places.triangles].into_iter().filter(|of| !of.is_empty())
+        {
             let mut triangles = mesh.triangles.iter().enumerate();
-            self.of
-                .retain(|_| triangles.next().is_none_or(|(index, &corners)| keep(index, corners)));
+            of.retain(|_| triangles.next().is_none_or(|(index, &corners)| keep(index, corners)));
         }
         let mut index = 0;
         mesh.triangles.retain(|&corners| {
@@ -183,8 +200,10 @@ impl Given {
 
     /// As many triangles as `count` were added at the end, pieces of `triangle`.
     pub(super) fn repeat(&mut self, triangle: u32, count: usize) {
-        if let Some(&face) = self.of.get(triangle as usize) {
-            self.of.resize(self.of.len() + count, face);
+        for of in [&mut self.of, &mut self.places.triangles] {
+            if let Some(&known) = of.get(triangle as usize) {
+                of.resize(of.len() + count, known);
+            }
         }
     }
 

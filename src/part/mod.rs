@@ -26,8 +26,10 @@ mod given;
 pub mod health;
 mod mass;
 mod noise;
+mod order;
 mod orient;
 mod pairs;
+mod patches;
 mod read;
 mod regions;
 mod repair;
@@ -57,6 +59,7 @@ pub struct Mesh {
 
 impl Mesh {
     /// The three corners of triangle `index` \[m\].
+    #[inline]
     pub fn corners(&self, index: u32) -> [DVec3; 3] {
         let [a, b, c] = self.triangles[index as usize];
         [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
@@ -343,8 +346,9 @@ impl Part {
         Ok(part)
     }
 
-    fn build(soup: weld::Soup, unit: Unit, options: &ReadOptions, place: &str) -> Result<Self> {
+    fn build(mut soup: weld::Soup, unit: Unit, options: &ReadOptions, place: &str) -> Result<Self> {
         check_extent(&soup, unit, place)?;
+        order::sort(&mut soup);
         let mut repaired = repair::repair(soup, unit.metres(), place)?;
         if let Some(fit) = options.fit {
             fitted::check(fit, repaired.diagonal)?;

@@ -1,21 +1,26 @@
 //! Planar regions by growing.
 //!
-//! A region starts at the largest triangle left and takes in neighbours whose corners lie within a
+//! A region starts at the largest flat patch left and takes in neighbours whose corners lie within a
 //! distance of the region's plane and whose normals agree within an angle; both tests are needed.
 //! The distance is scaled to the part. The angle is widened for a narrow triangle by what the
 //! uncertainty of its corners can tilt it: refining a plane in 32-bit floats leaves slivers whose
-//! normals point anywhere. The plane is refitted each time the region has doubled.
+//! normals point anywhere. The plane is refitted each time the region's area has doubled, between
+//! rings of neighbours.
 
 use glam::DVec3;
 use nalgebra::Matrix3;
 
 use super::Mesh;
 use super::given::{GivenFaces, Stated};
+use super::patches::{Patches, area_step};
 use super::repair::Repaired;
 use super::topology::NONE;
 
 /// Angle between a wide triangle and its face: 0.2 degrees.
 const ANGLE: f64 = 0.2 * std::f64::consts::PI / 180.0;
+
+/// Growth of a region's area after which its plane is fitted again: two, less rounding.
+const REFIT: f64 = 2.0 - 1e-6;
 
 /// How exactly a triangle must lie in a region's plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,10 +48,10 @@ impl Plane {
 /// Area-weighted sums over triangles: area, normal, first and second moments about a reference near
 /// the region.
 #[derive(Debug, Clone, Copy)]
-struct Sums {
+pub(super) struct Sums {
     reference: DVec3,
     area: f64,
-    vector: DVec3,
+    pub vector: DVec3,
     first: DVec3,
     /// Second moments xx, yy, zz and yz, zx, xy.
     squares: DVec3,
@@ -79,6 +84,36 @@ impl Sums {
         let weight = area / 12.0;
         self.squares += weight * (a * a + b * b + c * c + sum * sum);
         self.products += weight * (cyclic(a) + cyclic(b) + cyclic(c) + cyclic(sum));
+    }
+
+    pub(super) fn add_all(&mut self, mesh: &Mesh, triangles: &[u32]) {
+        for &triangle in triangles {
+            let corners = mesh.corners(triangle);
+            let cross = twice_normal(corners);
+            self.add(corners, cross, cross.length() / 2.0);
+        }
+    }
+
+    /// Of triangles, about a corner of the first.
+    pub(super) fn of(mesh: &Mesh, triangles: &[u32]) -> Self {
+        let mut sums = Self::new(mesh.corners(triangles[0])[0]);
+        sums.add_all(mesh, triangles);
+        sums
+    }
+
+    /// Adds the sums over others, about another reference.
+    pub(super) fn join(&mut self, other: &Self) {
+        let d = other.reference - self.reference;
+        self.area += other.area;
+        self.vector += other.vector;
+        self.first += other.first + other.area * d;
+        self.squares += other.squares + 2.0 * d * other.first + other.area * d * d;
+        let mixed = DVec3::new(
+            d.y * other.first.z + d.z * other.first.y,
+            d.z * other.first.x + d.x * other.first.z,
+            d.x * other.first.y + d.y * other.first.x,
+        );
+        self.products += other.products + mixed + other.area * cyclic(d);
     }
 
     fn centre(&self) -> DVec3 {
@@ -139,15 +174,17 @@ impl Regions {
     }
 }
 
-fn twice_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
+#[inline]
+pub(super) fn twice_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
 /// Partitions the triangles into planar regions. A plane that the file states is a region as it is;
 /// others end where faces do that the file states.
 pub(super) fn grow(part: &Repaired, given: &GivenFaces, flatness: Flatness) -> Regions {
-    let seeds = seeds(&part.mesh);
-    grow_from(part, given, flatness, seeds.iter().map(std::slice::from_ref))
+    let patches = Patches::new(part, given, flatness);
+    let seeds = patches.seeds(part);
+    grow_from(part, given, flatness, &patches, seeds.iter().map(|&seed| patches.triangles(seed)))
 }
 
 /// Grows regions once more, from the largest to the smallest: with its plane known, a large one takes
@@ -160,7 +197,9 @@ pub(super) fn grow_again(
 ) -> Regions {
     let mut order: Vec<usize> = (0..first.all.len()).collect();
     order.sort_by(|&a, &b| first.all[b].area.total_cmp(&first.all[a].area).then(a.cmp(&b)));
-    grow_from(part, given, flatness, order.into_iter().map(|index| first.triangles(index)))
+    let patches = Patches::new(part, given, flatness);
+    let starts = order.into_iter().map(|index| first.triangles(index));
+    grow_from(part, given, flatness, &patches, starts)
 }
 
 /// Grows regions from groups of triangles, as far as those belong to no region yet.
@@ -168,11 +207,12 @@ fn grow_from<'a>(
     part: &Repaired,
     given: &GivenFaces,
     flatness: Flatness,
+    patches: &Patches,
     starts: impl Iterator<Item = &'a [u32]>,
 ) -> Regions {
     let mesh = &part.mesh;
     let count = mesh.triangles.len();
-    let Flatness { distance, uncertainty } = flatness;
+    let uncertainty = flatness.uncertainty;
     let mut order = Vec::with_capacity(count);
     let mut region_of = vec![NONE; count];
     let mut regions = Vec::new();
@@ -180,17 +220,14 @@ fn grow_from<'a>(
     for face in &given.all {
         let Stated::Plane { origin, normal } = face.surface else { continue };
         let mut sums = Sums::new(origin);
+        sums.add_all(mesh, &face.triangles);
         let begin = order.len();
-        for &triangle in &face.triangles {
-            let corners = mesh.corners(triangle);
-            let cross = twice_normal(corners);
-            sums.add(corners, cross, cross.length() / 2.0);
-            region_of[triangle as usize] = regions.len() as u32;
-            order.push(triangle);
-        }
+        order.extend(&face.triangles);
+        let number = regions.len() as u32;
+        face.triangles.iter().for_each(|&triangle| region_of[triangle as usize] = number);
         let plane = Plane { normal, offset: normal.dot(origin), tilt: 0.0 };
         let centre = sums.centre();
-        let centre = centre - normal * (normal.dot(centre - origin));
+        let centre = centre - normal * normal.dot(centre - origin);
         regions.push(Region { begin, end: order.len(), plane, area: sums.area, centre });
     }
     for start in starts {
@@ -201,12 +238,12 @@ fn grow_from<'a>(
         let own = given.of(seed);
         let corners = mesh.corners(seed);
         let mut sums = Sums::new(corners[0]);
-        for &triangle in &order[begin..] {
-            let corners = mesh.corners(triangle);
-            let cross = twice_normal(corners);
-            sums.add(corners, cross, cross.length() / 2.0);
-            region_of[triangle as usize] = number;
+        if std::ptr::eq(start, patches.triangles(patches.of(seed))) {
+            patches.add_to(&mut sums, mesh, patches.of(seed));
+        } else {
+            sums.add_all(mesh, &order[begin..]);
         }
+        order[begin..].iter().for_each(|&triangle| region_of[triangle as usize] = number);
         let Some(mut plane) = sums.fit(uncertainty) else {
             // Not even a direction: alone, without area.
             let plane = Plane { normal: DVec3::Z, offset: corners[0].z, tilt: 0.0 };
@@ -217,31 +254,38 @@ fn grow_from<'a>(
             plane.normal = twice_normal(corners).normalize();
             plane.offset = plane.normal.dot(corners[0]);
         }
-        let mut refit_at = 2 * (order.len() - begin);
+        let mut refit_at = REFIT * sums.area;
         let mut next = begin;
         refused.clear();
         loop {
             while next < order.len() {
-                let triangle = order[next];
-                next += 1;
-                for half in triangle * 3..triangle * 3 + 3 {
-                    let twin = part.edges.twin[half as usize];
-                    if twin == NONE || region_of[(twin / 3) as usize] != NONE {
-                        continue;
-                    }
-                    let other = twin / 3;
-                    if given.of(other) != own {
-                        continue;
-                    }
-                    if take(mesh, other, &plane, distance, uncertainty, &mut sums) {
-                        region_of[other as usize] = number;
-                        order.push(other);
-                    } else {
-                        refused.push(other);
+                // One ring of neighbours with one plane: their order does not matter.
+                let ring = next..order.len();
+                next = ring.end;
+                for index in ring {
+                    let triangle = order[index];
+                    for half in triangle * 3..triangle * 3 + 3 {
+                        let twin = part.edges.twin[half as usize];
+                        if twin == NONE || region_of[(twin / 3) as usize] != NONE {
+                            continue;
+                        }
+                        let other = twin / 3;
+                        if given.of(other) != own {
+                            continue;
+                        }
+                        let patch = patches.of(other);
+                        let piece = patches.triangles(patch);
+                        if lie_in(mesh, piece, &plane, flatness) {
+                            patches.add_to(&mut sums, mesh, patch);
+                            piece.iter().for_each(|&other| region_of[other as usize] = number);
+                            order.extend(piece);
+                        } else {
+                            refused.push(other);
+                        }
                     }
                 }
-                if order.len() - begin >= refit_at {
-                    refit_at *= 2;
+                if sums.area >= refit_at {
+                    refit_at = REFIT * sums.area;
                     plane = sums.fit(uncertainty).unwrap_or(plane);
                 }
             }
@@ -253,10 +297,13 @@ fn grow_from<'a>(
                 if region_of[other as usize] != NONE {
                     return false;
                 }
-                let taken = take(mesh, other, &plane, distance, uncertainty, &mut sums);
+                let patch = patches.of(other);
+                let piece = patches.triangles(patch);
+                let taken = lie_in(mesh, piece, &plane, flatness);
                 if taken {
-                    region_of[other as usize] = number;
-                    order.push(other);
+                    patches.add_to(&mut sums, mesh, patch);
+                    piece.iter().for_each(|&other| region_of[other as usize] = number);
+                    order.extend(piece);
                 }
                 !taken
             });
@@ -275,16 +322,68 @@ fn grow_from<'a>(
     Regions { all: regions, order, of: region_of }
 }
 
-/// Adds a triangle to the sums if it lies in the plane.
-fn take(
-    mesh: &Mesh,
-    triangle: u32,
-    plane: &Plane,
-    distance: f64,
-    uncertainty: f64,
-    sums: &mut Sums,
-) -> bool {
-    let corners = mesh.corners(triangle);
+/// The triangles of a region in the order in which they are met going outwards from the first of the
+/// largest, their plane and the middle of their area. They are those with the `number` in `of`.
+pub(super) fn gathered(
+    part: &Repaired,
+    triangles: &[u32],
+    number: u32,
+    of: &mut [u32],
+) -> Option<(Vec<u32>, Plane, DVec3)> {
+    let step = |triangle: u32| area_step(twice_normal(part.mesh.corners(triangle)));
+    let first = triangles.iter().copied().min_by_key(|&triangle| (step(triangle), triangle))?;
+    let mut order = Vec::with_capacity(triangles.len());
+    let mut is_met = |triangle: u32| {
+        let of = &mut of[triangle as usize];
+        *of != number || std::mem::replace(of, NONE) == NONE
+    };
+    let mut sums = Sums::new(part.mesh.corners(first)[0]);
+    // One that hangs together has no other starts.
+    for &start in std::iter::once(&first).chain(triangles) {
+        if is_met(start) {
+            continue;
+        }
+        let mut next = order.len();
+        order.push(start);
+        while next < order.len() {
+            let triangle: u32 = order[next];
+            next += 1;
+            let corners = part.mesh.corners(triangle);
+            let cross = twice_normal(corners);
+            sums.add(corners, cross, cross.length() / 2.0);
+            for half in triangle * 3..triangle * 3 + 3 {
+                let twin = part.edges.twin[half as usize];
+                if twin != NONE && !is_met(twin / 3) {
+                    order.push(twin / 3);
+                }
+            }
+        }
+    }
+    order.iter().for_each(|&triangle| of[triangle as usize] = number);
+    Some((order, sums.fit(part.noise)?, sums.centre()))
+}
+
+/// The middle of the area of triangles in a plane through `origin` that is known.
+pub(super) fn middle(mesh: &Mesh, triangles: &[u32], origin: DVec3, normal: DVec3) -> DVec3 {
+    let mut sums = Sums::new(origin);
+    sums.add_all(mesh, triangles);
+    let centre = sums.centre();
+    centre - normal * normal.dot(centre - origin)
+}
+
+/// Whether triangles that add up to `sums` lie in one plane.
+pub(super) fn is_flat(part: &Repaired, triangles: &[u32], sums: &Sums, flatness: Flatness) -> bool {
+    let plane = sums.fit(flatness.uncertainty);
+    plane.is_some_and(|plane| lie_in(&part.mesh, triangles, &plane, flatness))
+}
+
+fn lie_in(mesh: &Mesh, triangles: &[u32], plane: &Plane, flatness: Flatness) -> bool {
+    triangles.iter().all(|&triangle| lies_in(mesh.corners(triangle), plane, flatness))
+}
+
+/// Whether a triangle lies in the plane.
+fn lies_in(corners: [DVec3; 3], plane: &Plane, flatness: Flatness) -> bool {
+    let Flatness { distance, uncertainty } = flatness;
     if corners.iter().any(|&corner| plane.distance(corner) > distance) {
         return false;
     }
@@ -298,35 +397,5 @@ fn take(
         ANGLE + plane.tilt + 2.0 * uncertainty * longest / twice_area.max(f64::MIN_POSITIVE);
     // A sliver narrower than the uncertainty has no direction: the distance alone decides.
     // 1 - x^2/2 is below the cosine by less than x^4/24: nothing at the angles in question.
-    if allowed < 1.0 && cross.dot(plane.normal) < (1.0 - allowed * allowed / 2.0) * twice_area {
-        return false;
-    }
-    sums.add(corners, cross, twice_area / 2.0);
-    true
-}
-
-/// Triangles by falling area, in steps of a factor of two: a counting sort by the exponent, file
-/// order within a step.
-fn seeds(mesh: &Mesh) -> Vec<u32> {
-    let exponents: Vec<u16> = (0..mesh.triangles.len() as u32)
-        .map(|triangle| {
-            let squared = twice_normal(mesh.corners(triangle)).length_squared();
-            // Exponent of the squared area; half of it is that of the area.
-            (0x7ff - ((squared.to_bits() >> 52) as u16 & 0x7ff)) / 2
-        })
-        .collect();
-    let mut starts = vec![0_u32; 0x402];
-    for &exponent in &exponents {
-        starts[exponent as usize + 1] += 1;
-    }
-    for index in 1..starts.len() {
-        starts[index] += starts[index - 1];
-    }
-    let mut seeds = vec![0; exponents.len()];
-    for (triangle, &exponent) in exponents.iter().enumerate() {
-        let slot = &mut starts[exponent as usize];
-        seeds[*slot as usize] = triangle as u32;
-        *slot += 1;
-    }
-    seeds
+    allowed >= 1.0 || cross.dot(plane.normal) >= (1.0 - allowed * allowed / 2.0) * twice_area
 }

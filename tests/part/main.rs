@@ -3,12 +3,14 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod curved;
+mod cut;
 mod faceted;
 mod fit;
 mod formats;
 mod freeform;
 mod hostile;
 mod no_curve;
+mod order;
 mod solids;
 #[cfg(feature = "step")]
 mod step;

@@ -10,6 +10,7 @@ mod leaning;
 mod motion;
 mod negatives;
 mod options;
+mod order;
 mod parts;
 mod places;
 mod round;

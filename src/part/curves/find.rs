@@ -17,8 +17,8 @@ use crate::part::topology::NONE;
 
 /// Side of a square, as a share of the part's diagonal, below whose area a curved face is none.
 const LEAST: f64 = 5e-4;
-/// Attempts that may fail before only each second facet is tried, then each third, and so on:
-/// freely curved surfaces; the second number where they have very many facets.
+/// Attempts that may fail before only half of the facets are tried, then a third, and so on: freely
+/// curved surfaces; the second number where they have very many facets.
 const PATIENCE: [usize; 2] = [150, 10];
 /// Facets that a surface found in spite of noise has at least.
 const MANY: usize = 24;
@@ -91,8 +91,8 @@ pub(in crate::part) fn curved_faces(
     if seeds.is_empty() {
         return Curves { faces: described, is_curved, flats: Vec::new() };
     }
-    let floor = floor.max(quantum(part, regions, &seeds));
-    let net = Net::new(part, regions, borders, given, floor);
+    let mut net = Net::new(part, regions, borders, given, floor);
+    net.floor = floor.max(quantum(&net, &seeds));
     let mut growth = Growth::new(&net);
     let mut faces: Vec<Face> = Vec::new();
     growth.exact(&seeds, &mut faces);
@@ -139,14 +139,19 @@ pub(super) fn sort(faces: &mut [CurvedFace], diagonal: f64) {
 
 /// The step to which the file rounds coordinates of curved surfaces \[m\], decimal or binary, where
 /// it is seen in all of them; 0 otherwise.
-fn quantum(part: &Repaired, regions: &Regions, seeds: &[u32]) -> f64 {
+fn quantum(net: &Net<'_>, seeds: &[u32]) -> f64 {
+    let part = net.part;
     let stride = seeds.len().div_ceil(SAMPLE);
+    // A program that cuts facets up may not round what it adds.
     let coordinates: Vec<f64> = seeds
         .iter()
         .step_by(stride)
-        .flat_map(|&facet| part.mesh.corners(regions.triangles(facet as usize)[0]))
-        .flat_map(|point| point.to_array())
+        .flat_map(|&facet| net.corners(facet))
+        .flat_map(|vertex| net.point(vertex).to_array())
         .collect();
+    if coordinates.is_empty() {
+        return 0.0;
+    }
     let decimal = (0..12).map(|digits| 10.0_f64.powi(-digits));
     let binary = (0..40).map(|digits| 0.5_f64.powi(digits));
     let fits = |step: &f64| {
@@ -162,6 +167,14 @@ fn quantum(part: &Repaired, regions: &Regions, seeds: &[u32]) -> f64 {
         .map(|step| part.unit * step)
         .filter(|step| possible.contains(step) && fits(step))
         .fold(0.0, f64::max)
+}
+
+/// Whether a place in a list is among the one in `count` that are looked at. Their steps follow the
+/// golden ratio: in steps of equal length the facets of one half of a part that mirrors the other
+/// could all be passed over.
+fn is_one_of(place: usize, count: usize) -> bool {
+    let turned = (place as u32).wrapping_mul(0x9e37_79b9);
+    (u64::from(turned) * count as u64) >> 32 == 0
 }
 
 /// Whether the facets of a face are no planes even where a look at their neighbours alone leaves it
@@ -242,9 +255,11 @@ impl Growth<'_> {
         if seeds.len() > MANY_SEEDS {
             (patience, self.patience) = (PATIENCE[1], FEW_PATCHES);
         }
+        let is_first = self.firsts(seeds);
         let mut failed = 0;
         for (index, &seed) in seeds.iter().enumerate() {
-            if self.owner[seed as usize] != FREE || index % (1 + failed / patience) != 0 {
+            let is_tried = is_first[index] || is_one_of(index, 1 + failed / patience);
+            if self.owner[seed as usize] != FREE || !is_tried {
                 continue;
             }
             if !self.shows_curvature(seed) {
@@ -292,31 +307,44 @@ impl Growth<'_> {
         (found, cut)
     }
 
-    /// Surfaces whose corners lie off by more, in connected bent facets that are left.
-    fn noisy(&mut self, seeds: &[u32], faces: &mut Vec<Face>) {
+    /// Smooth pieces of surface: facets in sets with those of their neighbours among them that are of
+    /// much the same size.
+    fn pieces(&self, facets: &[u32]) -> UnionFind {
         let net = self.net;
         let mut sets = UnionFind::new(self.owner.len());
-        let mut is_seed = vec![false; self.owner.len()];
-        for &seed in seeds.iter().filter(|&&seed| self.owner[seed as usize] == FREE) {
-            is_seed[seed as usize] = true;
-        }
-        for &seed in seeds.iter().filter(|&&seed| is_seed[seed as usize]) {
-            for border in net.borders.of(seed as usize) {
+        let mut is_one = vec![false; self.owner.len()];
+        facets.iter().for_each(|&facet| is_one[facet as usize] = true);
+        for &facet in facets {
+            for border in net.borders.of(facet as usize) {
                 let other = border.other;
-                if other < seed
-                    && is_seed[other as usize]
-                    && net.is_smooth(seed, other)
-                    && comparable(net, seed, other, NOISY_RATIO)
+                if other < facet
+                    && is_one[other as usize]
+                    && net.is_smooth(facet, other)
+                    && comparable(net, facet, other, NOISY_RATIO)
                 {
-                    sets.join(seed as usize, other as usize);
+                    sets.join(facet as usize, other as usize);
                 }
             }
         }
-        let mut groups: Vec<(usize, u32)> = seeds
-            .iter()
-            .filter(|&&seed| is_seed[seed as usize])
-            .map(|&seed| (sets.root(seed as usize), seed))
-            .collect();
+        sets
+    }
+
+    /// Whether each seed is the first of its piece of surface.
+    fn firsts(&self, seeds: &[u32]) -> Vec<bool> {
+        let mut pieces = self.pieces(seeds);
+        let mut is_met = vec![false; self.owner.len()];
+        let first = |&seed: &u32| !std::mem::replace(&mut is_met[pieces.root(seed as usize)], true);
+        seeds.iter().map(first).collect()
+    }
+
+    /// Surfaces whose corners lie off by more, in connected bent facets that are left.
+    fn noisy(&mut self, seeds: &[u32], faces: &mut Vec<Face>) {
+        let net = self.net;
+        let left: Vec<u32> =
+            seeds.iter().copied().filter(|&seed| self.owner[seed as usize] == FREE).collect();
+        let mut sets = self.pieces(&left);
+        let mut groups: Vec<(usize, u32)> =
+            left.iter().map(|&seed| (sets.root(seed as usize), seed)).collect();
         groups.sort_unstable();
         let mut groups: Vec<(f64, Vec<u32>)> = groups
             .chunk_by(|a, b| a.0 == b.0)

@@ -223,18 +223,15 @@ impl Growth<'_> {
             || (edge.most < 1.03 * edge.least && most - least < 0.06 * most + 2.0 * self.net.floor)
     }
 
-    /// Whether distances of the vertices from the surface are noise: neighbours along edges do not
-    /// agree.
+    /// Whether distances of the vertices from the surface are noise: neighbours along the rims of
+    /// facets do not agree.
     fn is_random(&self, found: &Found) -> bool {
         let net = self.net;
         let (mut products, mut squares) = (0.0, 0.0);
-        for &facet in &found.members {
-            for &triangle in net.triangles(facet) {
-                let [a, b, c] =
-                    net.part.mesh.corners(triangle).map(|point| found.surface.distance(point));
-                products += a * b + b * c + c * a;
-                squares += a * a + b * b + c * c;
-            }
+        for pair in found.members.iter().flat_map(|&facet| net.rim(facet)) {
+            let [a, b] = pair.map(|vertex| found.surface.distance(net.point(vertex)));
+            products += a * b;
+            squares += 0.5 * (a * a + b * b);
         }
         found.points.len() >= MANY && products < 0.2 * squares
     }

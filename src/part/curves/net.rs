@@ -3,11 +3,12 @@
 use glam::DVec3;
 
 use super::fit::Surface;
+use crate::part::Mesh;
 use crate::part::borders::Borders;
 use crate::part::given::GivenFaces;
 use crate::part::regions::Regions;
 use crate::part::repair::Repaired;
-use crate::part::topology::NONE;
+use crate::part::topology::{NONE, ends};
 
 /// Cosine of the greatest angle between neighbouring facets of one surface: 47.5 degrees, so that
 /// an octagon (45) may be a round bar, and a hexagon may not.
@@ -15,6 +16,8 @@ const SMOOTH: f64 = 0.675_590_207_615_660_2;
 /// Cosine of the angle between the mean normal of a facet and the surface's at its middle that is
 /// too great: 37 degrees.
 const ASKEW: f64 = 0.8;
+/// Corners of a facet whose chords are looked at.
+const FEW_CORNERS: usize = 8;
 
 /// Regions, their borders, and the vertices where three of them meet: only those surely lie on a
 /// curved surface, as facets may have been subdivided.
@@ -102,6 +105,44 @@ impl<'a> Net<'a> {
         triangles
             .flat_map(|&triangle| self.part.mesh.triangles[triangle as usize])
             .filter(|&vertex| self.is_corner[vertex as usize])
+    }
+
+    /// Pairs of corners that follow each other along the rim of a facet, however finely that is cut.
+    pub(super) fn rim(&self, facet: u32) -> Vec<[u32; 2]> {
+        let Mesh { triangles, .. } = &self.part.mesh;
+        let twin = &self.part.edges.twin;
+        let mut edges: Vec<(u32, u32)> = Vec::new();
+        for half in self.triangles(facet).iter().flat_map(|&t| 3 * t..3 * t + 3) {
+            let other = twin[half as usize];
+            if other == NONE || self.regions.of[other as usize / 3] != facet {
+                edges.push(ends(triangles, half));
+            }
+        }
+        edges.sort_unstable();
+        let starts = edges.iter().filter(|edge| self.is_corner(edge.0));
+        let pairs = starts.map(|&(from, mut to)| {
+            // A rim of this many edges has no more to a corner.
+            for _ in 0..edges.len() {
+                let next = edges.partition_point(|edge| edge.0 < to);
+                match edges.get(next) {
+                    Some(edge) if edge.0 == to && !self.is_corner(to) => to = edge.1,
+                    _ => break,
+                }
+            }
+            [from, to]
+        });
+        pairs.collect()
+    }
+
+    /// Middles of the chords between the first few corners of a facet.
+    pub(super) fn middles(&self, facet: u32) -> Vec<DVec3> {
+        let mut corners: Vec<u32> = self.corners(facet).collect();
+        corners.sort_unstable();
+        corners.dedup();
+        corners.truncate(FEW_CORNERS);
+        let points: Vec<DVec3> = corners.iter().map(|&vertex| self.point(vertex)).collect();
+        let pairs = points.iter().enumerate();
+        pairs.flat_map(|(k, &a)| points[..k].iter().map(move |&b| (a + b) / 2.0)).collect()
     }
 
     /// Whether three regions meet at a vertex.

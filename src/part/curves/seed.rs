@@ -147,16 +147,10 @@ fn torus_about(axis: Axis, points: &[DVec3]) -> Option<Surface> {
 }
 
 impl Growth<'_> {
-    /// Greatest distance of the middles of some facets' edges from a surface \[m\].
+    /// Greatest distance of the middles of some facets' chords from a surface \[m\].
     fn rough_sag(&self, surface: &Surface, facets: &[u32]) -> f64 {
-        let triangles = facets.iter().take(3).map(|&facet| self.net.triangles(facet)[0]);
-        triangles
-            .flat_map(|triangle| {
-                let [a, b, c] = self.net.part.mesh.corners(triangle);
-                [a + b, b + c, c + a]
-            })
-            .map(|sum| surface.distance(sum / 2.0).abs())
-            .fold(0.0, f64::max)
+        let middles = facets.iter().take(3).flat_map(|&facet| self.net.middles(facet));
+        middles.map(|middle| surface.distance(middle).abs()).fold(0.0, f64::max)
     }
 
     /// Fits and grows from `facets`, where the points are enough to test a fit and the first guess
