@@ -31,6 +31,9 @@ const PANEL: f64 = 0.8;
 /// Distance of the slip centre from the area's box, over the box's smaller half side, from which on
 /// the points of the area are taken.
 const OUTSIDE: f64 = 3.0;
+/// Half diagonal of the box around an area over the distance of the slip centre from its middle, up to
+/// which a plane piece takes the points of triangles.
+const FAR: f64 = 0.25;
 /// The area is cut where the pressure is `-CUT` of its greatest value, so that an edge of the
 /// polygon that lies exactly where the pressure ends is no tie. What it adds is of the order of
 /// the square.
@@ -510,7 +513,9 @@ impl Region {
         let near = OUTSIDE * omega.abs() * self.half.min_element();
         let centre = DVec2::new(-u2, u1) / omega;
         if outside.length_squared() > near * near {
-            if self.u.l == DVec2::ZERO {
+            // Long sides near the centre take fewer points by strips, which are cut either way.
+            let is_far = omega.abs() * self.half.length() <= FAR * off.length();
+            if is_far && self.u.l == DVec2::ZERO {
                 self.triangles::<BY>(twist, centre, &mut sum);
                 return sum;
             }
