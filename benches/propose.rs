@@ -6,7 +6,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a bench stops by panicking")]
 
-use std::f64::consts::TAU;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -14,6 +13,9 @@ use glam::{DVec2, DVec3};
 use gripfast::gripper;
 use gripfast::part::{Part, ReadOptions};
 use gripfast::propose::{ProposeOptions, Proposer};
+
+#[path = "../tests/support/lathe.rs"]
+mod lathe;
 
 /// Time over which runs of one part are averaged; the better of two such averages counts.
 const TIME: Duration = Duration::from_millis(400);
@@ -38,30 +40,15 @@ fn seconds<T>(work: &impl Fn() -> T) -> (f64, T) {
     unreachable!("the time comes to an end")
 }
 
-/// A closed surface over turns and rows of corners, from one end to the other.
-fn lathe(rows: u32, ends: [DVec3; 2], at: impl Fn(f64, f64) -> DVec3) -> Part {
-    const AROUND: u32 = 64;
-    let turn = |k: u32| TAU * f64::from(k) / f64::from(AROUND);
-    let along = |row: u32| f64::from(row) / f64::from(rows - 1);
-    let corners = (0..rows).flat_map(|row| (0..AROUND).map(move |k| (k, row)));
-    let mut vertices: Vec<DVec3> = corners.map(|(k, row)| at(turn(k), along(row))).collect();
-    let low = vertices.len() as u32;
-    vertices.extend(ends);
-    let mut triangles = Vec::new();
-    for k in 0..AROUND {
-        let next = (k + 1) % AROUND;
-        for row in 0..rows - 1 {
-            let [a, b] = [k, next].map(|k| row * AROUND + k);
-            triangles.extend([[a, b, b + AROUND], [a, b + AROUND, a + AROUND]]);
-        }
-        let top = (rows - 1) * AROUND;
-        triangles.extend([[next, k, low], [top + k, top + next, low + 1]]);
-    }
+/// A closed surface over turns and places along it from 0 to 1, in rows.
+fn turned(rows: u32, ends: [DVec3; 2], at: impl Fn(f64, f64) -> DVec3) -> Part {
+    let along = |row: f64| row / f64::from(rows - 1);
+    let (vertices, triangles) = lathe::lathe(64, rows, ends, |turn, row| at(turn, along(row)));
     Part::from_triangles("part", &vertices, &triangles).unwrap()
 }
 
 fn ellipsoid(half: DVec3) -> Part {
-    lathe(41, [DVec3::NEG_Z * half.z, DVec3::Z * half.z], move |turn, along| {
+    turned(41, [DVec3::NEG_Z * half.z, DVec3::Z * half.z], move |turn, along| {
         let (sine, cosine) = (3.0 * (along - 0.5)).sin_cos();
         half * DVec3::new(cosine * turn.cos(), cosine * turn.sin(), sine)
     })
@@ -70,14 +57,14 @@ fn ellipsoid(half: DVec3) -> Part {
 /// Straight from end to end, or bent outwards.
 fn round(radii: [f64; 2], bulge: f64) -> Part {
     let rows = 2 + 30 * u32::from(bulge > 0.0);
-    lathe(rows, [DVec3::ZERO, DVec3::Z * 0.06], move |turn, along| {
+    turned(rows, [DVec3::ZERO, DVec3::Z * 0.06], move |turn, along| {
         let radius = radii[0] + (radii[1] - radii[0]) * along + bulge * along * (1.0 - along);
         DVec3::new(radius * turn.cos(), radius * turn.sin(), 0.06 * along)
     })
 }
 
 fn prism(at: impl Fn(f64) -> DVec2) -> Part {
-    lathe(2, [DVec3::ZERO, DVec3::Z * 0.05], |turn, along| at(turn).extend(0.05 * along))
+    turned(2, [DVec3::ZERO, DVec3::Z * 0.05], |turn, along| at(turn).extend(0.05 * along))
 }
 
 /// `|x/a|^n + |y/b|^n = 1`.
@@ -96,7 +83,7 @@ fn lobed() -> Part {
 }
 
 fn bottle() -> Part {
-    lathe(61, [DVec3::ZERO, DVec3::Z * 0.12], |turn, along| {
+    turned(61, [DVec3::ZERO, DVec3::Z * 0.12], |turn, along| {
         let t = ((0.12 * along - 0.070) / 0.025).clamp(0.0, 1.0);
         let wide = DVec2::new(0.030 * turn.cos(), 0.018 * turn.sin());
         (wide * (1.0 - 0.6 * t * t * (3.0 - 2.0 * t))).extend(0.12 * along)

@@ -41,6 +41,20 @@ fn spread(x: u64) -> u64 {
     (x | x << 2) & 0x1249_2492_4924_9249
 }
 
+/// Where each item stands once they are sorted by keys below `keys`, those of one key in their order.
+pub(super) fn counted(items: impl Iterator<Item = usize> + Clone, keys: usize) -> Vec<u32> {
+    let mut next = vec![0_u32; keys + 1];
+    items.clone().for_each(|key| next[key + 1] += 1);
+    for key in 1..next.len() {
+        next[key] += next[key - 1];
+    }
+    let place = |key: usize| {
+        next[key] += 1;
+        next[key] - 1
+    };
+    items.map(place).collect()
+}
+
 /// Sorts vertices along a curve that fills the part's box (Morton's), on which near ones stay near
 /// in memory, and triangles by their vertices, the lowest one first in each. The same triangles in
 /// another order, with another corner first, or with their vertices numbered otherwise, give the
@@ -66,24 +80,19 @@ pub(super) fn sort(soup: &mut Soup) {
         rank[vertex as usize] = number;
     }
     soup.vertices = order.iter().map(|entry| points[entry.1 as usize]).collect();
-    // By the lowest vertex first: few triangles share one.
-    let mut next = vec![0_u32; rank.len() + 1];
     for triangle in &mut soup.triangles {
         *triangle = triangle.map(|vertex| rank[vertex as usize]);
-        next[triangle[0].min(triangle[1]).min(triangle[2]) as usize + 1] += 1;
     }
-    for vertex in 1..next.len() {
-        next[vertex] += next[vertex - 1];
-    }
+    // By the lowest vertex first: few triangles share one.
+    let lowest = soup.triangles.iter().map(|&[a, b, c]| a.min(b).min(c) as usize);
+    let places = counted(lowest, rank.len());
     let mut sorted = vec![([0_u32; 3], 0_u32); soup.triangles.len()];
-    for (triangle, number) in soup.triangles.iter().zip(0_u32..) {
+    for ((triangle, number), &place) in soup.triangles.iter().zip(0_u32..).zip(&places) {
         let mut triangle = *triangle;
         let lowest = (0..3).min_by_key(|&corner| triangle[corner]).unwrap_or(0);
         triangle.rotate_left(lowest);
-        let slot = &mut next[triangle[0] as usize];
         // Fits: MAX_TRIANGLES leaves room for half-edges.
-        sorted[*slot as usize] = (triangle, 3 * number + lowest as u32);
-        *slot += 1;
+        sorted[place as usize] = (triangle, 3 * number + lowest as u32);
     }
     let shared = |a: &([u32; 3], u32), b: &([u32; 3], u32)| a.0[0] == b.0[0];
     sorted.chunk_by_mut(shared).for_each(<[_]>::sort_unstable);
@@ -105,20 +114,8 @@ pub(super) fn restore(part: &mut Repaired) -> Vec<u32> {
         points[vertex as usize] = point;
     }
     part.mesh.vertices = points;
-    // A counting sort by the triangle of the file.
-    let mut next = vec![0_u32; triangles.iter().max().map_or(0, |&last| last as usize / 3 + 2)];
-    for &origin in &triangles {
-        next[origin as usize / 3 + 1] += 1;
-    }
-    for index in 1..next.len() {
-        next[index] += next[index - 1];
-    }
-    let mut number = vec![0_u32; triangles.len()];
-    for (number, &origin) in number.iter_mut().zip(&triangles) {
-        let slot = &mut next[origin as usize / 3];
-        *number = *slot;
-        *slot += 1;
-    }
+    let of_file = triangles.iter().map(|&origin| origin as usize / 3);
+    let number = counted(of_file.clone(), of_file.max().map_or(0, |last| last + 1));
     let half_of = |half: u32| {
         let triangle = (half / 3) as usize;
         3 * number[triangle] + (half % 3 + triangles[triangle] % 3) % 3

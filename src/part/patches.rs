@@ -9,6 +9,7 @@ use rustc_hash::FxHashMap;
 
 use super::Mesh;
 use super::given::GivenFaces;
+use super::order::counted;
 use super::regions::{Flatness, Sums, is_flat, twice_normal};
 use super::repair::Repaired;
 use super::topology::NONE;
@@ -52,17 +53,12 @@ impl Patches {
         drop(level);
         // The triangles of each set one after the other, the sets by their first ones.
         let roots: Vec<u32> = (0..count).map(|triangle| sets.root(triangle) as u32).collect();
-        let mut ends = vec![0_u32; count + 1];
-        roots.iter().for_each(|&root| ends[root as usize + 1] += 1);
-        for root in 1..ends.len() {
-            ends[root] += ends[root - 1];
-        }
         let mut members = vec![0_u32; count];
-        for (&root, triangle) in roots.iter().zip(0..) {
-            let slot = &mut ends[root as usize];
-            members[*slot as usize] = triangle;
-            *slot += 1;
+        let places = counted(roots.iter().map(|&root| root as usize), count);
+        for (&place, triangle) in places.iter().zip(0..) {
+            members[place as usize] = triangle;
         }
+        drop(places);
         let mut patches = Self {
             order: Vec::with_capacity(count),
             begins: vec![0],

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 pub(crate) mod block;
 pub(crate) mod grips;
+pub(crate) mod lathe;
 pub(crate) mod random;
 pub(crate) mod report;
 

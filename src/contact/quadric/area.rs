@@ -63,7 +63,8 @@ impl Region {
         add(&add_nodes(self, element, twist, range, rules, BY), sum);
     }
 
-    /// Points of an area with straight sides, by triangles from one of its corners.
+    /// Points of an area with straight sides, by triangles from one of its corners, about a slip centre
+    /// as far away as [`super::FAR`] says.
     pub(super) fn triangles<const BY: bool>(
         &self,
         twist: [f64; 3],
@@ -72,45 +73,21 @@ impl Region {
     ) {
         let Some(first) = self.elements.first() else { return };
         let base = first.a;
-        let mut triangles =
-            Triangles { list: [Triangle::default(); MOST], count: 0, lanes: [[0.0; LANES]; 19] };
-        for Element { a, b, .. } in &self.elements {
-            if *a != base && *b != base {
-                self.triangle::<BY>([base, *a, *b], (twist, centre), 0, &mut triangles);
+        let (mut list, mut count) = ([Triangle::default(); MOST], 0);
+        let mut lanes = [[0.0; LANES]; 19];
+        for &Element { a, b, .. } in &self.elements {
+            if a == base || b == base {
+                continue;
             }
+            if count == MOST {
+                add_triangles(self, twist, &list, &mut lanes, BY);
+                count = 0;
+            }
+            list[count] = Triangle::new([base, a, b], centre);
+            count += 1;
         }
-        triangles.flush::<BY>(self, twist);
-        add(&triangles.lanes, sum);
-    }
-
-    /// A triangle, cut until the slip centre is far from each part.
-    fn triangle<const BY: bool>(
-        &self,
-        [a, b, c]: [DVec2; 3],
-        about: ([f64; 3], DVec2),
-        depth: u32,
-        triangles: &mut Triangles,
-    ) {
-        let [one, two, three] = [(b - a).length(), (c - b).length(), (a - c).length()];
-        let longest = one.max(two).max(three);
-        let distance = ((a + b + c) / 3.0 - about.1).length();
-        if longest > PANEL * distance && depth < 40 {
-            let [far, from, to] = match longest {
-                side if side == one => [c, a, b],
-                side if side == two => [a, b, c],
-                _ => [b, c, a],
-            };
-            let middle = 0.5 * (from + to);
-            self.triangle::<BY>([far, from, middle], about, depth + 1, triangles);
-            self.triangle::<BY>([far, middle, to], about, depth + 1, triangles);
-            return;
-        }
-        let points = enough(longest / (distance - 0.5 * longest).max(0.5 * longest));
-        if triangles.count == MOST {
-            triangles.flush::<BY>(self, about.0);
-        }
-        triangles.list[triangles.count] = Triangle { a, sides: [b - a, c - a], points };
-        triangles.count += 1;
+        add_triangles(self, twist, &list[..count], &mut lanes, BY);
+        add(&lanes, sum);
     }
 }
 
@@ -141,17 +118,14 @@ struct Triangle {
 /// Triangles taken together, so that one call serves many.
 const MOST: usize = 16;
 
-/// What is still to be summed of an area.
-struct Triangles {
-    list: [Triangle; MOST],
-    count: usize,
-    lanes: Lanes,
-}
-
-impl Triangles {
-    fn flush<const BY: bool>(&mut self, region: &Region, twist: [f64; 3]) {
-        add_triangles(region, twist, &self.list[..self.count], &mut self.lanes, BY);
-        self.count = 0;
+impl Triangle {
+    fn new([a, b, c]: [DVec2; 3], centre: DVec2) -> Self {
+        let sides = [b - a, c - a];
+        let longest = sides[0].length().max(sides[1].length()).max((c - b).length());
+        let distance = ((a + b + c) / 3.0 - centre).length();
+        // As seen from the nearer end.
+        let points = enough(longest / (distance - 0.5 * longest).max(0.5 * longest));
+        Self { a, sides, points }
     }
 }
 

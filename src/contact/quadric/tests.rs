@@ -425,7 +425,7 @@ proptest! {
         corners in vec(0.0..TAU, 3..8),
         narrow in 0.0..2.5_f64,
         (angle, slope, c) in (0.0..TAU, 0.0..2.0_f64, 0.0..1.5_f64),
-        (away, towards) in (0.5..8.0_f64, 0.0..TAU),
+        (away, towards) in (0.0..8.0_f64, 0.0..TAU),
     ) {
         let mut corners = corners;
         corners.sort_by(f64::total_cmp);
@@ -435,9 +435,9 @@ proptest! {
         let region = Region::new(std::slice::from_ref(&ring), u);
         let (area, load) = region.area_and_load();
         prop_assume!(area > 1e-3 * thin.y && load > 1e-3 * thin.y);
-        // Beside the box, from as near as triangles are taken for on.
-        let reach = region.half + OUTSIDE * region.half.min_element();
-        let c = region.middle + 2.0_f64.sqrt() * reach * away.exp2() * DVec2::from_angle(towards);
+        // From as near as triangles are taken for on.
+        let c = region.middle
+            + region.half.length() / FAR * away.exp2() * DVec2::from_angle(towards);
         for sign in [1.0, -1.0] {
             let twist = [c.y, -c.x, 1.0].map(|x| sign * x);
             let (mut got, mut wanted): (Sums, Sums) = Default::default();

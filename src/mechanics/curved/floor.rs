@@ -116,8 +116,7 @@ impl Floors {
             }
         }
         pressed.push((force + change, last));
-        let spans = pressed.windows(2).map(|pair| {
-            let [(low, from), (high, to)] = pair else { unreachable!("pairs") };
+        let spans = pressed.iter().zip(&pressed[1..]).map(|((low, from), (high, to))| {
             let bent = |k: usize| if is_line { 0.0 } else { from[k].apart(&to[k]) };
             Span {
                 force: [*low, *high],

@@ -273,9 +273,11 @@ impl Screen<'_> {
         place.delta = [one.delta, two.delta];
         let faces = [&one, &two];
         let w = self.problem.along(faces, self.problem.moment_beyond(faces), DVec2::ZERO);
-        let enough = slip::enough(space, faces, *distance, w)?;
-        if enough * (1.0 + ROUNDING) < value {
-            return Some((Compared::Below, place, enough));
+        if value > 0.0 {
+            let enough = slip::enough(space, faces, *distance, w)?;
+            if enough * (1.0 + ROUNDING) < value {
+                return Some((Compared::Below, place, enough));
+            }
         }
         // From the motion that the load moves most.
         let moved = self.known.iter().filter(|(_, place)| place.mode != Mode::Off);
