@@ -30,6 +30,8 @@ const NARROWEST: f64 = 5e-4;
 /// A planar face before its outline is known.
 struct Flat {
     triangles: Vec<u32>,
+    /// Whether it may be the flattest spot of a smooth surface.
+    is_spot: bool,
     stated: Option<StatedFlat>,
 }
 
@@ -118,7 +120,7 @@ fn recognised(
     if faceted {
         facets.is_facet.fill(false);
         part.health.warnings.extend(noise.map(|noise| noisy(noise, taken)));
-        return (flats(part, &given, &regions, &facets), Vec::new());
+        return (flats(part, &given, &regions, &facets, taken), Vec::new());
     }
     let Curves { faces: curved, is_curved, flats } =
         curves::curved_faces(part, &regions, &facets.borders, &given, floor);
@@ -128,12 +130,15 @@ fn recognised(
     for flat in flats {
         facets.is_facet[flat as usize] = false;
     }
-    let planar = self::flats(part, &given, &regions, &facets);
+    let mut planar = self::flats(part, &given, &regions, &facets, taken);
     let mut is_taken = vec![false; part.mesh.triangles.len()];
-    let triangles = planar.iter().map(|face| &face.triangles);
+    let triangles = planar.iter().filter(|face| !face.is_spot).map(|face| &face.triangles);
     let triangles = triangles.chain(curved.iter().map(|face| &face.triangles)).flatten();
     triangles.for_each(|&triangle| is_taken[triangle as usize] = true);
     let free = curves::free_faces(part, &regions, &is_taken);
+    let triangles = free.iter().flat_map(|face| &face.triangles);
+    triangles.for_each(|&triangle| is_taken[triangle as usize] = true);
+    planar.retain(|face| !face.is_spot || !is_taken[face.triangles[0] as usize]);
     part.health.warnings.extend(noise.map(|noise| noisy(noise, taken)));
     (planar, curved.into_iter().chain(free).collect())
 }
@@ -175,11 +180,17 @@ fn fitted_faces(
     for (index, is_facet) in facets.is_facet.iter_mut().enumerate() {
         *is_facet |= given.face(regions.triangles(index)[0]).is_none();
     }
-    (flats(part, given, &regions, &facets), curves::given_faces(part, given))
+    (flats(part, given, &regions, &facets, flatness.distance), curves::given_faces(part, given))
 }
 
-/// The planar faces among the regions.
-fn flats(part: &Repaired, given: &GivenFaces, regions: &Regions, facets: &Facets) -> Vec<Flat> {
+/// The planar faces among the regions. `within`: distance from a plane that corners may have \[m\].
+fn flats(
+    part: &Repaired,
+    given: &GivenFaces,
+    regions: &Regions,
+    facets: &Facets,
+    within: f64,
+) -> Vec<Flat> {
     let mut flats = Vec::new();
     for (index, region) in regions.all.iter().enumerate() {
         let triangles = regions.triangles(index);
@@ -189,7 +200,8 @@ fn flats(part: &Repaired, given: &GivenFaces, regions: &Regions, facets: &Facets
         if facets.is_facet[index] || (is_narrow && stated.is_none()) {
             continue;
         }
-        flats.push(Flat { triangles: triangles.to_vec(), stated });
+        let is_spot = stated.is_none() && facets.is_spot(part, regions, index, within);
+        flats.push(Flat { triangles: triangles.to_vec(), is_spot, stated });
     }
     flats
 }
@@ -203,7 +215,7 @@ fn outline(part: &Repaired, flats: Vec<Flat>) -> Vec<PlanarFace> {
     }
     let mut faces: Vec<PlanarFace> = Vec::new();
     for (flat, number) in flats.into_iter().zip(0..) {
-        let Flat { triangles, stated } = flat;
+        let Flat { triangles, stated, .. } = flat;
         let (order, normal, centre) = match &stated {
             Some(StatedFlat { plane: (origin, normal), .. }) => {
                 let centre = regions::middle(&part.mesh, &triangles, *origin, *normal);

@@ -16,6 +16,11 @@ const ARC: f64 = 0.01;
 /// Side of a square, as a share of the diagonal, below whose area a region with one such neighbour
 /// is taken for a facet.
 const SMALL: f64 = 0.02;
+/// Share of the distance from a plane that corners may lie off it which those of the flattest spot
+/// of a smooth surface use, at least: it ends where the tolerance does.
+const SPOT: f64 = 0.25;
+/// Angle between such a spot and the facets about it, at most: 1 degree.
+const LEVEL: f64 = std::f64::consts::PI / 180.0;
 
 /// Angle between the halves of a plane that noise has folded \[rad\]: 0.1 degrees.
 const FOLD: f64 = 2e-3;
@@ -80,6 +85,28 @@ impl Facets {
             })
             .collect();
         facets
+    }
+
+    /// Whether a region lies among facets that are nearly level with it and ends only where its
+    /// corners would lie more than `distance` \[m\] off its plane, as the flattest spot of a smooth
+    /// surface does, which is no plane.
+    pub(super) fn is_spot(
+        &self,
+        part: &Repaired,
+        regions: &Regions,
+        index: usize,
+        distance: f64,
+    ) -> bool {
+        let plane = &regions.all[index].plane;
+        let is_level = |border: &Border| {
+            let other = &regions.all[border.other as usize].plane;
+            plane.normal.angle_between(other.normal) < LEVEL
+        };
+        let is_off = |&triangle: &u32| {
+            let corners = part.mesh.corners(triangle);
+            corners.iter().any(|&corner| plane.distance(corner) > SPOT * distance)
+        };
+        self.borders.of(index).iter().all(is_level) && regions.triangles(index).iter().any(is_off)
     }
 
     /// Neighbours with which a region may lie on one curved surface.
@@ -249,6 +276,50 @@ mod tests {
             }
             let part = Part::from_triangles("cylinder", &vertices, &triangles).unwrap();
             assert_eq!(part.faces.len(), 2, "{count}");
+        }
+    }
+
+    /// A superellipsoid of the fourth degree, from an octahedron whose edges are cut into `count`.
+    fn superellipsoid(count: u32) -> Part {
+        let at = |a: DVec3, b: DVec3, c: DVec3, i: u32, j: u32| {
+            let [u, v] = [i, j].map(|k| f64::from(k) / f64::from(count));
+            let ray =
+                ((a + u * (b - a) + v * (c - a)).normalize()) / DVec3::new(0.014, 0.018, 0.025);
+            let powers = (ray * ray) * (ray * ray);
+            ray * DVec3::new(0.014, 0.018, 0.025) / powers.element_sum().powf(0.25)
+        };
+        let mut vertices: Vec<DVec3> = Vec::new();
+        for signs in 0..8 {
+            let sign = |bit: u32| if signs >> bit & 1 == 0 { 1.0 } else { -1.0 };
+            let (a, mut b, mut c) = (DVec3::X * sign(0), DVec3::Y * sign(1), DVec3::Z * sign(2));
+            if sign(0) * sign(1) * sign(2) < 0.0 {
+                std::mem::swap(&mut b, &mut c);
+            }
+            for i in 0..count {
+                for j in 0..count - i {
+                    vertices
+                        .extend([(i, j), (i + 1, j), (i, j + 1)].map(|(i, j)| at(a, b, c, i, j)));
+                    if i + j + 1 < count {
+                        let corners = [(i + 1, j), (i + 1, j + 1), (i, j + 1)];
+                        vertices.extend(corners.map(|(i, j)| at(a, b, c, i, j)));
+                    }
+                }
+            }
+        }
+        let triangles: Vec<[u32; 3]> =
+            (0..vertices.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let part = Part::from_triangles("superellipsoid", &vertices, &triangles).unwrap();
+        assert!(part.health.watertight, "{:?}", part.health);
+        part
+    }
+
+    /// About the poles some facets lie in one plane within the tolerance.
+    #[test]
+    fn the_flattest_spots_of_free_form_are_no_planes() {
+        for count in [24, 32, 40, 50] {
+            let part = superellipsoid(count);
+            let planes: Vec<f64> = part.faces.iter().map(|face| face.area).collect();
+            assert_eq!((planes.len(), part.curved.len()), (0, 1), "{count} {planes:?}");
         }
     }
 }

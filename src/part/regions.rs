@@ -40,7 +40,7 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    fn distance(&self, point: DVec3) -> f64 {
+    pub(super) fn distance(&self, point: DVec3) -> f64 {
         (self.normal.dot(point) - self.offset).abs()
     }
 }
