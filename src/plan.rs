@@ -106,8 +106,11 @@ pub struct Progress {
 /// Sees a run while it goes; every method does nothing unless it is overridden, and `()` sees
 /// nothing at all.
 pub trait Observer: Send {
-    /// After every chunk of candidates, and once before the first.
+    /// Now and then, and once before the first candidate.
     fn progress(&mut self, _progress: Progress) {}
+
+    /// The search is over: the numbers that only so many listed grips have are made now.
+    fn finishing(&mut self, _grips: usize) {}
 
     /// The grips of a chunk in the order of their ids, each with its worst load solved, also those
     /// that do not hold ([`crate::model::Status::holds`]). Their ranks are not known yet.
@@ -307,7 +310,7 @@ impl Plan {
         let misses = self.misses(proposer, &lost);
         let none = complete && found.collector.is_empty();
         let nearest = none.then(|| self.nearest_lost(proposer, &lost)).flatten();
-        let (set, shown) = self.finish(proposer, assessor, found, lost)?;
+        let (set, shown) = self.finish(proposer, assessor, found, lost, observer)?;
         if complete && set.grips.is_empty() {
             let rejections = &set.summary.rejections;
             let tally = proposer.tally();
@@ -344,6 +347,7 @@ impl Plan {
         assessor: &Assessor<'_>,
         found: Found,
         lost: BTreeMap<String, Vec<Negative>>,
+        observer: &mut dyn Observer,
     ) -> Result<(GripSet, Vec<u64>)> {
         let selection = &self.request.selection;
         let (low, high) = self.part.mesh.bounding_box();
@@ -355,6 +359,7 @@ impl Plan {
             *rejections.entry(reason.clone()).or_default() += count;
         }
         let mut grips = self.kept(ranking.grips, size);
+        observer.finishing(grips.len());
         assessor.finish(&mut grips);
         let comparison = selection
             .compare

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::score::{Scored, TIE, usable};
 use super::top::{Beaten, Best, race};
+use super::watch::Watch;
 use crate::mechanics::curved::{Compared, Pads, Screen};
 use crate::mechanics::refused;
 use crate::model::{Score, Status, Wrench};
@@ -38,15 +39,29 @@ pub fn score_curved(problems: &[CurvedProblem<'_>], polish: Polish) -> Vec<Score
         .collect()
 }
 
-/// The same without the grips that cannot be among the `best`, as [`super::Backend::score_best`].
-pub fn score_curved_best(
+/// The worst load of each grip, as far as `watch` does not stop it: `None` for the others. With `best`
+/// those that cannot be among them are outranked, as [`super::Backend::score_best`] has it; `merit` as
+/// there.
+pub(crate) fn score_curved_watched(
     problems: &[CurvedProblem<'_>],
-    best: &mut Best,
+    best: Option<&mut Best>,
     merit: &(dyn Fn(usize, f64) -> f64 + Sync),
-) -> Vec<Scored> {
+    watch: &Watch<'_>,
+) -> Vec<Option<Scored>> {
+    let score = |index: usize, beaten: Option<&Beaten<'_>>| {
+        if watch.is_stopped() {
+            return None;
+        }
+        let scored = problems[index].score(beaten);
+        watch.count(1);
+        Some(scored)
+    };
+    let Some(best) = best else {
+        return (0..problems.len()).into_par_iter().map(|index| score(index, None)).collect();
+    };
     let promise = |(index, problem): (usize, &CurvedProblem<'_>)| merit(index, problem.about());
     let promise = problems.par_iter().enumerate().map(promise).collect();
-    race(promise, best, merit, &|index, beaten| problems[index].score(Some(beaten)))
+    race(promise, best, merit, &|index, beaten| score(index, Some(beaten)))
 }
 
 /// Loads looked at so far.

@@ -35,6 +35,7 @@ mod table;
 mod top;
 #[cfg(test)]
 mod twins;
+mod watch;
 mod worst;
 
 #[cfg(feature = "gpu")]
@@ -45,9 +46,11 @@ pub use gpu::{
 
 pub use crate::request::{Choice, Polish};
 pub use choice::{Selection, select};
-pub use curved::{CurvedProblem, score_curved, score_curved_best};
+pub(crate) use curved::score_curved_watched;
+pub use curved::{CurvedProblem, score_curved};
 pub use job::Backend;
 pub use problem::{Batch, F32_TOLERANCE, LOAD_TOLERANCE, Pose, Problem, Seed, SeedStatus};
 pub use score::{ScoreOptions, Scored};
 pub use seeds::{NEGATED, RING, SeedSet};
 pub use top::Best;
+pub use watch::Watch;

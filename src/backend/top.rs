@@ -73,14 +73,17 @@ impl Backend {
                 let merit = |index: usize, mu: f64| merit(range.start + index, mu);
                 let lower = |(index, case): (usize, &Case<'_>)| merit(index, case.lower());
                 let promise = cases.par_iter().enumerate().map(lower).collect();
-                race(promise, best, &merit, &|index, beaten| cases[index].score(Some(beaten)))
+                let score =
+                    |index: usize, beaten: &Beaten<'_>| Some(cases[index].score(Some(beaten)));
+                race(promise, best, &merit, &score).into_iter().flatten().collect()
             },
         )
     }
 }
 
-/// The answer of a grip by its place, which may end as soon as its friction is beaten.
-type Entry<'a> = &'a (dyn Fn(usize, &Beaten<'_>) -> Scored + Sync);
+/// The answer of a grip by its place, which may end as soon as its friction is beaten; `None` where it
+/// is stopped.
+type Entry<'a> = &'a (dyn Fn(usize, &Beaten<'_>) -> Option<Scored> + Sync);
 /// Whether a grip that needs this friction at least is surely not among the best.
 pub(super) type Beaten<'a> = dyn Fn(f64) -> bool + Sync + 'a;
 
@@ -90,7 +93,7 @@ pub(super) fn race(
     best: &mut Best,
     merit: &(dyn Fn(usize, f64) -> f64 + Sync),
     score: Entry<'_>,
-) -> Vec<Scored> {
+) -> Vec<Option<Scored>> {
     let mut scored: Vec<Option<Scored>> = vec![None; promise.len()];
     let mut order: Vec<(f64, usize)> = promise.into_iter().zip(0..).collect();
     order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
@@ -98,19 +101,20 @@ pub(super) fn race(
     while !rest.is_empty() {
         let (now, later) = rest.split_at(round.min(rest.len()));
         let known = &*best;
-        let answers: Vec<Scored> = now
+        let answers: Vec<Option<Scored>> = now
             .par_iter()
             .map(|&(_, index)| score(index, &|mu| known.beats(merit(index, mu))))
             .collect();
         for (&(_, index), answer) in now.iter().zip(answers) {
-            if let Some(mu) = answer.worst.as_ref().and_then(|(_, score)| usable(score)) {
+            let worst = answer.as_ref().and_then(|answer| answer.worst.as_ref());
+            if let Some(mu) = worst.and_then(|(_, score)| usable(score)) {
                 best.insert(merit(index, mu));
             }
-            scored[index] = Some(answer);
+            scored[index] = answer;
         }
         (rest, round) = (later, (2 * round).min(*ROUNDS.end()));
     }
-    scored.into_iter().flatten().collect()
+    scored
 }
 
 #[cfg(test)]

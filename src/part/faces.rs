@@ -115,10 +115,11 @@ fn recognised(
             fine.distance * 1e6
         ));
     }
-    let noise = noise::measure(part, &given, &regions);
     let taken = if is_rough { rough } else { fine }.distance;
+    let mut is_smooth = vec![false; part.mesh.triangles.len()];
     if faceted {
         facets.is_facet.fill(false);
+        let noise = noise::measure(part, &given, &regions, &is_smooth);
         part.health.warnings.extend(noise.map(|noise| noisy(noise, taken)));
         return (flats(part, &given, &regions, &facets, taken), Vec::new());
     }
@@ -137,8 +138,9 @@ fn recognised(
     triangles.for_each(|&triangle| is_taken[triangle as usize] = true);
     let free = curves::free_faces(part, &regions, &is_taken);
     let triangles = free.iter().flat_map(|face| &face.triangles);
-    triangles.for_each(|&triangle| is_taken[triangle as usize] = true);
-    planar.retain(|face| !face.is_spot || !is_taken[face.triangles[0] as usize]);
+    triangles.for_each(|&triangle| is_smooth[triangle as usize] = true);
+    planar.retain(|face| !face.is_spot || !is_smooth[face.triangles[0] as usize]);
+    let noise = noise::measure(part, &given, &regions, &is_smooth);
     part.health.warnings.extend(noise.map(|noise| noisy(noise, taken)));
     (planar, curved.into_iter().chain(free).collect())
 }

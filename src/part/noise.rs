@@ -60,8 +60,17 @@ impl Noise {
 /// Looks for planes that fell into single triangles when regions were grown as `fine` ones: patches
 /// that a wide tolerance gathers, most of whose area lies in single triangles, bent both ways. A
 /// tessellated cylinder falls into strips, and a sphere into triangles that are bent one way.
-pub(super) fn measure(part: &Repaired, given: &GivenFaces, fine: &Regions) -> Option<Noise> {
-    let single = |region: u32| fine.triangles(region as usize).len() == 1;
+/// `is_smooth`: triangles of free form, which were seen to be without noise.
+pub(super) fn measure(
+    part: &Repaired,
+    given: &GivenFaces,
+    fine: &Regions,
+    is_smooth: &[bool],
+) -> Option<Noise> {
+    let single = |region: u32| match fine.triangles(region as usize) {
+        &[triangle] => !is_smooth[triangle as usize],
+        _ => false,
+    };
     let total: f64 = fine.all.iter().map(|region| region.area).sum();
     let alone: f64 = fine
         .all

@@ -2,14 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use glam::DVec2;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use crate::backend::{
-    Backend, Batch, Best, CurvedProblem, Pose, Problem, ScoreOptions, Scored, SeedSet,
-    score_curved, score_curved_best,
+    Backend, Batch, Best, CurvedProblem, Pose, Problem, ScoreOptions, Scored, SeedSet, Watch,
+    score_curved, score_curved_watched,
 };
 use crate::error::{Error, Result};
 use crate::geometry::patch_area;
@@ -145,6 +146,15 @@ pub struct Assessor<'a> {
     pub seeds: &'a SeedSet,
 }
 
+/// What a call that may be stopped has come to.
+#[derive(Debug)]
+pub(super) struct AssessedGrips {
+    /// In order, those that can be among the best.
+    pub(super) ranked: Vec<RankedGrip>,
+    /// How many were left unscored.
+    pub(super) left: usize,
+}
+
 /// Loads of one call of the backend: bounds the memory whatever the number of grips and loads.
 const LOADS_AT_ONCE: usize = 1 << 20;
 /// The same where the answer of every load is kept for a while, some 250 bytes each.
@@ -184,25 +194,23 @@ impl Assessor<'_> {
     /// # Errors
     /// As [`Backend::score`].
     pub fn assess(&self, grips: Vec<Grip>) -> Result<Vec<RankedGrip>> {
-        self.assess_blocks(grips, None)
+        let (stop, mut tell) = (AtomicBool::new(false), |_| ());
+        Ok(self.assess_watched(grips, None, &Watch::new(&stop, &mut tell))?.ranked)
     }
 
-    /// As [`Assessor::assess`], but without the grips whose bounds show that they cannot be among
-    /// the `best`, the merits so far. The weight `k1` must not be negative.
+    /// As [`Assessor::assess`] until `watch` stops it. With `best`, the merits so far, without the grips
+    /// whose bounds show that they cannot be among them; the weight `k1` must then not be negative.
     ///
     /// # Errors
-    /// As [`Backend::score_best`].
-    pub fn assess_best(&self, grips: Vec<Grip>, best: &mut Best) -> Result<Vec<RankedGrip>> {
-        self.assess_blocks(grips, Some(best))
-    }
-
-    fn assess_blocks(
+    /// As [`Backend::score`].
+    pub(super) fn assess_watched(
         &self,
         grips: Vec<Grip>,
         mut best: Option<&mut Best>,
-    ) -> Result<Vec<RankedGrip>> {
+        watch: &Watch<'_>,
+    ) -> Result<AssessedGrips> {
         let most = |loads: usize| (loads / self.loads.len().max(1)).max(1);
-        let mut ranked = Vec::with_capacity(grips.len());
+        let mut done = AssessedGrips { ranked: Vec::with_capacity(grips.len()), left: 0 };
         let mut grips = grips.into_iter().peekable();
         while let Some(first) = grips.peek() {
             // Those on planes and the others by turns: mostly all of one kind.
@@ -214,14 +222,20 @@ impl Assessor<'_> {
             {
                 block.push(grip);
             }
+            if watch.is_stopped() {
+                done.left += block.len();
+                continue;
+            }
             let best = best.as_deref_mut();
-            ranked.extend(if curved {
-                self.assess_curved(block, best)
+            if curved {
+                self.assess_curved(block, best, watch, &mut done);
             } else {
-                self.assess_plane(block, best)?
-            });
+                let count = block.len();
+                done.ranked.extend(self.assess_plane(block, best)?);
+                watch.count(count);
+            }
         }
-        Ok(ranked)
+        Ok(done)
     }
 
     fn assess_plane(&self, grips: Vec<Grip>, best: Option<&mut Best>) -> Result<Vec<RankedGrip>> {
@@ -248,7 +262,13 @@ impl Assessor<'_> {
         Ok(jobs.map(measure).collect())
     }
 
-    fn assess_curved(&self, grips: Vec<Grip>, best: Option<&mut Best>) -> Vec<RankedGrip> {
+    fn assess_curved(
+        &self,
+        grips: Vec<Grip>,
+        best: Option<&mut Best>,
+        watch: &Watch<'_>,
+        done: &mut AssessedGrips,
+    ) {
         let ready = Surfaced::new(grips.iter(), self.settings.force);
         let wrenches: Vec<Vec<Wrench>> = grips.par_iter().map(|grip| self.wrenches(grip)).collect();
         let problems: Vec<CurvedProblem<'_>> = grips
@@ -262,22 +282,18 @@ impl Assessor<'_> {
         };
         let levers: Vec<FreeTwistOut> = grips.par_iter().map(lever).collect();
         let least = |lever: &FreeTwistOut| lever.least_lever().unwrap_or(0.0);
-        let scored = match best {
-            None => score_curved(&problems, self.settings.score.polish),
-            Some(best) => {
-                let alpha = |(grip, lever)| self.alpha(grip, least(lever));
-                let alphas: Vec<f64> = grips.iter().zip(&levers).map(alpha).collect();
-                let merit = |index: usize, mu: f64| self.settings.merit(mu, alphas[index]);
-                score_curved_best(&problems, best, &merit)
-            }
-        };
+        let alpha = |(grip, lever)| self.alpha(grip, least(lever));
+        let alphas: Vec<f64> = grips.iter().zip(&levers).map(alpha).collect();
+        let merit = |index: usize, mu: f64| self.settings.merit(mu, alphas[index]);
+        let scored = score_curved_watched(&problems, best, &merit, watch);
+        done.left += scored.iter().filter(|scored| scored.is_none()).count();
         let jobs = grips.into_par_iter().zip(levers).zip(scored);
-        jobs.filter(|(_, scored)| !scored.outranked)
-            .map(|((grip, lever), scored)| {
-                let margin = |wrench: &Wrench| lever.margin(self.settings.force, wrench);
-                self.measure(grip, &scored, least(&lever), &margin)
-            })
-            .collect()
+        let measured = jobs.filter_map(|((grip, lever), scored)| {
+            let scored = scored.filter(|scored| !scored.outranked)?;
+            let margin = |wrench: &Wrench| lever.margin(self.settings.force, wrench);
+            Some(self.measure(grip, &scored, least(&lever), &margin))
+        });
+        done.ranked.par_extend(measured);
     }
 
     fn curved_problem<'a>(
@@ -422,7 +438,7 @@ impl Assessor<'_> {
                 None => (None, friction.and_then(|_| Pads::new(&ranked.grip.contact))),
             };
             if let Some(pads) = curved {
-                let answer = pads.solve(distance, force, wrench);
+                let answer = pads.solve_again(distance, force, wrench, ranked.worst.status);
                 (ranked.faces, ranked.notes) = (answer.faces, answer.notes);
             }
             let Some(friction) = friction else { return };

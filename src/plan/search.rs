@@ -7,9 +7,10 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
+use super::assess::AssessedGrips;
 use super::checkpoint::{self, Checkpoint};
 use super::{Assessor, Collector, Observer, Plan, Progress, Settings};
-use crate::backend::Best;
+use crate::backend::{Best, Watch};
 use crate::error::{Error, Result};
 use crate::model::Grip;
 use crate::propose::{self, Proposer};
@@ -18,6 +19,8 @@ use crate::propose::{self, Proposer};
 const NOT_CHOSEN: &str = "not_chosen";
 /// Among the rejections: grips that are another one with the jaws exchanged.
 const FLIP: &str = "flip";
+/// Among the rejections: grips that an interrupt has left unscored.
+const INTERRUPTED: &str = "interrupted";
 
 /// A checkpoint costs at most one part in this many of the time.
 const LEAST_PAUSE: u32 = 20;
@@ -185,11 +188,20 @@ impl Search<'_> {
         while let Some(chunk) = proposer.next() {
             let (grips, left_out) = self.chosen(chunk.grips);
             let proposed = grips.len();
-            let scored = match &mut best {
-                Some(best) => self.assessor.assess_best(grips, best),
-                None => self.assessor.assess(grips),
+            let mut told = done.candidates();
+            let mut tell = |scored: usize| {
+                // As far into the chunk as grips of it are scored.
+                let part = chunk.candidates as u128 * scored as u128 / proposed.max(1) as u128;
+                let known = progress(&done, &found);
+                let now = known.done + part as u64;
+                if told < now && now < known.done + chunk.candidates {
+                    told = now;
+                    observer.progress(Progress { done: now, ..known });
+                }
             };
-            let scored = match scored {
+            let watch = Watch::new(stop, &mut tell);
+            let scored = self.assessor.assess_watched(grips, best.as_mut(), &watch);
+            let AssessedGrips { ranked: scored, left } = match scored {
                 Ok(scored) => scored,
                 Err(error) => {
                     // The chunk that failed is the first of a run that resumes this one.
@@ -199,13 +211,22 @@ impl Search<'_> {
                     return Err(error);
                 }
             };
+            if left > 0 {
+                // So is one that was stopped on the way; what it has found still counts here.
+                found.complete = false;
+                found.checkpoint = self.save(&done, &found, observer);
+                found.collector.reject(INTERRUPTED.to_owned(), left as u64);
+            }
             observer.grips(&scored);
-            found.collector.outrank((proposed - scored.len()) as u64);
+            found.collector.outrank((proposed - left - scored.len()) as u64);
             left_out.into_iter().for_each(|(reason, n)| found.collector.reject(reason, n));
             let Settings { weights, pads, .. } = *self.assessor.settings;
             found.collector.add(scored, self.keep, weights, pads);
             done = proposer.progress();
             observer.progress(progress(&done, &found));
+            if left > 0 {
+                return Ok(found);
+            }
             if stop.load(Ordering::Relaxed) {
                 found.complete = done.candidates() == total;
                 break;

@@ -33,6 +33,9 @@ const ITEM: usize = 2048;
 /// Corners of contact polygons that a chunk may hold, about (16 bytes each): where pads cover
 /// finely tessellated outlines, chunks have fewer candidates.
 const MOST_CORNERS: usize = 4_000_000;
+/// Candidates of a chunk on free form, where a grip may take seconds under many loads: a run can be
+/// resumed from a chunk's beginning.
+const MOST_FREE: usize = 1024;
 
 /// Some candidates' outcome, in order.
 #[derive(Debug, Clone, Default)]
@@ -313,7 +316,8 @@ impl<'a> Proposer<'a> {
         let mut items: Vec<Item> = Vec::new();
         let mut candidates = 0;
         let most = ((MOST_CORNERS as f64 / self.corners) as usize).min(self.options.chunk).max(1);
-        while candidates < most {
+        let most_here = |site: usize| if site < self.known { most } else { most.min(MOST_FREE) };
+        while candidates < most_here(self.next.site) {
             let Some(site) = self.sites.get(self.next.site) else { break };
             if self.next.angle == site.angles.len() {
                 let (site, places) = match self.next.places {

@@ -1,8 +1,10 @@
 //! The main job as a call of the library: watched, stopped, resumed, and with what is in memory.
 
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use glam::DVec3;
 use gripfast::error::ErrorKind;
 use gripfast::gripper;
 use gripfast::part::{Part, ReadOptions};
@@ -109,6 +111,69 @@ fn a_stopped_run_says_so_and_is_resumed_to_the_same_grips() {
     assert_eq!(watch.progress[0].done, some.set.summary.candidates);
     assert!(all.set.provenance.complete && all.checkpoint.is_none() && !file.exists());
     assert_eq!((&all.set.grips, &all.set.summary), (&whole.grips, &whole.summary));
+}
+
+/// A superellipsoid of 24 mm x 32 mm x 44 mm \[m\], whose contacts are hundreds of facets.
+fn superellipsoid() -> Part {
+    let (around, rows) = (48, 30);
+    let half = DVec3::new(0.012, 0.016, 0.022);
+    let at = |turn: f64, row: f64| {
+        let rise = PI * ((row + 1.0) / f64::from(rows + 1) - 0.5);
+        let ray = DVec3::new(rise.cos() * turn.cos(), rise.cos() * turn.sin(), rise.sin());
+        let squares = ray * ray;
+        half * ray / (squares * squares).element_sum().powf(0.25)
+    };
+    let ends = [-1.0, 1.0].map(|z| half * DVec3::Z * z);
+    let (vertices, triangles) = crate::support::lathe::lathe(around, rows, ends, at);
+    Part::from_triangles("superellipsoid", &vertices, &triangles).unwrap()
+}
+
+/// Stops the run as soon as it has come a way into the first chunk.
+struct Halt<'a> {
+    stop: &'a AtomicBool,
+    seen: Vec<u64>,
+}
+
+impl Observer for Halt<'_> {
+    fn progress(&mut self, progress: Progress) {
+        self.seen.push(progress.done);
+        self.stop.store(progress.done > 0, Ordering::Relaxed);
+    }
+}
+
+#[test]
+fn a_run_stopped_within_a_chunk_keeps_its_grips_and_scores_it_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut request = request();
+    request.part = PathBuf::new();
+    request.loads = vec!["gravity".into()];
+    request.candidates.spacing = Some(Length(0.01));
+    request.candidates.angle_step = Angle(90_f64.to_radians());
+    request.output.output = Some(folder.path().join("grips.json"));
+    request.output.resume = true;
+    let part = superellipsoid();
+    assert_eq!((part.faces.len(), part.curved.len()), (0, 1));
+    let plan = Plan::builder(request).part(part).build().unwrap();
+    let stop = AtomicBool::new(false);
+    let mut halt = Halt { stop: &stop, seen: Vec::new() };
+    let some = plan.run(&mut halt, &stop).unwrap();
+    let summary = &some.set.summary;
+    let [0, part] = halt.seen[..2] else { panic!("{:?}", halt.seen) };
+    assert!(part > 0 && part < summary.candidates, "{:?}", halt.seen);
+    assert!(!some.set.provenance.complete && !some.set.grips.is_empty());
+    assert!(summary.rejections["interrupted"] > 0);
+    let rejected: u64 = summary.rejections.values().sum();
+    assert_eq!(summary.ranked + rejected, summary.candidates);
+
+    let mut watch = Watch::default();
+    let resumed = plan.run(&mut watch, &AtomicBool::new(false)).unwrap().set;
+    assert!(watch.notes.contains("resuming from"), "{}", watch.notes);
+    assert_eq!(watch.progress[0].done, 0);
+    assert!(watch.progress.len() > 3, "{:?}", watch.progress);
+    assert!(watch.progress.windows(2).all(|pair| pair[0].done < pair[1].done));
+    std::fs::remove_file(folder.path().join("grips.json")).unwrap();
+    let whole = plan.run(&mut (), &AtomicBool::new(false)).unwrap().set;
+    assert_eq!((&resumed.grips, &resumed.summary), (&whole.grips, &whole.summary));
 }
 
 #[test]

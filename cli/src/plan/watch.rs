@@ -68,6 +68,12 @@ impl Observer for Watch {
         }
     }
 
+    fn finishing(&mut self, grips: usize) {
+        if let Some(bar) = &self.bar {
+            bar.set_message(format!("completing {grips} grips"));
+        }
+    }
+
     fn note(&mut self, text: &str) {
         if !self.quiet {
             self.line(&format!("{}{text}", self.about));
@@ -101,7 +107,7 @@ fn progress_bar(total: u64, quiet: bool) -> ProgressBar {
     bar
 }
 
-/// A request to stop from outside: the run ends after the chunk in flight with what it has; a
+/// A request to stop from outside: the run ends after the grips in flight with what it has; a
 /// second one ends the program at once.
 pub(crate) struct Interrupt {
     /// Set by the first one.

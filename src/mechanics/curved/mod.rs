@@ -177,7 +177,19 @@ impl Pads {
         self.answer(distance, force, wrench, Asked::ALL)
     }
 
-    /// The same without notes.
+    /// As [`Self::solve`] for a load whose status is known: where that is `ok` there is no other limit
+    /// state to look for.
+    pub(crate) fn solve_again(
+        &self,
+        distance: f64,
+        force: f64,
+        wrench: &Wrench,
+        status: Status,
+    ) -> Answer {
+        self.answer(distance, force, wrench, Asked { others: status != Status::Ok, notes: true })
+    }
+
+    /// As [`Self::solve`] without notes.
     pub fn score(&self, distance: f64, force: f64, wrench: &Wrench) -> Score {
         self.answer(distance, force, wrench, Asked::SCORE).score
     }

@@ -79,6 +79,14 @@ struct Problem<'a, 'b> {
 const STEPS: u32 = 60;
 /// What is added to the second derivatives, over their sum, until a step succeeds.
 const LIFTS: [f64; 5] = [1e-15, 1e-12, 1e-9, 1e-6, 1e-3];
+/// Halvings of a step at most, from which length on one is short, and how many in a row may be: along
+/// a crease they get ever shorter.
+const HALVINGS: u32 = 8;
+const SHORT: f64 = 0.1;
+const HASTY: u32 = 2;
+const PATIENT: u32 = 8;
+/// Residual from which on a step has to make it smaller; before, the merit.
+const NEAR: f64 = 1e-6;
 /// Residual at which Newton's method is content; `mu` is right to its square.
 const ENOUGH: f64 = 1e-14;
 /// Residual below which rounding keeps a full step from making it smaller: no shorter one would.
@@ -88,7 +96,8 @@ const ROUNDED: f64 = 1e-12;
 const AT_REST: f64 = 1.0 - 1e-9;
 /// The same where only `mu` is asked for.
 const ALIKE: f64 = 1.0 + 1e-10;
-/// The same where Newton's method finds nothing, so near the tie.
+/// The same where Newton's method finds nothing at once, and where it finds nothing, so near the tie.
+const EVEN: f64 = 1.0 + 1e-12;
 const TIED: f64 = 1.0 + 1e-6;
 
 /// How near its bounds must be for an answer found from a neighbour's without a look at the creases.
@@ -115,7 +124,7 @@ pub(super) fn solve(
     let mut moving = None;
     match near {
         Some(None) => {
-            moving = problem.interior(&w, zeta);
+            moving = problem.interior(&w, zeta, HASTY);
             let sure = |answer: &Slipping| answer.bounds.upper <= answer.mu * (1.0 + SURE);
             if let Some(answer) = moving.filter(sure) {
                 return Some(problem.counted(answer));
@@ -133,15 +142,20 @@ pub(super) fn solve(
     if let Some(rolling) = candidates.iter().flatten().find(|rolling| problem.rests(rolling)) {
         return Some(problem.counted(rolling.answer));
     }
+    // A neighbour that rolls moves along a crease: no way leads off it.
     if near.is_none_or(|rolls_on| rolls_on.is_some()) {
-        moving = problem.interior(&w, zeta);
+        moving = problem.interior(&w, None, HASTY);
     }
+    let tied =
+        |within: f64| candidates.iter().flatten().find_map(|rolling| problem.tied(rolling, within));
     moving
         .or_else(|| {
             let start = problem.off_crease(&w, &candidates)?;
-            problem.interior(&w, Some(&start))
+            problem.interior(&w, Some(&start), PATIENT)
         })
-        .or_else(|| candidates.iter().flatten().find_map(|rolling| problem.tied(rolling)))
+        .or_else(|| tied(EVEN))
+        .or_else(|| problem.interior(&w, None, PATIENT))
+        .or_else(|| tied(TIED))
         .map(|answer| problem.counted(answer))
 }
 
@@ -281,7 +295,12 @@ impl<'a, 'b> Problem<'a, 'b> {
 
     /// Newton's method on `D^2/2 - w . z` where the function is smooth. At the end the length of
     /// `z` is `mu` in these units.
-    fn interior(&self, w: &Vector5<f64>, start: Option<&Vector5<f64>>) -> Option<Slipping> {
+    fn interior(
+        &self,
+        w: &Vector5<f64>,
+        start: Option<&Vector5<f64>>,
+        patience: u32,
+    ) -> Option<Slipping> {
         let w = w.component_mul(&self.units) / self.normal;
         let size = w.amax();
         let w = w / size;
@@ -305,8 +324,9 @@ impl<'a, 'b> Problem<'a, 'b> {
         let residual = |at: &Both| at.value * at.gradient - w;
         let merit = |at: &Both, z: &Vector5<f64>| 0.5 * at.value * at.value - w.dot(z);
         let mut error = residual(&at);
+        let mut short = 0;
         for _ in 0..STEPS {
-            if error.amax() <= ENOUGH {
+            if error.amax() <= ENOUGH || short == patience {
                 break;
             }
             let mut matrix = at.gradient * at.gradient.transpose() + at.value * at.hessian;
@@ -316,7 +336,7 @@ impl<'a, 'b> Problem<'a, 'b> {
             }
             let mut moved = false;
             let (lifts, halvings) =
-                if error.amax() <= ROUNDED { (1, 1) } else { (LIFTS.len(), 30) };
+                if error.amax() <= ROUNDED { (1, 1) } else { (LIFTS.len(), HALVINGS) };
             for lift in &LIFTS[..lifts] {
                 let lifted = matrix + *lift * trace * Matrix5::identity();
                 let Some(factor) = lifted.cholesky() else { continue };
@@ -328,12 +348,11 @@ impl<'a, 'b> Problem<'a, 'b> {
                     let tried = z + t * step;
                     let there = self.both(&tried);
                     let left = residual(&there);
-                    if left.amax() < 0.5 * error.amax()
-                        || merit(&there, &tried) < here + 1e-4 * t * slope
-                            && left.amax() < 2.0 * error.amax().max(0.1)
-                            && error.amax() > 1e-9
-                        || left.amax() < 0.9 * error.amax()
-                    {
+                    // Near the answer rounding hides how the merit falls.
+                    let falls = merit(&there, &tried) < here + 1e-4 * t * slope;
+                    let nears = left.amax() < 0.9 * error.amax();
+                    if if error.amax() > NEAR { falls } else { nears } {
+                        short = if t < SHORT { short + 1 } else { 0 };
                         (z, at, error, moved) = (tried, there, left, true);
                         break;
                     }
@@ -448,11 +467,11 @@ impl<'a, 'b> Problem<'a, 'b> {
     }
 
     /// A candidate so near the tie that Newton's method finds nothing.
-    fn tied(&self, rolling: &Rolling) -> Option<Slipping> {
+    fn tied(&self, rolling: &Rolling, within: f64) -> Option<Slipping> {
         let answer = rolling.answer;
         let (alone, _) = self.alone(rolling.on, &answer.shares[rolling.on])?;
         let bounds = Bounds { lower: answer.mu, upper: answer.mu.max(alone) };
-        (alone <= TIED * answer.mu).then_some(Slipping { bounds, ..answer })
+        (alone <= within * answer.mu).then_some(Slipping { bounds, ..answer })
     }
 
     /// [`rolling`] on face `k`: the answer if `k` carries the rest of the load at no more friction
@@ -480,7 +499,7 @@ impl<'a, 'b> Problem<'a, 'b> {
             evaluations: std::cell::Cell::new(0),
         };
         let w = Vector5::new(load.x, load.y, load.z, 0.0, 0.0);
-        let answer = one.interior(&w, None).map(|slip| (slip.bounds.upper, slip.zeta));
+        let answer = one.interior(&w, None, PATIENT).map(|slip| (slip.bounds.upper, slip.zeta));
         self.evaluations.set(self.evaluations.get() + one.evaluations.get());
         answer
     }
