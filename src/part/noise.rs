@@ -60,17 +60,14 @@ impl Noise {
 /// Looks for planes that fell into single triangles when regions were grown as `fine` ones: patches
 /// that a wide tolerance gathers, most of whose area lies in single triangles, bent both ways. A
 /// tessellated cylinder falls into strips, and a sphere into triangles that are bent one way.
-/// `is_smooth`: triangles of free form, which were seen to be without noise.
+/// `is_smooth`: triangles of free form, which alone are not taken for noise.
 pub(super) fn measure(
     part: &Repaired,
     given: &GivenFaces,
     fine: &Regions,
     is_smooth: &[bool],
 ) -> Option<Noise> {
-    let single = |region: u32| match fine.triangles(region as usize) {
-        &[triangle] => !is_smooth[triangle as usize],
-        _ => false,
-    };
+    let single = |region: u32| fine.triangles(region as usize).len() == 1;
     let total: f64 = fine.all.iter().map(|region| region.area).sum();
     let alone: f64 = fine
         .all
@@ -94,7 +91,7 @@ pub(super) fn measure(
         let triangles = coarse.triangles(index);
         let (mut alone, mut squares, mut convex, mut concave, mut most) =
             (0.0, 0.0, 0.0, 0.0, 0.0_f64);
-        let (mut singles, mut products, mut own_squares) = (0, 0.0, 0.0);
+        let (mut singles, mut rough, mut products, mut own_squares) = (0, 0.0, 0.0, 0.0);
         let mut fragments: FxHashMap<u32, ()> = FxHashMap::default();
         for &triangle in triangles {
             let own = fine.of[triangle as usize];
@@ -106,8 +103,11 @@ pub(super) fn measure(
             let heights =
                 corners.map(|corner| region.plane.normal.dot(corner) - region.plane.offset);
             if single(own) {
-                let [x, y, z] = heights;
                 alone += area;
+            }
+            if single(own) && !is_smooth[triangle as usize] {
+                let [x, y, z] = heights;
+                rough += area;
                 singles += 1;
                 products += x * y + y * z + z * x;
                 own_squares += x * x + y * y + z * z;
@@ -151,7 +151,7 @@ pub(super) fn measure(
             && products < RANDOM * own_squares
             && square.sqrt() < GATHERED * WITHIN * part.diagonal
         {
-            random.push((alone, square));
+            random.push((rough, square));
         }
     }
     noise(&mut broken, SHARE * total, total).or_else(|| noise(&mut random, PART * total, total))

@@ -1,6 +1,7 @@
 //! Triangles as they come from a reader, joined at equal corners.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::given::Given;
 #[cfg(feature = "step")]
@@ -26,7 +27,12 @@ pub(super) struct Soup {
 /// for repairs.
 pub(super) const MAX_TRIANGLES: usize = 1 << 30;
 
-/// Joins corners with equal coordinates (`-0.0` equals `0.0`) while triangles stream in.
+/// Triangles joined at a time, and by one thread: as many as a table of theirs fits a fast cache with.
+const BLOCK: usize = 1 << 18;
+const PIECE: usize = 1 << 14;
+
+/// Joins corners with equal coordinates (`-0.0` equals `0.0`) while triangles stream in. Vertices are
+/// numbered as they come.
 ///
 /// An open-addressing table of vertex numbers: one probe costs one cache line of it and one of the
 /// vertices, and neighbouring triangles hit the same ones.
@@ -40,6 +46,8 @@ pub(super) struct Welder {
     recent: [(DVec3, u32); 6],
     next_recent: usize,
     read: usize,
+    /// The last triangles, not joined yet.
+    pending: Vec<[DVec3; 3]>,
     given: Given,
 }
 
@@ -53,6 +61,7 @@ impl Default for Welder {
             recent: [(DVec3::ZERO, u32::MAX); 6],
             next_recent: 0,
             read: 0,
+            pending: Vec::new(),
             given: Given::default(),
         }
     }
@@ -62,6 +71,31 @@ impl Welder {
     /// Adds a triangle; one with two equal corners is only counted.
     #[inline]
     pub(super) fn triangle(&mut self, corners: [DVec3; 3]) {
+        self.pending.push(corners);
+        if self.pending.len() == BLOCK {
+            self.join_pending();
+        }
+    }
+
+    /// Joins what is pending: pieces for themselves, on all threads, then one after the other.
+    fn join_pending(&mut self) {
+        let mut pending = std::mem::take(&mut self.pending);
+        if pending.len() <= PIECE {
+            pending.iter().for_each(|&corners| self.join(corners));
+        } else {
+            let joined = |piece: &[[DVec3; 3]]| {
+                let mut own = Self::default();
+                piece.iter().for_each(|&corners| own.join(corners));
+                own
+            };
+            let pieces: Vec<Self> = pending.par_chunks(PIECE).map(joined).collect();
+            pieces.into_iter().for_each(|piece| self.take(piece));
+        }
+        pending.clear();
+        self.pending = pending;
+    }
+
+    fn join(&mut self, corners: [DVec3; 3]) {
         self.read += 1;
         let [a, b, c] = corners.map(|corner| self.vertex(corner));
         if a != b && b != c && c != a {
@@ -70,15 +104,26 @@ impl Welder {
         }
     }
 
+    /// Takes what was joined for itself.
+    fn take(&mut self, piece: Self) {
+        self.read += piece.read;
+        let numbers: Vec<u32> = piece.vertices.iter().map(|&vertex| self.probe(vertex)).collect();
+        for triangle in piece.triangles {
+            self.triangles.push(triangle.map(|vertex| numbers[vertex as usize]));
+            self.given.push();
+        }
+    }
+
     /// The triangles that follow belong to a face of this surface.
     #[cfg(feature = "step")]
     pub(super) fn face(&mut self, surface: Stated) {
+        self.join_pending();
         self.given.begin(surface);
     }
 
     /// Triangles taken so far.
     pub(super) fn count(&self) -> usize {
-        self.read
+        self.read + self.pending.len()
     }
 
     #[inline]
@@ -130,7 +175,8 @@ impl Welder {
     }
 
     /// The joined triangles.
-    pub(super) fn finish(self, unit: Option<Unit>, warnings: Vec<String>) -> Soup {
+    pub(super) fn finish(mut self, unit: Option<Unit>, warnings: Vec<String>) -> Soup {
+        self.join_pending();
         Soup {
             vertices: self.vertices,
             triangles: self.triangles,
@@ -165,6 +211,27 @@ mod tests {
         welder.triangle([DVec3::X, DVec3::X, DVec3::Z]);
         let soup = welder.finish(None, Vec::new());
         assert_eq!((soup.vertices.len(), soup.triangles.len(), soup.read), (4, 2, 3));
+    }
+
+    /// Pieces joined on threads give what one after the other gives, numbers too.
+    #[test]
+    fn many_triangles_are_joined_as_few_are() {
+        let point = |i: u32| {
+            let (x, y) = (i.wrapping_mul(0x9e37_79b9) >> 20, i % 61);
+            DVec3::new(f64::from(x), f64::from(y) - 30.0, 0.0 * f64::from(y) - 0.0)
+        };
+        let triangles: Vec<[DVec3; 3]> = (0..BLOCK as u32 + 70_000)
+            .map(|i| [point(i), point(i + 1), if i % 1000 == 0 { point(i) } else { point(i / 2) }])
+            .collect();
+        let (mut many, mut few) = (Welder::default(), Welder::default());
+        for &corners in &triangles {
+            many.triangle(corners);
+            few.join(corners);
+        }
+        let [many, few] = [many, few].map(|welder| welder.finish(None, Vec::new()));
+        assert_eq!(many.read, triangles.len());
+        assert!(many.triangles.len() < many.read && many.vertices.len() < many.read);
+        assert!(many.vertices == few.vertices && many.triangles == few.triangles);
     }
 
     #[test]
