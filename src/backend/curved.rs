@@ -30,38 +30,35 @@ pub struct CurvedProblem<'a> {
 /// The worst load of each grip, in order; under [`Polish::All`] all of them. The answers do not
 /// depend on the number of threads.
 pub fn score_curved(problems: &[CurvedProblem<'_>], polish: Polish) -> Vec<Scored> {
-    problems
-        .par_iter()
-        .map(|problem| match polish {
-            Polish::All => problem.score_all(),
-            _ => problem.score(None),
-        })
-        .collect()
+    problems.par_iter().map(|problem| problem.polished(polish)).collect()
 }
 
-/// The worst load of each grip, as far as `watch` does not stop it: `None` for the others. With `best`
-/// those that cannot be among them are outranked, as [`super::Backend::score_best`] has it; `merit` as
-/// there.
+/// As [`score_curved`], as far as `watch` does not stop it: `None` for the other grips. With `best`
+/// those that cannot be among them are outranked under their worst loads, as
+/// [`super::Backend::score_best`] has it; `merit` as there.
 pub(crate) fn score_curved_watched(
     problems: &[CurvedProblem<'_>],
+    polish: Polish,
     best: Option<&mut Best>,
     merit: &(dyn Fn(usize, f64) -> f64 + Sync),
     watch: &Watch<'_>,
 ) -> Vec<Option<Scored>> {
-    let score = |index: usize, beaten: Option<&Beaten<'_>>| {
+    let watched = |score: &dyn Fn() -> Scored| {
         if watch.is_stopped() {
             return None;
         }
-        let scored = problems[index].score(beaten);
+        let scored = score();
         watch.count(1);
         Some(scored)
     };
     let Some(best) = best else {
-        return (0..problems.len()).into_par_iter().map(|index| score(index, None)).collect();
+        return problems.par_iter().map(|problem| watched(&|| problem.polished(polish))).collect();
     };
     let promise = |(index, problem): (usize, &CurvedProblem<'_>)| merit(index, problem.about());
     let promise = problems.par_iter().enumerate().map(promise).collect();
-    race(promise, best, merit, &|index, beaten| score(index, Some(beaten)))
+    let score =
+        |index: usize, beaten: &Beaten<'_>| watched(&|| problems[index].score(Some(beaten)));
+    race(promise, best, merit, &score)
 }
 
 /// Loads looked at so far.
@@ -104,6 +101,10 @@ impl CurvedProblem<'_> {
             Some(pads) => pads.score(self.distance, self.force, &self.wrenches[load]),
             None => refused(Status::NoContact, 0),
         }
+    }
+
+    fn polished(&self, polish: Polish) -> Scored {
+        if polish == Polish::All { self.score_all() } else { self.score(None) }
     }
 
     fn score_all(&self) -> Scored {

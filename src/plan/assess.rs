@@ -282,10 +282,11 @@ impl Assessor<'_> {
         };
         let levers: Vec<FreeTwistOut> = grips.par_iter().map(lever).collect();
         let least = |lever: &FreeTwistOut| lever.least_lever().unwrap_or(0.0);
-        let alpha = |(grip, lever)| self.alpha(grip, least(lever));
-        let alphas: Vec<f64> = grips.iter().zip(&levers).map(alpha).collect();
-        let merit = |index: usize, mu: f64| self.settings.merit(mu, alphas[index]);
-        let scored = score_curved_watched(&problems, best, &merit, watch);
+        let merit = |index: usize, mu: f64| {
+            self.settings.merit(mu, self.alpha(&grips[index], least(&levers[index])))
+        };
+        let polish = self.settings.score.polish;
+        let scored = score_curved_watched(&problems, polish, best, &merit, watch);
         done.left += scored.iter().filter(|scored| scored.is_none()).count();
         let jobs = grips.into_par_iter().zip(levers).zip(scored);
         let measured = jobs.filter_map(|((grip, lever), scored)| {

@@ -3,14 +3,14 @@
 use std::sync::atomic::AtomicBool;
 
 use glam::{DMat3, DVec2, DVec3};
-use gripfast::backend::{CurvedProblem, Scored, score_curved};
+use gripfast::backend::{Backend, CurvedProblem, ScoreOptions, Scored, SeedSet, score_curved};
 use gripfast::geometry::patch_area;
 use gripfast::gripper;
 use gripfast::load::{LoadSet, wrench_in_grip};
 use gripfast::mechanics::curved::Pads;
 use gripfast::model::{Gap, LoadCase, Slip, Status, Wrench};
 use gripfast::part::Part;
-use gripfast::plan::Plan;
+use gripfast::plan::{Assessor, Plan, Settings};
 use gripfast::propose::{ProposeOptions, Proposer};
 use gripfast::request::{Choice, Polish, Request};
 use gripfast::results::{GripSet, RankedGrip};
@@ -280,6 +280,36 @@ pub(crate) fn screened_as_solved(name: &str, part: &Part, count: usize) -> [usiz
     }
     println!("{name}: {solved} of {all} loads solved");
     [solved, all]
+}
+
+#[test]
+fn an_assessor_solves_every_load_of_a_barrel_where_that_is_asked() {
+    let (part, gripper) = (shaft(0.3), gripper::find("robotiq-2f85").unwrap());
+    let options = ProposeOptions::default()
+        .with_curved(Some(true))
+        .with_spacing(Some(0.02))
+        .with_angle_step(1.6);
+    let grips: Vec<_> = Proposer::new(&part, &gripper, &options)
+        .unwrap()
+        .flat_map(|chunk| chunk.grips)
+        .filter(|grip| grip.surfaces.is_some())
+        .take(4)
+        .collect();
+    let mass = part.mass_properties(0.2 / part.mass_properties(1.0).volume);
+    let loads = LoadSet::parse("loads", "gravity:26").unwrap().cases(&mass).unwrap();
+    let assessed = |polish| {
+        let score = ScoreOptions { polish, ..ScoreOptions::default() };
+        let settings = &Settings::of_force(60.0).with_score(score);
+        let (backend, seeds) = (&Backend::Cpu, &SeedSet::default());
+        let assessor = Assessor { loads: &loads, mass, settings, backend, seeds };
+        assessor.assess(grips.clone()).unwrap()
+    };
+    let (worst, all) = (assessed(Polish::Worst), assessed(Polish::All));
+    assert_eq!((worst.len(), all.len()), (4, 4));
+    for (worst, all) in worst.iter().zip(&all) {
+        assert_eq!((worst.mu_by_load.len(), all.mu_by_load.len()), (0, loads.len()));
+        assert_eq!(worst.worst.load, all.worst.load);
+    }
 }
 
 #[test]

@@ -349,9 +349,12 @@ impl<'a, 'b> Problem<'a, 'b> {
                     let there = self.both(&tried);
                     let left = residual(&there);
                     // Near the answer rounding hides how the merit falls.
-                    let falls = merit(&there, &tried) < here + 1e-4 * t * slope;
-                    let nears = left.amax() < 0.9 * error.amax();
-                    if if error.amax() > NEAR { falls } else { nears } {
+                    let is_better = if error.amax() > NEAR {
+                        merit(&there, &tried) < here + 1e-4 * t * slope
+                    } else {
+                        left.amax() < 0.9 * error.amax()
+                    };
+                    if is_better {
                         short = if t < SHORT { short + 1 } else { 0 };
                         (z, at, error, moved) = (tried, there, left, true);
                         break;
@@ -466,7 +469,7 @@ impl<'a, 'b> Problem<'a, 'b> {
         self.bears(rolling.on, &rolling.answer.shares[rolling.on], rolling.answer.mu * AT_REST)
     }
 
-    /// A candidate so near the tie that Newton's method finds nothing.
+    /// A candidate whose face at rest needs no more friction alone than `within` times its answer.
     fn tied(&self, rolling: &Rolling, within: f64) -> Option<Slipping> {
         let answer = rolling.answer;
         let (alone, _) = self.alone(rolling.on, &answer.shares[rolling.on])?;
