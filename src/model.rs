@@ -62,32 +62,40 @@ impl Contact {
         for (name, patch) in [("A_I", &self.face_i), ("A_II", &self.face_ii)] {
             let rings =
                 || patch.iter().flat_map(|polygon| polygon.holes.iter().chain([&polygon.outer]));
-            let bad = |problem: String, remedy: &str| {
-                Err(Error::new(ErrorKind::Geometry, format!("{place}{name}"), problem, remedy))
-            };
-            let mut extent = 0.0_f64;
-            for point in rings().flatten() {
-                if !point.is_finite() || point.abs().max_element() > LARGEST_SCALE {
-                    return bad(
-                        format!("has the point ({:?}, {:?})", point.x, point.y),
-                        "give finite coordinates of at most 1e60 m",
-                    );
-                }
-            }
-            for ring in rings() {
-                let Some(&first) = ring.first() else { continue };
-                extent =
-                    ring.iter().map(|x| (*x - first).abs().max_element()).fold(extent, f64::max);
-            }
-            if extent > 0.0 && extent < SMALLEST_EXTENT {
-                return bad(
-                    format!("measures {extent:e} m"),
-                    "give an area of at least 1e-30 m in one direction",
-                );
-            }
+            check_area(rings, || format!("{place}{name}"))?;
         }
         Ok(())
     }
+}
+
+/// [`Contact::check`] for the rings of one area; `place` names it.
+pub(crate) fn check_area<'a, I: Iterator<Item = &'a Ring>>(
+    rings: impl Fn() -> I,
+    place: impl Fn() -> String,
+) -> Result<()> {
+    let bad = |problem: String, remedy: &str| {
+        Err(Error::new(ErrorKind::Geometry, place(), problem, remedy))
+    };
+    let mut extent = 0.0_f64;
+    for point in rings().flatten() {
+        if !point.is_finite() || point.abs().max_element() > LARGEST_SCALE {
+            return bad(
+                format!("has the point ({:?}, {:?})", point.x, point.y),
+                "give finite coordinates of at most 1e60 m",
+            );
+        }
+    }
+    for ring in rings() {
+        let Some(&first) = ring.first() else { continue };
+        extent = ring.iter().map(|x| (*x - first).abs().max_element()).fold(extent, f64::max);
+    }
+    if extent > 0.0 && extent < SMALLEST_EXTENT {
+        return bad(
+            format!("measures {extent:e} m"),
+            "give an area of at least 1e-30 m in one direction",
+        );
+    }
+    Ok(())
 }
 
 /// A force \[N\] and a moment [N m] ON the body. The frame and the point of the moment are the

@@ -6,8 +6,8 @@ use glam::{DAffine2, DMat2, DVec2};
 
 use super::quadric::{Quadratic, Region, area_and_load};
 use crate::geometry::{
-    Bounds2, clip_convex, clip_ring_convex, intersect_convex, is_convex, ring_area, transform,
-    within_window,
+    Bounds2, clip_convex, clip_ring_convex, intersect_convex, is_convex, is_within, ring_area,
+    transform, within_window,
 };
 use crate::model::{Patch, Polygon, Ring};
 
@@ -312,13 +312,17 @@ pub(crate) fn pressed(piece: &Piece, delta: f64) -> Patch {
         return Patch::new();
     }
     let middle = bounds.centre();
-    let along = |axis: DVec2, at: DVec2, low: f64, high: f64| -> Ring {
+    let along = |axis: DVec2, at: DVec2, low: f64, high: f64| -> [DVec2; 4] {
         // A stretch across `axis` through `at`, as long as the piece.
         let at = at + axis * axis.dot(middle - at);
         let corner = |x: f64, y: f64| at + size * x * axis + y * axis.perp();
-        vec![corner(-1.0, low), corner(1.0, low), corner(1.0, high), corner(-1.0, high)]
+        [corner(-1.0, low), corner(1.0, low), corner(1.0, high), corner(-1.0, high)]
     };
-    let windows: Vec<Ring> = match piece.gap {
+    let mut patch = Patch::new();
+    let shape = Shape::of(piece);
+    let mut within =
+        |window: &[DVec2]| shape.cut(piece, window, &mut |polygon| patch.push(polygon));
+    match piece.gap {
         Gap::Plane { height, slope } if slope == DVec2::ZERO => {
             return if height < delta { vec![piece.polygon()] } else { Patch::new() };
         }
@@ -328,18 +332,19 @@ pub(crate) fn pressed(piece: &Piece, delta: f64) -> Patch {
             if left <= -size {
                 return Patch::new();
             }
-            vec![along(slope.normalize().perp(), middle, -left.min(size), size)]
+            within(&along(slope.normalize().perp(), middle, -left.min(size), size));
         }
         Gap::Cylinder { radius, axis, at, height } => {
             let half = (2.0 * radius * (delta - height)).max(0.0).sqrt();
             let axis = axis.normalize();
             match radius > 0.0 {
-                true if height < delta => vec![along(axis, at, -half, half)],
+                true if height < delta => within(&along(axis, at, -half, half)),
                 true => return Patch::new(),
                 false if height < delta => return vec![piece.polygon()],
                 false => {
                     let far = half + 2.0 * size + at.distance(middle);
-                    vec![along(axis, at, half, far), along(axis, at, -far, -half)]
+                    within(&along(axis, at, half, far));
+                    within(&along(axis, at, -far, -half));
                 }
             }
         }
@@ -349,7 +354,7 @@ pub(crate) fn pressed(piece: &Piece, delta: f64) -> Patch {
                 _ => ([piece.gap.radius().unwrap_or(1.0); 2], DVec2::X),
             };
             if radii.iter().any(|radius| *radius < 0.0) {
-                return vec![piece.polygon()];
+                return hollow(piece, delta);
             }
             if height >= delta {
                 return Patch::new();
@@ -360,29 +365,38 @@ pub(crate) fn pressed(piece: &Piece, delta: f64) -> Patch {
             let half = radii.map(|radius| grown * (2.0 * radius * (delta - height)).sqrt());
             let axis = axis.normalize();
             let corner = |e: &DVec2| at + half[0] * e.x * axis + half[1] * e.y * axis.perp();
-            vec![CIRCLE.iter().map(corner).collect()]
+            within(&CIRCLE.each_ref().map(corner));
         }
         Gap::Cone { radius, slope, axis, at, height } => {
             if slope == 0.0 {
                 let gap = Gap::Cylinder { radius, axis, at, height };
                 return pressed(&Piece { gap, ..piece.clone() }, delta);
             }
+            if radius < 0.0 {
+                return hollow(piece, delta);
+            }
             // Uphill of a parabola whose top lies where the crest's gap is `delta`.
             let downhill = axis.normalize() * slope.signum();
             let top = at + downhill * ((delta - height) / slope.abs());
             let deep = downhill.dot(top - middle) + size;
-            if radius <= 0.0 || deep <= 0.0 {
-                return if radius <= 0.0 { vec![piece.polygon()] } else { Patch::new() };
+            if deep <= 0.0 {
+                return Patch::new();
             }
             let half = (2.0 * radius * slope.abs() * deep).sqrt();
             let corner = |k: usize| {
                 let y = half * (2.0 * k as f64 / SIDES as f64 - 1.0);
                 top - downhill * (deep * (y / half).powi(2)) + downhill.perp() * y
             };
-            vec![(0..=SIDES).map(corner).collect()]
+            within(&std::array::from_fn::<_, { SIDES + 1 }, _>(corner));
         }
-    };
-    windows.iter().flat_map(|window| cut(piece, window)).collect()
+    }
+    patch
+}
+
+/// All of a hollow piece, unless it lies behind what a layer compressed by `delta` presses.
+fn hollow(piece: &Piece, delta: f64) -> Patch {
+    let reached = Field::new(piece).nearest(DVec2::ZERO) < delta;
+    if reached { vec![piece.polygon()] } else { Patch::new() }
 }
 
 /// Sides of a window up to which convex rings are clipped by one after the other.
@@ -402,30 +416,58 @@ fn begin(ring: &mut Ring) {
     }
 }
 
+/// What the outline of a piece that is cut again and again says once and for all.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Shape {
+    bounds: Bounds2,
+    is_convex: bool,
+}
+
+impl Shape {
+    pub(crate) fn of(piece: &Piece) -> Self {
+        let is_convex = piece.holes.is_empty() && is_convex(&piece.outer);
+        Self { bounds: Bounds2::of(&piece.outer), is_convex }
+    }
+
+    /// Gives the parts of its piece's outline within a convex counter-clockwise ring.
+    pub(crate) fn cut(&self, piece: &Piece, window: &[DVec2], give: &mut impl FnMut(Polygon)) {
+        if !self.bounds.meets(Bounds2::of(window)) {
+            return;
+        }
+        let mut part = |outer: Ring| {
+            let size = Bounds2::of(&outer).size().max_element();
+            if outer.len() >= 3 && ring_area(&outer) > 1e-9 * size * size {
+                give(Polygon { outer, holes: Vec::new() });
+            }
+        };
+        if self.is_convex {
+            return part(match window.len() <= FEW_SIDES {
+                true => clip_ring_convex(&piece.outer, window),
+                false => clip_convex(window, &piece.outer),
+            });
+        }
+        if piece.holes.is_empty() && is_within(self.bounds, window) {
+            let mut ring = piece.outer.clone();
+            begin(&mut ring);
+            return part(ring);
+        }
+        if piece.holes.is_empty()
+            && let Some(rings) = within_window(&piece.outer, window)
+        {
+            return rings.into_iter().for_each(|mut ring| {
+                begin(&mut ring);
+                part(ring);
+            });
+        }
+        intersect_convex(window, &[piece.polygon()]).into_iter().for_each(give);
+    }
+}
+
 /// The outline of a piece within a convex counter-clockwise ring.
 pub(crate) fn cut(piece: &Piece, window: &[DVec2]) -> Patch {
-    if !Bounds2::of(&piece.outer).meets(Bounds2::of(window)) {
-        return Patch::new();
-    }
-    let solid = |outer: &Ring| {
-        let size = Bounds2::of(outer).size().max_element();
-        outer.len() >= 3 && ring_area(outer) > 1e-9 * size * size
-    };
-    if piece.holes.is_empty() {
-        let found = match is_convex(&piece.outer) {
-            true if window.len() <= FEW_SIDES => Some(vec![clip_ring_convex(&piece.outer, window)]),
-            true => Some(vec![clip_convex(window, &piece.outer)]),
-            false => within_window(&piece.outer, window).map(|mut rings| {
-                rings.iter_mut().for_each(begin);
-                rings
-            }),
-        };
-        if let Some(rings) = found {
-            let rings = rings.into_iter().filter(solid);
-            return rings.map(|outer| Polygon { outer, holes: Vec::new() }).collect();
-        }
-    }
-    intersect_convex(window, &[piece.polygon()])
+    let mut patch = Patch::new();
+    Shape::of(piece).cut(piece, window, &mut |polygon| patch.push(polygon));
+    patch
 }
 
 #[cfg(test)]

@@ -97,12 +97,31 @@ pub fn clip_rings_half_plane(rings: &[Ring], half: &HalfPlane) -> Vec<Ring> {
 /// The part of `ring` inside the convex counter-clockwise polygon `convex`, in the ring's own
 /// sense.
 pub fn clip_ring_convex(ring: &[DVec2], convex: &[DVec2]) -> Ring {
-    let (mut current, mut next) = (ring.to_vec(), Vec::with_capacity(ring.len() + convex.len()));
+    let bounds = Bounds2::of(ring);
+    let (middle, size) = (bounds.centre(), 0.5 * bounds.size());
+    let (mut current, mut next) = (Ring::new(), Ring::new());
+    let mut is_whole = true;
     for (&a, &b) in convex.iter().zip(convex.iter().cycle().skip(1)) {
-        clip_ring_half_plane_into(&current, &HalfPlane::left_of(a, b), &mut next);
+        let half = HalfPlane::left_of(a, b);
+        // A side that leaves the ring's box as it is leaves the ring.
+        let (value, most) = (half.value(middle), half.normal.abs().dot(size));
+        if value > most * BOX {
+            continue;
+        }
+        if value < -most * BOX {
+            return Ring::new();
+        }
+        if is_whole {
+            next.reserve(ring.len() + convex.len());
+            clip_ring_half_plane_into(ring, &half, &mut next);
+        } else {
+            next.reserve(current.len() + convex.len());
+            clip_ring_half_plane_into(&current, &half, &mut next);
+        }
         std::mem::swap(&mut current, &mut next);
+        is_whole = false;
     }
-    current
+    if is_whole { ring.to_vec() } else { current }
 }
 
 /// The part of a convex counter-clockwise polygon inside another one: of the many sides of an outline
@@ -129,6 +148,15 @@ pub(crate) fn clip_convex(ring: &[DVec2], convex: &[DVec2]) -> Ring {
     }
     // A corner on a side is met twice.
     if is_whole { current } else { straightened(&current) }
+}
+
+/// Whether a box lies within a convex counter-clockwise polygon beyond rounding.
+pub(crate) fn is_within(bounds: Bounds2, convex: &[DVec2]) -> bool {
+    let (middle, size) = (bounds.centre(), 0.5 * bounds.size());
+    convex.iter().zip(convex.iter().cycle().skip(1)).all(|(&a, &b)| {
+        let half = HalfPlane::left_of(a, b);
+        half.value(middle) > half.normal.abs().dot(size) * BOX
+    })
 }
 
 /// Size of a box beyond which no rounding lets a side cut it.

@@ -15,11 +15,11 @@ pub mod sphere;
 mod union_find;
 mod window;
 
-pub(crate) use clip::clip_convex;
 pub use clip::{
     HalfPlane, clip_ring_axis, clip_ring_convex, clip_ring_half_plane, clip_ring_half_plane_into,
     clip_rings_half_plane,
 };
+pub(crate) use clip::{clip_convex, is_within};
 pub use hull::{convex_hull, is_convex, support};
 pub use overlay::{even_odd, intersect, intersect_convex, union};
 pub(crate) use paraboloid::{Paraboloid, principal};

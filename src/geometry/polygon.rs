@@ -164,15 +164,19 @@ fn clean(ring: &mut Ring) {
 /// again).
 #[must_use]
 pub fn transform(polygon: &Polygon, map: &DAffine2) -> Polygon {
+    transformed(polygon.clone(), map)
+}
+
+/// [`transform`] in place.
+pub(crate) fn transformed(mut polygon: Polygon, map: &DAffine2) -> Polygon {
     let reflected = map.matrix2.determinant() < 0.0;
-    let ring = |ring: &Ring| -> Ring {
-        let mut mapped: Ring = ring.iter().map(|&point| map.transform_point2(point)).collect();
+    for ring in std::iter::once(&mut polygon.outer).chain(&mut polygon.holes) {
+        ring.iter_mut().for_each(|point| *point = map.transform_point2(*point));
         if reflected {
-            mapped.reverse();
+            ring.reverse();
         }
-        mapped
-    };
-    Polygon { outer: ring(&polygon.outer), holes: polygon.holes.iter().map(ring).collect() }
+    }
+    polygon
 }
 
 /// Whether `point` lies inside the polygon (even-odd over all its rings; exact predicates, so the

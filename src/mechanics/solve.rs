@@ -101,6 +101,12 @@ pub fn limit_states(
 }
 
 pub(crate) fn check(contact: &Contact, distance: f64, force: f64, wrench: &Wrench) -> Result<()> {
+    check_numbers(distance, force, wrench)?;
+    contact.check("")
+}
+
+/// [`check`] without the contact.
+pub(super) fn check_numbers(distance: f64, force: f64, wrench: &Wrench) -> Result<()> {
     let bad = |what: &str, value: String, allowed: &str| {
         Err(Error::input(what, format!("is {value}"), format!("give {allowed}")))
     };
@@ -121,7 +127,7 @@ pub(crate) fn check(contact: &Contact, distance: f64, force: f64, wrench: &Wrenc
             "finite numbers",
         );
     }
-    contact.check("")
+    Ok(())
 }
 
 /// An answer without a limit state.

@@ -37,7 +37,22 @@ pub(super) struct Buffers {
 
 /// Contacts of one item by their rounded coordinates: a pad moved along a straight edge keeps its
 /// contact.
-pub(super) type Known = FxHashMap<Vec<i64>, Touched>;
+#[derive(Debug, Default)]
+pub(super) struct Known {
+    contacts: FxHashMap<Vec<i64>, Touched>,
+    /// The coordinates asked for.
+    key: Vec<i64>,
+}
+
+impl Known {
+    /// The contact of `key`, which is made if it is new.
+    fn or_insert(&mut self, made: impl FnOnce() -> Touched) -> Touched {
+        if let Some(known) = self.contacts.get(&self.key) {
+            return known.clone();
+        }
+        self.contacts.entry(self.key.clone()).or_insert_with(made).clone()
+    }
+}
 
 /// What the pads of a grip touch: areas and, where it is not plane, the surface.
 #[derive(Debug, Clone)]
@@ -401,14 +416,15 @@ impl Proposer<'_> {
         if rings().map(<[DVec2]>::len).sum::<usize>() > SHARED_CORNERS {
             return Arc::new(contact).into();
         }
-        let mut key = Vec::new();
+        let key = &mut known.key;
+        key.clear();
         for patch in [&contact.face_i, &contact.face_ii] {
             for ring in patch.iter().flat_map(polygon::rings) {
-                push(&mut key, step, ring);
+                push(key, step, ring);
             }
             key.push(i64::MIN);
         }
-        known.entry(key).or_insert_with(|| Arc::new(contact).into()).clone()
+        known.or_insert(|| Arc::new(contact).into())
     }
 
     /// What is pressed of the surfaces under the pads.
@@ -420,28 +436,32 @@ impl Proposer<'_> {
         known: &mut Known,
     ) -> Touched {
         let step = self.same();
-        let mut key = Vec::new();
+        let key = &mut known.key;
+        key.clear();
         for piece in surfaces.face_i.iter().chain([&Piece::default()]).chain(&surfaces.face_ii) {
-            push(&mut key, step, &piece.outer);
-            piece.holes.iter().for_each(|hole| push(&mut key, step, hole));
+            push(key, step, &piece.outer);
+            piece.holes.iter().for_each(|hole| push(key, step, hole));
             let numbers = surface::numbers(&piece.gap);
-            key.extend(numbers.iter().map(|x| (x / step).round() as i64));
+            key.extend(numbers.map(|x| rounded(x / step)));
             key.push(i64::MIN);
         }
         let touched = || Touched {
             contact: Arc::new(relief.outlines(&surfaces, jaws)),
             surfaces: Some(Arc::new(surfaces)),
         };
-        known.entry(key).or_insert_with(touched).clone()
+        known.or_insert(touched)
     }
 }
 
 /// Adds a ring's rounded coordinates to a key.
 fn push(key: &mut Vec<i64>, step: f64, ring: &[DVec2]) {
-    key.extend(
-        ring.iter().flat_map(|x| [(x.x / step).round() as i64, (x.y / step).round() as i64]),
-    );
+    key.extend(ring.iter().flat_map(|x| [rounded(x.x / step), rounded(x.y / step)]));
     key.push(i64::MAX);
+}
+
+/// To the nearest whole number.
+fn rounded(x: f64) -> i64 {
+    (x + 0.5_f64.copysign(x)) as i64
 }
 
 /// Exchanges the jaws of a grip: half a turn about the approach axis.

@@ -497,3 +497,22 @@ fn real_parts_have_the_curved_faces_of_their_cad_models() {
         }
     }
 }
+
+/// All corners of a chamfered cylinder as long as it is wide lie on a sphere.
+#[test]
+fn a_chamfered_cylinder_is_no_ball() {
+    for (n, radius, chamfer) in
+        [(24, 10.0, 1.0), (32, 10.0, 2.0), (64, 15.0, 5.0), (360, 15.0, 5.0)]
+    {
+        for longer in [0.0, 0.1] {
+            let (end, small) = (2.0 * radius + longer, radius - chamfer);
+            let profile = [(0.0, small), (chamfer, radius), (end - chamfer, radius), (end, small)];
+            let part = Solid::lathe(&profile.map(DVec2::from), n, |_| 0.0).part(3, 0.0);
+            let mut kinds: Vec<&str> = part.curved.iter().map(|face| face.shape.name()).collect();
+            kinds.sort_unstable();
+            let what = format!("{n} facets, chamfer {chamfer}, {longer} longer");
+            assert_eq!(kinds, ["cone", "cone", "cylinder"], "{what}");
+            assert_eq!(part.faces.len(), 2, "{what}");
+        }
+    }
+}

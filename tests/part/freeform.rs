@@ -5,6 +5,7 @@ use std::path::Path;
 use glam::{DVec2, DVec3};
 use gripfast::part::{Part, ReadOptions, Shape};
 
+use crate::solids::Solid;
 use crate::support;
 
 fn free(part: &Part) -> usize {
@@ -70,5 +71,34 @@ fn sample_parts_of_planes_and_round_faces_have_none() {
         let part =
             Part::read(&folder.join(format!("{name}.stl")), &ReadOptions::default()).unwrap();
         assert_eq!(free(&part), 0, "{name}");
+    }
+}
+
+/// A plate with an arched top of some strips, 40 mm wide, 15 mm high and 40 mm deep \[mm\].
+fn arched(radius: f64, strips: u32) -> Part {
+    let half = 20.0_f64;
+    let height =
+        |x: f64| 15.0 + (radius * radius - x * x).sqrt() - (radius * radius - half * half).sqrt();
+    let mut outline = vec![DVec2::new(-half, 0.0), DVec2::new(half, 0.0)];
+    outline.extend((0..=strips).map(|k| {
+        let x = half - 2.0 * half * f64::from(k) / f64::from(strips);
+        DVec2::new(x, height(x))
+    }));
+    Solid::extrude(&outline, 40.0).part(2, 0.0)
+}
+
+#[test]
+fn gentle_domes_and_arches_are() {
+    for rise in [2e-5, 1e-4, 5e-4] {
+        let dome = block(24, 0.0, |at| {
+            let [x, y] = [at.x / 0.03, at.y / 0.02].map(|x| 1.0 - x.powi(4));
+            rise * x * y
+        });
+        assert_eq!(free(&dome), 1, "{rise}");
+    }
+    for (radius, strips) in [(100.0, 16), (200.0, 6), (200.0, 12), (200.0, 40), (1000.0, 8)] {
+        let part = arched(radius, strips);
+        assert_eq!(free(&part), 1, "{radius}, {strips}");
+        assert!(part.curved[0].outside, "{radius}, {strips}");
     }
 }

@@ -16,6 +16,8 @@ use gripfast::request::{Choice, Polish, Request};
 use gripfast::results::{GripSet, RankedGrip};
 use gripfast::units::{Angle, Force, Length, Mass};
 
+use crate::support::lathe::lathe;
+
 const RADIUS: f64 = 0.010;
 const LENGTH: f64 = 0.060;
 
@@ -335,4 +337,67 @@ fn comparing_loads_gives_the_worst_one_that_solving_all_of_them_gives() {
     }
     let [solved, all] = sums;
     assert!(4 * solved < all, "{solved} of {all}");
+}
+
+fn proposals(part: &Part, options: &ProposeOptions) -> Vec<gripfast::model::Grip> {
+    let gripper = gripper::find("robotiq-2f85").unwrap();
+    Proposer::new(part, &gripper, options).unwrap().flat_map(|chunk| chunk.grips).collect()
+}
+
+/// A cap of a ball of 60 mm on a base of 20 mm shows a few degrees of directions.
+#[test]
+fn a_cap_is_gripped_however_it_lies_and_whatever_the_step() {
+    let (radius, base) = (0.060, 0.020_f64);
+    let (vertices, triangles) =
+        lathe(64, 12, [DVec3::ZERO, DVec3::Z * (radius - 0.0565685)], |turn, row| {
+            let angle = (base / radius).asin() * (1.0 - row / 12.0);
+            let out = DVec2::from_angle(turn) * angle.sin() * radius;
+            out.extend(angle.cos() * radius - 0.0565685)
+        });
+    for (index, step) in [30.0, 20.0, 45.0_f64].into_iter().enumerate() {
+        let turn = DMat3::from_euler(glam::EulerRot::XYZ, 0.7 * index as f64, -0.4, 1.1);
+        let moved: Vec<DVec3> = vertices.iter().map(|vertex| turn * *vertex).collect();
+        let part = Part::from_triangles("cap", &moved, &triangles).unwrap();
+        let options =
+            ProposeOptions::default().with_spacing(Some(0.008)).with_angle_step(step.to_radians());
+        let along = proposals(&part, &options)
+            .iter()
+            .filter(|grip| grip.part_from_grip.rotation.z_axis.cross(turn.z_axis).length() < 1e-3)
+            .count();
+        assert!(along > 10, "{step}: {along}");
+    }
+}
+
+/// The far side of the hole faces the pad, too.
+#[test]
+fn a_ring_is_touched_at_its_outside_alone() {
+    let (major, minor) = (0.020_f64, 0.012_f64);
+    let mut vertices = Vec::new();
+    let mut triangles = Vec::new();
+    let (around, about) = (96_u32, 48_u32);
+    let step =
+        |k: u32, of: u32| DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / f64::from(of));
+    for i in 0..around {
+        for k in 0..about {
+            let (turn, tube) = (step(i, around), step(k, about) * minor);
+            vertices.push((turn * (major + tube.x)).extend(tube.y));
+            let [a, b] = [i, (i + 1) % around].map(|i| i * about);
+            let next = (k + 1) % about;
+            triangles.extend([[a + k, b + k, b + next], [a + k, b + next, a + next]]);
+        }
+    }
+    let part = Part::from_triangles("ring", &vertices, &triangles).unwrap();
+    let grips = proposals(&part, &ProposeOptions::default().with_spacing(Some(0.008)));
+    let wide: Vec<_> = grips.iter().filter(|grip| (grip.width - 0.064).abs() < 1e-3).collect();
+    assert!(wide.len() > 10, "{}", grips.len());
+    for grip in wide.iter().filter(|grip| grip.part_from_grip.origin.length() < 1e-6) {
+        // A paraboloid's load is half its area times its depth.
+        let gripper = gripper::find("robotiq-2f85").unwrap();
+        let stiffness = gripper.layer().stiffness;
+        let radii = (major + minor) * minor;
+        let deep = (gripper.force[1] / (std::f64::consts::PI * stiffness * radii.sqrt())).sqrt();
+        let expected = 2.0 * std::f64::consts::PI * radii.sqrt() * deep;
+        let found = patch_area(&grip.contact.face_i);
+        assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
+    }
 }

@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use crate::contact::quadric::Quadratic;
 use crate::contact::surface::{Field, Piece, Surfaces};
 use crate::error::{Error, Result};
-use crate::model::{Face as Side, Score, Slip, Status, Wrench};
+use crate::model::{Face as Side, Score, Slip, Status, Wrench, check_area};
 
 use super::{COUPLING_SEARCH, refused};
 use equilibrium::{Problem, State};
@@ -571,12 +571,10 @@ fn face_answer(face: &Pressed<'_>, slipping: &Slipping, k: usize) -> FaceAnswer 
 }
 
 fn check(surfaces: &Surfaces, distance: f64, force: f64, wrench: &Wrench) -> Result<()> {
-    let outlines = crate::model::Contact {
-        face_i: surfaces.face_i.iter().map(Piece::polygon).collect(),
-        face_ii: surfaces.face_ii.iter().map(Piece::polygon).collect(),
-    };
-    super::check(&outlines, distance, force, wrench)?;
+    super::solve::check_numbers(distance, force, wrench)?;
     for (name, pieces) in [("A_I", &surfaces.face_i), ("A_II", &surfaces.face_ii)] {
+        let rings = || pieces.iter().flat_map(|piece| piece.holes.iter().chain([&piece.outer]));
+        check_area(rings, || name.to_owned())?;
         for (index, piece) in pieces.iter().enumerate() {
             if let Some(fault) = piece.gap.fault() {
                 return Err(Error::input(

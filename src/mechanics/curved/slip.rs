@@ -5,6 +5,8 @@
 //! where a face is at rest, and there the answer often lies: the body rolls on the less loaded
 //! face. Those two candidates are tested first; elsewhere Newton's method has a smooth function.
 
+use std::cell::{Cell, OnceCell};
+
 use glam::DVec2;
 use nalgebra::{Matrix3, Matrix3x5, Matrix5, Vector3, Vector5};
 
@@ -72,7 +74,7 @@ struct Problem<'a, 'b> {
     units: Vector5<f64>,
     /// Sum of the normal forces that count.
     normal: f64,
-    evaluations: std::cell::Cell<u32>,
+    evaluations: Cell<u32>,
 }
 
 /// Newton steps at most.
@@ -100,6 +102,10 @@ const ALIKE: f64 = 1.0 + 1e-10;
 const EVEN: f64 = 1.0 + 1e-12;
 const TIED: f64 = 1.0 + 1e-6;
 
+/// Share of `mu` by which bounds may be apart where the residual is not small, of a hasty search and of a
+/// patient one.
+const CLOSE: f64 = 1e-10;
+const APART: f64 = 1e-6;
 /// How near its bounds must be for an answer found from a neighbour's without a look at the creases.
 const SURE: f64 = 1e-12;
 
@@ -163,7 +169,7 @@ pub(super) fn solve(
 /// needs no more alone, ties among them.
 pub(super) fn rests(faces: [&Pressed<'_>; 2], k: usize, load: &Vector3<f64>, mu: f64) -> bool {
     let problem = Problem::new(&Space::default(), faces, 1.0);
-    problem.bears(k, load, mu * ALIKE)
+    problem.bears(k, load, mu * ALIKE, || problem.slips_alone(k, load))
 }
 
 /// The body rolls on face `k`: the other face, of normal force `load` and `first = int p x`, slides
@@ -269,7 +275,7 @@ impl<'a, 'b> Problem<'a, 'b> {
             active: space.dimensions(),
             units: Vector5::new(1.0, 1.0, 1.0 / length(faces), reach, reach),
             normal: faces[0].load + faces[1].load,
-            evaluations: std::cell::Cell::new(0),
+            evaluations: Cell::new(0),
         }
     }
 
@@ -372,8 +378,9 @@ impl<'a, 'b> Problem<'a, 'b> {
         let lower = w.dot(&z) / at.value;
         let mu = lower * size;
         let upper = size * self.upper(&w, lower, &at, &error)?;
-        // A twist that is not the best, e.g. caught at a crease.
-        if error.amax() > 1e-8 && upper > mu * (1.0 + 1e-6) {
+        // A twist that is not the best, e.g. caught at a crease: one found in haste is looked at again.
+        let wide = if patience == HASTY { CLOSE } else { APART };
+        if error.amax() > 1e-8 && upper > mu * (1.0 + wide) {
             return None;
         }
         Some(Slipping {
@@ -452,8 +459,15 @@ impl<'a, 'b> Problem<'a, 'b> {
         (faces[0] + faces[1]).component_mul(&self.units) / self.normal
     }
 
-    /// Whether face `k` alone bears `load` at the friction `mu`: first by a bound.
-    fn bears(&self, k: usize, load: &Vector3<f64>, mu: f64) -> bool {
+    /// Whether face `k` alone bears `load` at the friction `mu`: first by a bound, then by what it needs
+    /// `alone`.
+    fn bears(
+        &self,
+        k: usize,
+        load: &Vector3<f64>,
+        mu: f64,
+        alone: impl FnOnce() -> Option<(f64, Vector5<f64>)>,
+    ) -> bool {
         let face = self.faces[k];
         if load.x.hypot(load.y) > mu * face.load {
             return false;
@@ -462,17 +476,18 @@ impl<'a, 'b> Problem<'a, 'b> {
         if Bearing::of(face).bears(load) <= mu {
             return true;
         }
-        self.alone(k, load).is_some_and(|(alone, _)| alone <= mu)
+        alone().is_some_and(|(alone, _)| alone <= mu)
     }
 
     fn rests(&self, rolling: &Rolling) -> bool {
-        self.bears(rolling.on, &rolling.answer.shares[rolling.on], rolling.answer.mu * AT_REST)
+        let mu = rolling.answer.mu * AT_REST;
+        self.bears(rolling.on, rolling.borne(), mu, || self.alone(rolling))
     }
 
     /// A candidate whose face at rest needs no more friction alone than `within` times its answer.
     fn tied(&self, rolling: &Rolling, within: f64) -> Option<Slipping> {
         let answer = rolling.answer;
-        let (alone, _) = self.alone(rolling.on, &answer.shares[rolling.on])?;
+        let (alone, _) = self.alone(rolling)?;
         let bounds = Bounds { lower: answer.mu, upper: answer.mu.max(alone) };
         (alone <= within * answer.mu).then_some(Slipping { bounds, ..answer })
     }
@@ -485,11 +500,16 @@ impl<'a, 'b> Problem<'a, 'b> {
             return None;
         }
         let answer = rolling(&self.basis, space.spins.len(), k, w, (other.load, other.first))?;
-        Some(Rolling { answer, on: k })
+        Some(Rolling::new(answer, k))
+    }
+
+    /// The friction that the face at rest needs for what it bears, and its motion if it moved.
+    fn alone(&self, rolling: &Rolling) -> Option<(f64, Vector5<f64>)> {
+        *rolling.alone.get_or_init(|| self.slips_alone(rolling.on, rolling.borne()))
     }
 
     /// The friction that face `k` alone needs for a load, and its motion.
-    fn alone(&self, k: usize, load: &Vector3<f64>) -> Option<(f64, Vector5<f64>)> {
+    fn slips_alone(&self, k: usize, load: &Vector3<f64>) -> Option<(f64, Vector5<f64>)> {
         if load.amax() <= 1e-15 * self.normal {
             return Some((0.0, Vector5::zeros()));
         }
@@ -499,7 +519,7 @@ impl<'a, 'b> Problem<'a, 'b> {
             active: 3,
             units: self.units,
             normal: self.faces[k].load,
-            evaluations: std::cell::Cell::new(0),
+            evaluations: Cell::new(0),
         };
         let w = Vector5::new(load.x, load.y, load.z, 0.0, 0.0);
         let answer = one.interior(&w, None, PATIENT).map(|slip| (slip.bounds.upper, slip.zeta));
@@ -520,7 +540,7 @@ impl<'a, 'b> Problem<'a, 'b> {
             w.dot(zeta) / (self.normal * self.both(&zeta.component_div(&self.units)).value)
         };
         // The face at rest is moved as it would move by itself.
-        let (_, lifted) = self.alone(best.on, &best.answer.shares[best.on])?;
+        let (_, lifted) = self.alone(best)?;
         let zeta = best.answer.zeta;
         let size = |zeta: &Vector5<f64>| zeta.component_div(&self.units).norm();
         let ratio = size(&zeta) / size(&lifted);
@@ -538,9 +558,22 @@ impl<'a, 'b> Problem<'a, 'b> {
 }
 
 /// A candidate: the body rolls on one face.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 struct Rolling {
     answer: Slipping,
     /// The face at rest.
     on: usize,
+    /// [`Problem::alone`].
+    alone: OnceCell<Option<(f64, Vector5<f64>)>>,
+}
+
+impl Rolling {
+    fn new(answer: Slipping, on: usize) -> Self {
+        Self { answer, on, alone: OnceCell::new() }
+    }
+
+    /// What the face at rest bears.
+    fn borne(&self) -> &Vector3<f64> {
+        &self.answer.shares[self.on]
+    }
 }

@@ -17,11 +17,13 @@ use crate::part::topology::NONE;
 const SMOOTH: f64 = 0.906_307_787_036_65;
 /// Facets that show a form.
 const MANY: usize = 24;
-/// Share of the part's surface below which it is told from no blend.
+/// Facets that show one if all bend the same way: a plane that noise has broken up bends both ways.
+const FEW: usize = 4;
+/// Share of the part's surface below which many facets, and few, are told from no blend.
 const LEAST: f64 = 0.01;
-/// Cosine of the angle that some normal must differ by from the mean: 10 degrees. A plane that
-/// noise has broken up bends both ways and comes back.
-const BENT: f64 = 0.984_807_753_012_208;
+const LARGE: f64 = 0.04;
+/// Cosine of the angle that some normal must differ by from the mean: 0.1 degrees.
+const BENT: f64 = 0.999_998_476_913_288;
 /// Places at which the surface is tried, and vertices about each at least: twice what makes a
 /// paraboloid.
 const PLACES: usize = 200;
@@ -35,9 +37,11 @@ const INFLECTION: f64 = 0.1;
 const SHARE: f64 = 0.9;
 
 /// The smooth regions of free form among triangles that belong to no face, by falling area, not
-/// numbered yet: connected under less than 25 degrees, of 24 facets and 1 % of the part's surface
-/// or more, bent by 10 degrees or more, and smooth: about nine of ten vertices the others lie off a
-/// paraboloid by less than 35 % of what they lie off a plane. Noise is as far from either.
+/// numbered yet: connected under less than 25 degrees, bent by 0.1 degrees or more, of 24 facets and
+/// 1 % of the part's surface or more, and smooth: about nine of ten vertices the others lie off a
+/// paraboloid by less than 35 % of what they lie off a plane. Noise is as far from either. Of four
+/// facets and 4 % of the surface, too, where all bend the same way: a gently arched plate shows too
+/// little of a circle to be a cylinder.
 pub(in crate::part) fn free_faces(
     part: &Repaired,
     regions: &Regions,
@@ -51,7 +55,7 @@ pub(in crate::part) fn free_faces(
     };
     let total: f64 = (0..count).map(|triangle| 0.5 * twice(triangle).length()).sum();
     let loose: Vec<u32> = (0..count as u32).filter(|&t| !is_taken[t as usize]).collect();
-    if loose.len() < MANY {
+    if loose.len() < FEW {
         return Vec::new();
     }
     let mut sets = UnionFind::new(count);
@@ -74,20 +78,32 @@ pub(in crate::part) fn free_faces(
     groups.sort_unstable();
     let mut found: Vec<CurvedFace> = groups
         .chunk_by(|a, b| a.0 == b.0)
-        .filter(|group| group.len() >= MANY)
+        .filter(|group| group.len() >= FEW)
         .map(|group| group.iter().map(|entry| entry.1).collect::<Vec<u32>>())
-        .filter(|triangles| {
+        .filter_map(|triangles| {
             let facets: FxHashSet<u32> =
                 triangles.iter().map(|&t| regions.of[t as usize]).collect();
-            facets.len() >= MANY
+            match facets.len() {
+                MANY.. => describe(part, triangles, LEAST * total, smooth),
+                FEW.. => describe(part, triangles, LARGE * total, |part, triangles| {
+                    bulges(part, regions, triangles)
+                }),
+                _ => None,
+            }
         })
-        .filter_map(|triangles| describe(part, triangles, LEAST * total))
         .collect();
     sort(&mut found, part.diagonal);
     found
 }
 
-fn describe(part: &Repaired, triangles: Vec<u32>, least: f64) -> Option<CurvedFace> {
+/// The face of these triangles, `least` [m^2] or more of them; `form`: whether it bulges outwards, none
+/// for no form.
+fn describe(
+    part: &Repaired,
+    triangles: Vec<u32>,
+    least: f64,
+    form: impl Fn(&Repaired, &[u32]) -> Option<bool>,
+) -> Option<CurvedFace> {
     let mesh = &part.mesh;
     let (mut area, mut centroid, mut sum) = (0.0, DVec3::ZERO, DVec3::ZERO);
     for &triangle in &triangles {
@@ -106,7 +122,7 @@ fn describe(part: &Repaired, triangles: Vec<u32>, least: f64) -> Option<CurvedFa
         let [a, b, c] = mesh.corners(triangle);
         (b - a).cross(c - a).normalize_or_zero().dot(mean) < BENT
     });
-    let outside = if is_bent { smooth(part, &triangles)? } else { return None };
+    let outside = if is_bent { form(part, &triangles)? } else { return None };
     let shell = part.shell_of[triangles[0] as usize];
     Some(CurvedFace {
         id: 0,
@@ -122,6 +138,36 @@ fn describe(part: &Repaired, triangles: Vec<u32>, least: f64) -> Option<CurvedFa
         shell,
         reachable: part.shells[shell as usize].role == Role::Body,
     })
+}
+
+/// Whether all facets of a region bulge outwards, or all inwards.
+fn bulges(part: &Repaired, regions: &Regions, triangles: &[u32]) -> Option<bool> {
+    let mesh = &part.mesh;
+    let normal = |triangle: u32| {
+        let [a, b, c] = mesh.corners(triangle);
+        (b - a).cross(c - a).normalize_or_zero()
+    };
+    let of = |triangle: u32| regions.of[triangle as usize];
+    let (mut outwards, mut inwards) = (0, 0);
+    for &triangle in triangles {
+        for half in 3 * triangle..3 * triangle + 3 {
+            let twin = part.edges.twin[half as usize];
+            if twin == NONE
+                || of(twin / 3) == of(triangle)
+                || triangles.binary_search(&(twin / 3)).is_err()
+            {
+                continue;
+            }
+            let apex = mesh.corners(twin / 3)[((twin + 2) % 3) as usize];
+            let fall = normal(triangle).dot(apex - mesh.corners(triangle)[0]);
+            *(if fall < 0.0 { &mut outwards } else { &mut inwards }) += 1;
+        }
+    }
+    match (outwards, inwards) {
+        (1.., 0) => Some(true),
+        (0, 1..) => Some(false),
+        _ => None,
+    }
 }
 
 /// Whether a region is smooth, and then whether most of it bulges outwards.

@@ -36,6 +36,10 @@ const MANY: usize = 30;
 const ARC: f64 = 0.01;
 /// Sag as a multiple of that of a chord across a typical facet from which on a facet is too deep.
 const DEEP: f64 = 8.0;
+/// Large facets of a whole ball, and of a part of one, at least: a cube with chamfers has 26.
+const BALL: [usize; 2] = [40, 60];
+/// Area of the caps about large facets of a ball over their own, at most: squares 1.6, triangles 2.4.
+const COMPACT: f64 = 6.0;
 /// Side of a square as a share of the diagonal: three facets alone count when smaller.
 const SMALL: f64 = 0.02;
 
@@ -190,6 +194,7 @@ impl Growth<'_> {
                     && area > 0.1 * found.surface.radius().powi(2)
                     && (found.sag < ARC * diagonal || found.members.len() >= 16)
                     && !runs_on
+                    && self.is_ball(found, &edge, area)
             }
             Kind::Torus => {
                 let [tube, about] = torus_turns(found, step);
@@ -221,6 +226,39 @@ impl Growth<'_> {
             sags.fold((f64::INFINITY, 0.0_f64), |(low, high), sag| (low.min(sag), high.max(sag)));
         doubly
             || (edge.most < 1.03 * edge.least && most - least < 0.06 * most + 2.0 * self.net.floor)
+    }
+
+    /// Whether facets on a sphere are alike, and where they are large as wide as long: on a chamfered
+    /// cylinder or cube, too, all corners may lie on a sphere. `area` of all \[m^2\].
+    fn is_ball(&self, found: &Found, edge: &Edge, area: f64) -> bool {
+        let radius = found.surface.radius();
+        let mut sags: Vec<(f64, f64)> = found
+            .members
+            .iter()
+            .filter_map(|&facet| {
+                let net = self.net;
+                let sag =
+                    net.sag(&found.surface, facet, found.sign, f64::INFINITY, f64::INFINITY)?;
+                Some((sag, net.area(facet)))
+            })
+            .collect();
+        sags.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (Some(middle), Some(last)) = (sags.get(sags.len() / 2), sags.last()) else {
+            return false;
+        };
+        if last.0 > DEEP * middle.0 + self.net.floor {
+            return false;
+        }
+        // Half the angle that most of the surface's facets take up.
+        let mut sum = 0.0;
+        let most = sags.iter().find(|(_, own)| {
+            sum += own;
+            sum >= 0.5 * area
+        });
+        let half = (1.0 - most.map_or(last.0, |one| one.0) / radius).clamp(-1.0, 1.0).acos();
+        let caps = found.members.len() as f64 * std::f64::consts::PI * (half * radius).powi(2);
+        2.0 * half <= COARSE
+            || caps <= COMPACT * area && found.members.len() >= BALL[usize::from(edge.outer > 0.0)]
     }
 
     /// Whether distances of the vertices from the surface are noise: neighbours along the rims of

@@ -5,7 +5,7 @@ use glam::{DAffine2, DVec2, DVec3};
 
 use super::places::Edge;
 use super::shapes::to_site;
-use crate::contact::surface::{cut, mapped, pressed, spot};
+use crate::contact::surface::{Shape, mapped, pressed, spot};
 use crate::geometry::polygon;
 use crate::gripper::{Jaws, Layer};
 use crate::mechanics::curved::Pads;
@@ -19,7 +19,7 @@ const POINT_STEP: f64 = 45.0 * std::f64::consts::PI / 180.0;
 #[derive(Debug, Clone)]
 pub(in crate::propose) struct Relief {
     /// Pieces on side I and II in the site's `(x, y)`; gaps are those behind the site's planes.
-    pub(super) pieces: [Vec<Piece>; 2],
+    pieces: [Vec<(Piece, Shape)>; 2],
     /// What is pressed on either side by pads as far as they press one piece over its middle: the
     /// measure of a contact before it is solved.
     pub(in crate::propose) pressed: [Patch; 2],
@@ -38,7 +38,7 @@ impl Relief {
         pads: &[Ring; 2],
         place: DVec2,
     ) -> Option<Self> {
-        let deltas = [0.0; 2];
+        let (pieces, deltas) = (shaped(pieces), [0.0; 2]);
         let relief = Self { pieces, pressed: Default::default(), layer, force, deltas };
         let rings = pads.each_ref().map(|pad| moved_ring(pad, place));
         let under = relief.under(
@@ -47,7 +47,7 @@ impl Relief {
             Jaws::Straight,
         );
         let deltas = Pads::new(&under).ok()?.deltas(force)?;
-        Some(Self::pressed_by(relief.pieces, layer, force, deltas))
+        Some(relief.with_deltas(deltas))
     }
 
     /// With the pressure of pads whose layers are compressed by `deltas` at the pads' planes.
@@ -57,19 +57,25 @@ impl Relief {
         force: f64,
         deltas: [f64; 2],
     ) -> Self {
+        let pressed = Default::default();
+        Self { pieces: shaped(pieces), pressed, layer, force, deltas }.with_deltas(deltas)
+    }
+
+    fn with_deltas(self, deltas: [f64; 2]) -> Self {
         let pressed = [0, 1].map(|side: usize| {
-            pieces[side].iter().flat_map(|piece| pressed(piece, deltas[side])).collect()
+            let pieces = self.pieces[side].iter();
+            pieces.flat_map(|(piece, _)| pressed(piece, deltas[side])).collect()
         });
-        Self { pieces, pressed, layer, force, deltas }
+        Self { pressed, deltas, ..self }
     }
 
     /// As seen from another origin and turn.
     pub(super) fn moved(&self, origin: DVec2, turn: f64) -> Self {
         let map = DAffine2::from_angle(-turn) * DAffine2::from_translation(-origin);
-        let pieces = [0, 1].map(|side: usize| {
+        let pieces = shaped([0, 1].map(|side: usize| {
             let pieces = self.pieces[side].iter();
-            pieces.map(|piece| moved(&piece.polygon(), &piece.gap, &map)).collect()
-        });
+            pieces.map(|(piece, _)| moved(piece.polygon(), &piece.gap, &map)).collect()
+        }));
         let pressed = [0, 1].map(|side: usize| {
             self.pressed[side].iter().map(|polygon| to_site(polygon, origin, turn)).collect()
         });
@@ -84,13 +90,12 @@ impl Relief {
             Jaws::Exchanged => DAffine2::from_scale(DVec2::new(1.0, -1.0)) * *grip_from_site,
         };
         let under = |side: usize| -> Vec<Piece> {
-            let pieces = self.pieces[side].iter();
-            pieces
-                .flat_map(|piece| {
-                    let polygons = cut(piece, rings[side]);
-                    polygons.into_iter().map(|polygon| moved(&polygon, &piece.gap, &map))
-                })
-                .collect()
+            let mut under = Vec::new();
+            for (piece, shape) in &self.pieces[side] {
+                let mut give = |polygon| under.push(moved(polygon, &piece.gap, &map));
+                shape.cut(piece, rings[side], &mut give);
+            }
+            under
         };
         let (face_i, face_ii) = match jaws {
             Jaws::Straight => (under(0), under(1)),
@@ -140,7 +145,7 @@ impl Relief {
 
     /// Directions of the crests, in the site's `(x, y)`.
     fn crests(&self) -> impl Iterator<Item = DVec2> + '_ {
-        self.pieces.iter().flatten().filter_map(|piece| match piece.gap {
+        self.pieces.iter().flatten().filter_map(|(piece, _)| match piece.gap {
             Gap::Cylinder { axis, .. } | Gap::Barrel { axis, .. } | Gap::Cone { axis, .. } => {
                 Some(axis)
             }
@@ -188,7 +193,16 @@ fn moved_ring(ring: &[DVec2], by: DVec2) -> Ring {
     ring.iter().map(|&point| point + by).collect()
 }
 
-fn moved(polygon: &Polygon, gap: &Gap, map: &DAffine2) -> Piece {
-    let Polygon { outer, holes } = polygon::transform(polygon, map);
+/// Pieces with what their outlines say.
+fn shaped(pieces: [Vec<Piece>; 2]) -> [Vec<(Piece, Shape)>; 2] {
+    let shaped = |piece: Piece| {
+        let shape = Shape::of(&piece);
+        (piece, shape)
+    };
+    pieces.map(|pieces| pieces.into_iter().map(shaped).collect())
+}
+
+fn moved(polygon: Polygon, gap: &Gap, map: &DAffine2) -> Piece {
+    let Polygon { outer, holes } = polygon::transformed(polygon, map);
     Piece { outer, holes, gap: mapped(gap, map) }
 }

@@ -250,6 +250,7 @@ impl Finder<'_> {
             self.add_closings(axis, &mut found);
         }
         let is_sphere = |face: &CurvedFace| matches!(face.shape, Shape::Sphere { .. });
+        self.facing_spheres().into_iter().for_each(|direction| add(direction, &mut found));
         if self.round_faces().any(is_sphere) {
             let divisions = (ICOSAHEDRON / self.options.angle_step).round() as usize;
             let divisions = divisions.clamp(1, MOST_DIVISIONS);
@@ -260,6 +261,40 @@ impl Finder<'_> {
                 for index in 0..2 * divisions {
                     let turn = std::f64::consts::PI * index as f64 / (2 * divisions) as f64;
                     add(first * turn.cos() + second * turn.sin(), &mut found);
+                }
+            }
+        }
+        found
+    }
+
+    /// Directions in which a sphere stands opposite a plane, another sphere or a cylinder, which a step
+    /// of directions may miss: a cap shows few of them.
+    fn facing_spheres(&self) -> Vec<DVec3> {
+        let spheres: Vec<(&CurvedFace, DVec3, f64)> = self
+            .round_faces()
+            .filter_map(|face| match face.shape {
+                Shape::Sphere { centre, radius } => Some((face, centre, radius)),
+                _ => None,
+            })
+            .take(MOST_PLANES)
+            .collect();
+        let planes = self.part.faces.iter().filter(|face| face.reachable);
+        let planes: Vec<DVec3> = planes.take(MOST_PLANES).map(|face| face.normal).collect();
+        let mut found = Vec::new();
+        for (index, &(face, centre, radius)) in spheres.iter().enumerate() {
+            let mut take = |direction: DVec3| {
+                if [1.0, -1.0].iter().any(|s| self.has_crest(face, s * direction, centre, radius)) {
+                    found.push(direction);
+                }
+            };
+            planes.iter().for_each(|normal| take(*normal));
+            let others = spheres[..index].iter();
+            others.filter_map(|other| (centre - other.1).try_normalize()).for_each(&mut take);
+            for other in self.round_faces().take(MOST_PLANES) {
+                if let Shape::Cylinder { axis, .. } = other.shape
+                    && let Some(across) = (centre - axis.foot(centre)).try_normalize()
+                {
+                    take(across);
                 }
             }
         }

@@ -29,6 +29,8 @@ const SAME_HEIGHT: f64 = 1e-14;
 pub(super) const LEVEL: f64 = 5e-4;
 /// The part of a radius to either side of a crest within which the parabola stands for the circle.
 const PARABOLA: f64 = 0.9;
+/// Gap of a round face over that of the parabola for it, at most.
+const DEEPER: f64 = 1.5;
 /// Share of the reach that is added to boxes against rounding.
 const SLACK: f64 = 1e-3;
 /// Corners of the window around what a pad may touch of a sphere.
@@ -181,7 +183,7 @@ impl<'a> Survey<'a> {
         let region = Bounds2::of(window);
         let look = Look { survey: self, height: 0.0, side, reach: 0.0, above: 0.0, region };
         let mut pieces = Vec::new();
-        look.outline(triangles, window, gap, &mut pieces);
+        look.outline(triangles, f64::INFINITY, window, gap, &mut pieces);
         pieces
     }
 }
@@ -378,7 +380,7 @@ impl Look<'_> {
                     .map(|(x, y)| corner(x, y));
                 let radius = if face.outside { radius } else { -radius };
                 let gap = Gap::Cylinder { radius, axis: direction, at, height };
-                self.outline(&face.triangles, &window, gap, pieces);
+                self.within(face, &window, gap, pieces);
                 true
             }
             Shape::Cone { apex, axis, half_angle, along } => {
@@ -403,7 +405,7 @@ impl Look<'_> {
                         .map(|(x, y)| corner(x, y));
                     let (radius, slope) = (sense * radius, -sense * slope);
                     let gap = Gap::Cone { radius, slope, axis: direction, at, height };
-                    self.outline(&face.triangles, &window, gap, pieces);
+                    self.within(face, &window, gap, pieces);
                 }
                 true
             }
@@ -413,12 +415,7 @@ impl Look<'_> {
                 if height < self.reach {
                     let at = centre.truncate();
                     let window = ellipse(at, DVec2::X, [half(radius, height); 2]);
-                    self.outline(
-                        &face.triangles,
-                        &window,
-                        Gap::Sphere { radius, at, height },
-                        pieces,
-                    );
+                    self.within(face, &window, Gap::Sphere { radius, at, height }, pieces);
                 }
                 true
             }
@@ -432,7 +429,7 @@ impl Look<'_> {
                     let window =
                         ellipse(at, direction, [half(minor, height), half(radius, height)]);
                     let gap = Gap::Barrel { radius, meridian: minor, axis: direction, at, height };
-                    self.outline(&face.triangles, &window, gap, pieces);
+                    self.within(face, &window, gap, pieces);
                 }
                 true
             }
@@ -440,8 +437,21 @@ impl Look<'_> {
         }
     }
 
-    /// The part of some triangles within a window.
-    fn outline(&self, triangles: &[u32], window: &[DVec2], gap: Gap, pieces: &mut Vec<Piece>) {
+    /// The part of a curved face within a window.
+    fn within(&self, face: &CurvedFace, window: &[DVec2], gap: Gap, pieces: &mut Vec<Piece>) {
+        // What lies behind, as the far wall of a hole, is under the pad too, and seen from there.
+        self.outline(&face.triangles, DEEPER * self.reach, window, gap, pieces);
+    }
+
+    /// The part of some triangles within a window, up to a gap of `deepest` \[m\].
+    fn outline(
+        &self,
+        triangles: &[u32],
+        deepest: f64,
+        window: &[DVec2],
+        gap: Gap,
+        pieces: &mut Vec<Piece>,
+    ) {
         let within = Bounds2::of(window);
         if !within.meets(self.region) {
             return;
@@ -451,7 +461,11 @@ impl Look<'_> {
             let corners = self.survey.corners(triangle);
             let [a, b, c] = corners.map(DVec3::truncate);
             let bounds = Bounds2 { min: a.min(b).min(c), max: a.max(b).max(c) };
-            if bounds.meets(within) && (b - a).perp_dot(c - a) * self.side > 0.0 {
+            let behind = corners.map(|corner| self.side * (self.height - corner.z));
+            if behind.into_iter().fold(f64::INFINITY, f64::min) <= deepest
+                && bounds.meets(within)
+                && (b - a).perp_dot(c - a) * self.side > 0.0
+            {
                 seen.push(triangle);
             }
         }
