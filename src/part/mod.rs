@@ -377,6 +377,13 @@ impl Part {
         MassProperties { mass: unit.mass * density, inertia: unit.inertia * density, ..*unit }
     }
 
+    /// The curved face that a plane is a facet of as well: so few make its turn that either may be meant.
+    pub(crate) fn round_of(&self, plane: &PlanarFace) -> Option<&CurvedFace> {
+        let first = plane.triangles.first()?;
+        let mut doubtful = self.curved.iter().filter(|face| face.is_doubtful());
+        doubtful.find(|face| face.triangles.binary_search(first).is_ok())
+    }
+
     /// The curved face of this number.
     pub fn curved_face(&self, id: u32) -> Option<&CurvedFace> {
         self.curved.get((id as usize).checked_sub(self.faces.len())?)

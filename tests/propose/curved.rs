@@ -401,3 +401,28 @@ fn a_ring_is_touched_at_its_outside_alone() {
         assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
     }
 }
+
+/// Both readings of few facets are tried, each by itself.
+#[test]
+fn round_or_faceted_but_never_both_at_once() {
+    for facets in [8, 9, 12, 14] {
+        let (vertices, triangles) = cylinder(RADIUS, LENGTH, facets, 0.1);
+        let part = Part::from_triangles("bar", &vertices, &triangles).unwrap();
+        assert_eq!(part.curved.len(), 1);
+        let options = ProposeOptions::default().with_spacing(Some(0.008)).with_curved(Some(true));
+        let grips = proposals(&part, &options);
+        let (round, flat): (Vec<_>, Vec<_>) =
+            grips.iter().partition(|grip| grip.surfaces.is_some());
+        assert!(round.len() > 20, "{facets}: {}", round.len());
+        for grip in round {
+            let surfaces = grip.surfaces.as_ref().unwrap();
+            assert!((grip.width / (2.0 * RADIUS) - 1.0).abs() < 1e-5, "{facets}: {}", grip.width);
+            for piece in surfaces.face_i.iter().chain(&surfaces.face_ii) {
+                assert!(matches!(piece.gap, Gap::Cylinder { .. }), "{facets}: {:?}", piece.gap);
+            }
+        }
+        let across = 2.0 * RADIUS * (std::f64::consts::PI / f64::from(facets)).cos();
+        let between = |grip: &&&gripfast::model::Grip| (grip.width - across).abs() < 1e-6;
+        assert_eq!(flat.iter().any(|grip| between(&grip)), facets % 2 == 0, "{facets}");
+    }
+}

@@ -80,7 +80,7 @@ impl Tally {
                 self.leaning.iter().map(|angle| format!("{:.2}", angle.to_degrees())).collect();
             remarks.push(format!(
                 "opposite faces lean by {} deg against the pads; those of {} take planes of up to \
-                 {:.2} deg at {} N",
+                 {:.2} deg at {} N, cones and narrow faces of less; less force lets them lean more",
                 angles.join(", "),
                 gripper.name,
                 site::steepest(gripper, options).to_degrees(),

@@ -366,6 +366,7 @@ impl Finder<'_> {
                 && aligned
                 && face.normal.dot(closing) > 0.0
                 && self.may_touch(face.id)
+                && self.part.round_of(face).is_none()
             {
                 let bounds = polygon::bounds(&project(std::iter::once(face), &axes_from_part));
                 let (height, ends) = (closing.dot(face.centroid), [DVec3::ZERO; 2]);

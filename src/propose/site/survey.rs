@@ -106,6 +106,10 @@ impl<'a> Survey<'a> {
         };
         let corners = |&triangle: &u32| corners(part, &axes_from_part, &points, triangle);
         let plane = |face: &PlanarFace| {
+            // As a facet of a round face it is there once.
+            if part.round_of(face).is_some_and(|round| !is_left_out(round)) {
+                return Span { across: Bounds2::EMPTY, along: [0.0; 2] };
+            }
             let outlines = face.polygons.iter().flat_map(|polygon| &polygon.outer);
             Span::of(outlines.map(|at| axes_from_part * face.part_from_face.point(at.extend(0.0))))
         };
