@@ -32,6 +32,17 @@ impl HalfPlane {
         let normal = (b - a).perp();
         Self { normal, offset: -normal.dot(a) }
     }
+
+    /// Whether it keeps all of a box of this middle and half size, or nothing, beyond rounding; `None` where
+    /// it may cut it. A side of no length has no value, and cuts nothing.
+    fn keeps(&self, middle: DVec2, half_size: DVec2) -> Option<bool> {
+        let (value, most) = (self.value(middle), self.normal.abs().dot(half_size) * BOX);
+        match () {
+            () if value >= most => Some(true),
+            () if value < -most => Some(false),
+            () => None,
+        }
+    }
 }
 
 /// The part of a plane ring in space with `sign * point[axis] <= limit`; `sign` is 1 or -1. New
@@ -104,20 +115,14 @@ pub fn clip_ring_convex(ring: &[DVec2], convex: &[DVec2]) -> Ring {
     for (&a, &b) in convex.iter().zip(convex.iter().cycle().skip(1)) {
         let half = HalfPlane::left_of(a, b);
         // A side that leaves the ring's box as it is leaves the ring.
-        let (value, most) = (half.value(middle), half.normal.abs().dot(size));
-        if value > most * BOX {
-            continue;
+        match half.keeps(middle, size) {
+            Some(true) => continue,
+            Some(false) => return Ring::new(),
+            None => {}
         }
-        if value < -most * BOX {
-            return Ring::new();
-        }
-        if is_whole {
-            next.reserve(ring.len() + convex.len());
-            clip_ring_half_plane_into(ring, &half, &mut next);
-        } else {
-            next.reserve(current.len() + convex.len());
-            clip_ring_half_plane_into(&current, &half, &mut next);
-        }
+        next.reserve(ring.len() + convex.len());
+        let from = if is_whole { ring } else { &current };
+        clip_ring_half_plane_into(from, &half, &mut next);
         std::mem::swap(&mut current, &mut next);
         is_whole = false;
     }
@@ -135,16 +140,14 @@ pub(crate) fn clip_convex(ring: &[DVec2], convex: &[DVec2]) -> Ring {
     for &b in convex {
         let half = HalfPlane::left_of(a, b);
         a = b;
-        // Of the box: a side of no length has no value, and cuts nothing.
-        let (value, most) = (half.value(middle), half.normal.abs().dot(size));
-        if value < -most {
-            return Ring::new();
+        match half.keeps(middle, size) {
+            Some(true) => continue,
+            Some(false) => return Ring::new(),
+            None => {}
         }
-        if value < most * BOX {
-            clip_ring_half_plane_into(&current, &half, &mut next);
-            std::mem::swap(&mut current, &mut next);
-            is_whole = false;
-        }
+        clip_ring_half_plane_into(&current, &half, &mut next);
+        std::mem::swap(&mut current, &mut next);
+        is_whole = false;
     }
     // A corner on a side is met twice.
     if is_whole { current } else { straightened(&current) }
@@ -153,10 +156,8 @@ pub(crate) fn clip_convex(ring: &[DVec2], convex: &[DVec2]) -> Ring {
 /// Whether a box lies within a convex counter-clockwise polygon beyond rounding.
 pub(crate) fn is_within(bounds: Bounds2, convex: &[DVec2]) -> bool {
     let (middle, size) = (bounds.centre(), 0.5 * bounds.size());
-    convex.iter().zip(convex.iter().cycle().skip(1)).all(|(&a, &b)| {
-        let half = HalfPlane::left_of(a, b);
-        half.value(middle) > half.normal.abs().dot(size) * BOX
-    })
+    let mut sides = convex.iter().zip(convex.iter().cycle().skip(1));
+    sides.all(|(&a, &b)| HalfPlane::left_of(a, b).keeps(middle, size) == Some(true))
 }
 
 /// Size of a box beyond which no rounding lets a side cut it.

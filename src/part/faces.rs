@@ -156,7 +156,7 @@ fn noisy(noise: Noise, taken: f64) -> String {
         noise.distance * 1e6,
         noise.distance / taken,
         taken * 1e6,
-        (noise.tolerance(1e-3) * 1e9).round() / 1e6
+        noise.tolerance()
     )
 }
 

@@ -47,13 +47,13 @@ pub(super) struct Noise {
 }
 
 impl Noise {
-    /// A tolerance with which planes can be fitted, rounded up to a plain number of `unit` \[m\].
-    pub(super) fn tolerance(&self, unit: f64) -> f64 {
-        let plain = FITS * self.distance / unit;
+    /// A tolerance with which planes can be fitted, rounded up to a plain number \[mm\].
+    pub(super) fn tolerance(&self) -> f64 {
+        let plain = FITS * self.distance * 1e3;
         let step = 10.0_f64.powf(plain.log10().floor());
         // A power of ten below one is no exact number, its inverse is.
         let rounded = (plain / step).ceil();
-        unit * if step < 1.0 { rounded / (1.0 / step).round() } else { rounded * step }
+        if step < 1.0 { rounded / (1.0 / step).round() } else { rounded * step }
     }
 }
 

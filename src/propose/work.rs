@@ -50,7 +50,9 @@ impl Known {
         if let Some(known) = self.contacts.get(&self.key) {
             return known.clone();
         }
-        self.contacts.entry(self.key.clone()).or_insert_with(made).clone()
+        let made = made();
+        self.contacts.insert(self.key.clone(), made.clone());
+        made
     }
 }
 
@@ -459,7 +461,8 @@ fn push(key: &mut Vec<i64>, step: f64, ring: &[DVec2]) {
     key.push(i64::MAX);
 }
 
-/// To the nearest whole number.
+/// To the nearest whole number, as `round` has it where halves do not matter: that is a call on processors
+/// without an instruction for it.
 fn rounded(x: f64) -> i64 {
     (x + 0.5_f64.copysign(x)) as i64
 }

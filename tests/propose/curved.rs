@@ -8,7 +8,7 @@ use gripfast::geometry::patch_area;
 use gripfast::gripper;
 use gripfast::load::{LoadSet, wrench_in_grip};
 use gripfast::mechanics::curved::Pads;
-use gripfast::model::{Gap, LoadCase, Slip, Status, Wrench};
+use gripfast::model::{Gap, Grip, LoadCase, Slip, Status, Wrench};
 use gripfast::part::Part;
 use gripfast::plan::{Assessor, Plan, Settings};
 use gripfast::propose::{ProposeOptions, Proposer};
@@ -286,14 +286,13 @@ pub(crate) fn screened_as_solved(name: &str, part: &Part, count: usize) -> [usiz
 
 #[test]
 fn an_assessor_solves_every_load_of_a_barrel_where_that_is_asked() {
-    let (part, gripper) = (shaft(0.3), gripper::find("robotiq-2f85").unwrap());
+    let part = shaft(0.3);
     let options = ProposeOptions::default()
         .with_curved(Some(true))
         .with_spacing(Some(0.02))
         .with_angle_step(1.6);
-    let grips: Vec<_> = Proposer::new(&part, &gripper, &options)
-        .unwrap()
-        .flat_map(|chunk| chunk.grips)
+    let grips: Vec<_> = proposals(&part, &options)
+        .into_iter()
         .filter(|grip| grip.surfaces.is_some())
         .take(4)
         .collect();
@@ -339,7 +338,7 @@ fn comparing_loads_gives_the_worst_one_that_solving_all_of_them_gives() {
     assert!(4 * solved < all, "{solved} of {all}");
 }
 
-fn proposals(part: &Part, options: &ProposeOptions) -> Vec<gripfast::model::Grip> {
+fn proposals(part: &Part, options: &ProposeOptions) -> Vec<Grip> {
     let gripper = gripper::find("robotiq-2f85").unwrap();
     Proposer::new(part, &gripper, options).unwrap().flat_map(|chunk| chunk.grips).collect()
 }
@@ -388,11 +387,11 @@ fn a_ring_is_touched_at_its_outside_alone() {
     }
     let part = Part::from_triangles("ring", &vertices, &triangles).unwrap();
     let grips = proposals(&part, &ProposeOptions::default().with_spacing(Some(0.008)));
+    let gripper = gripper::find("robotiq-2f85").unwrap();
     let wide: Vec<_> = grips.iter().filter(|grip| (grip.width - 0.064).abs() < 1e-3).collect();
     assert!(wide.len() > 10, "{}", grips.len());
     for grip in wide.iter().filter(|grip| grip.part_from_grip.origin.length() < 1e-6) {
         // A paraboloid's load is half its area times its depth.
-        let gripper = gripper::find("robotiq-2f85").unwrap();
         let stiffness = gripper.layer().stiffness;
         let radii = (major + minor) * minor;
         let deep = (gripper.force[1] / (std::f64::consts::PI * stiffness * radii.sqrt())).sqrt();
@@ -422,7 +421,7 @@ fn round_or_faceted_but_never_both_at_once() {
             }
         }
         let across = 2.0 * RADIUS * (std::f64::consts::PI / f64::from(facets)).cos();
-        let between = |grip: &&&gripfast::model::Grip| (grip.width - across).abs() < 1e-6;
+        let between = |grip: &&&Grip| (grip.width - across).abs() < 1e-6;
         assert_eq!(flat.iter().any(|grip| between(&grip)), facets % 2 == 0, "{facets}");
     }
 }

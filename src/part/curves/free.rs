@@ -8,7 +8,7 @@ use super::{CurvedFace, Shape};
 use crate::geometry::{Paraboloid, UnionFind};
 use crate::part::FaceSource;
 use crate::part::orient::Role;
-use crate::part::regions::Regions;
+use crate::part::regions::{Regions, twice_normal};
 use crate::part::repair::Repaired;
 use crate::part::topology::NONE;
 
@@ -49,10 +49,7 @@ pub(in crate::part) fn free_faces(
 ) -> Vec<CurvedFace> {
     let mesh = &part.mesh;
     let count = mesh.triangles.len();
-    let twice = |triangle: usize| {
-        let [a, b, c] = mesh.corners(triangle as u32);
-        (b - a).cross(c - a)
-    };
+    let twice = |triangle: usize| twice_normal(mesh.corners(triangle as u32));
     let total: f64 = (0..count).map(|triangle| 0.5 * twice(triangle).length()).sum();
     let loose: Vec<u32> = (0..count as u32).filter(|&t| !is_taken[t as usize]).collect();
     if loose.len() < FEW {
@@ -108,7 +105,7 @@ fn describe(
     let (mut area, mut centroid, mut sum) = (0.0, DVec3::ZERO, DVec3::ZERO);
     for &triangle in &triangles {
         let [a, b, c] = mesh.corners(triangle);
-        let twice = (b - a).cross(c - a);
+        let twice = twice_normal([a, b, c]);
         let own = 0.5 * twice.length();
         area += own;
         centroid += (a + b + c) / 3.0 * own;
@@ -118,10 +115,9 @@ fn describe(
         return None;
     }
     let mean = sum.normalize_or_zero();
-    let is_bent = triangles.iter().any(|&triangle| {
-        let [a, b, c] = mesh.corners(triangle);
-        (b - a).cross(c - a).normalize_or_zero().dot(mean) < BENT
-    });
+    let is_bent = triangles
+        .iter()
+        .any(|&triangle| twice_normal(mesh.corners(triangle)).normalize_or_zero().dot(mean) < BENT);
     let outside = if is_bent { form(part, &triangles)? } else { return None };
     let shell = part.shell_of[triangles[0] as usize];
     Some(CurvedFace {
@@ -143,10 +139,7 @@ fn describe(
 /// Whether all facets of a region bulge outwards, or all inwards.
 fn bulges(part: &Repaired, regions: &Regions, triangles: &[u32]) -> Option<bool> {
     let mesh = &part.mesh;
-    let normal = |triangle: u32| {
-        let [a, b, c] = mesh.corners(triangle);
-        (b - a).cross(c - a).normalize_or_zero()
-    };
+    let normal = |triangle: u32| twice_normal(mesh.corners(triangle)).normalize_or_zero();
     let of = |triangle: u32| regions.of[triangle as usize];
     let (mut outwards, mut inwards) = (0, 0);
     for &triangle in triangles {
@@ -198,8 +191,7 @@ fn smooth(part: &Repaired, triangles: &[u32]) -> Option<bool> {
             inner = near.len();
             for index in ring {
                 for triangle in of(near[index]) {
-                    let [a, b, c] = mesh.corners(triangle);
-                    normal += (b - a).cross(c - a);
+                    normal += twice_normal(mesh.corners(triangle));
                     for corner in mesh.triangles[triangle as usize] {
                         if !near.contains(&corner) {
                             near.push(corner);

@@ -215,15 +215,19 @@ impl Growth<'_> {
         (is_sound && is_true).then_some(Cut { step, facets, turn })
     }
 
+    /// Sag \[m\] and area [m^2] of each facet.
+    fn sags(&self, found: &Found) -> impl Iterator<Item = (f64, f64)> {
+        let net = self.net;
+        let sag = |facet| net.sag(&found.surface, facet, found.sign, f64::INFINITY, f64::INFINITY);
+        found.members.iter().filter_map(move |&facet| Some((sag(facet)?, net.area(facet))))
+    }
+
     /// Whether coarse facets are alike: a square bar with chamfers also has its corners on a circle.
     fn is_even(&self, found: &Found, edge: &Edge) -> bool {
         let doubly = matches!(found.kind, Kind::Torus | Kind::Sphere);
-        let sags = found.members.iter().filter_map(|&facet| {
-            let net = self.net;
-            net.sag(&found.surface, facet, found.sign, f64::INFINITY, f64::INFINITY)
-        });
-        let (least, most) =
-            sags.fold((f64::INFINITY, 0.0_f64), |(low, high), sag| (low.min(sag), high.max(sag)));
+        let (least, most) = self
+            .sags(found)
+            .fold((f64::INFINITY, 0.0_f64), |(low, high), sag| (low.min(sag.0), high.max(sag.0)));
         doubly
             || (edge.most < 1.03 * edge.least && most - least < 0.06 * most + 2.0 * self.net.floor)
     }
@@ -232,16 +236,7 @@ impl Growth<'_> {
     /// cylinder or cube, too, all corners may lie on a sphere. `area` of all \[m^2\].
     fn is_ball(&self, found: &Found, edge: &Edge, area: f64) -> bool {
         let radius = found.surface.radius();
-        let mut sags: Vec<(f64, f64)> = found
-            .members
-            .iter()
-            .filter_map(|&facet| {
-                let net = self.net;
-                let sag =
-                    net.sag(&found.surface, facet, found.sign, f64::INFINITY, f64::INFINITY)?;
-                Some((sag, net.area(facet)))
-            })
-            .collect();
+        let mut sags: Vec<(f64, f64)> = self.sags(found).collect();
         sags.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (Some(middle), Some(last)) = (sags.get(sags.len() / 2), sags.last()) else {
             return false;

@@ -250,8 +250,8 @@ impl Finder<'_> {
             self.add_closings(axis, &mut found);
         }
         let is_sphere = |face: &CurvedFace| matches!(face.shape, Shape::Sphere { .. });
-        self.facing_spheres().into_iter().for_each(|direction| add(direction, &mut found));
         if self.round_faces().any(is_sphere) {
+            self.facing_spheres().into_iter().for_each(|direction| add(direction, &mut found));
             let divisions = (ICOSAHEDRON / self.options.angle_step).round() as usize;
             let divisions = divisions.clamp(1, MOST_DIVISIONS);
             let evenly = directions(10 * divisions * divisions + 2);
