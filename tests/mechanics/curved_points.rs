@@ -3,7 +3,7 @@
 
 use glam::{DVec2, DVec3};
 use gripfast::contact::surface::{Gap, Surfaces};
-use gripfast::mechanics::curved::{Answer, Note, solve};
+use gripfast::mechanics::curved::{Answer, Note, Pads};
 use gripfast::model::{Status, Wrench};
 use nalgebra::{Matrix5, Vector5};
 
@@ -94,8 +94,9 @@ pub(crate) fn posed(number: u64) -> Posed {
     Posed { surfaces, spins, distance, force, wrench: Wrench { force: f, moment } }
 }
 
-/// A point with its pressure's force, face, and slope of the surface.
+/// A point with the tilt that its face feels, its pressure's force, and slope of the surface.
 struct Spot {
+    felt: DVec2,
     x: DVec2,
     height: f64,
     face: usize,
@@ -165,7 +166,14 @@ fn on_points(posed: &Posed, spins: &[DVec2], answer: &Answer, grid: usize) -> Ve
                 });
                 let p = posed.surfaces.stiffness[k] * u.max(0.0) * cell.x * cell.y;
                 let height = sign * 0.5 * posed.distance;
-                spots.push(Spot { x, height, face: k, p, slope: DVec2::from(slope) });
+                spots.push(Spot {
+                    felt: sign * felt(&piece.gap, tilt),
+                    x,
+                    height,
+                    face: k,
+                    p,
+                    slope: DVec2::from(slope),
+                });
             }
         }
     }
@@ -179,6 +187,15 @@ fn on_points(posed: &Posed, spins: &[DVec2], answer: &Answer, grid: usize) -> Ve
         normal[spot.face] += spot.p;
         force += push;
         moment += spot.x.extend(spot.height).cross(push);
+    }
+    // The push of tilted planes where it counts, of the points' own pressure.
+    if let Some(told) = answer.notes.iter().find_map(|note| match note {
+        Note::TiltPushesMuch { force, .. } => Some(DVec2::from(*force)),
+        _ => None,
+    }) {
+        let push: DVec2 = spots.iter().map(|spot| spot.p * spot.felt).sum();
+        assert!((push - told).length() < TOLERANCE / grid as f64 * told.length(), "{push} {told}");
+        force += push.extend(0.0);
     }
     let wanted = [0.5, -0.5].map(|half| posed.force + half * posed.wrench.force.z);
     let off = (0..2).map(|k| (normal[k] / wanted[k] - 1.0).abs()).fold(0.0, f64::max);
@@ -289,7 +306,8 @@ fn agree_on_points(numbers: std::ops::Range<u64>, grid: usize) -> Seen {
         .into_par_iter()
         .map(|number| {
             let posed = posed(number);
-            let got = solve(&posed.surfaces, posed.distance, posed.force, &posed.wrench).unwrap();
+            let pads = Pads::new(&posed.surfaces).unwrap();
+            let got = pads.solve_pushed(posed.distance, posed.force, &posed.wrench);
             assert_ne!(got.score.status, Status::NotConverged, "case {number}");
             let free = usize::from(got.dimensions) - 3;
             let mut spins = posed.spins.clone();

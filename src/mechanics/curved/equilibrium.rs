@@ -13,7 +13,10 @@ use super::slip::{self, Slipping, Space};
 use crate::model::Wrench;
 
 /// What is asked: both faces, their distance, normal forces, and the load.
+#[derive(Clone)]
 pub(super) struct Problem<'a> {
+    /// Whether pieces of planes push along the pads when they tilt, and others do not.
+    pub(super) pushes: bool,
     pub(super) faces: [&'a Face; 2],
     pub(super) distance: f64,
     pub(super) normal: [f64; 2],
@@ -61,6 +64,34 @@ const RAYS: usize = 16;
 const RINGS: usize = 7;
 /// Starts of Newton's method in the plane.
 const STARTS: usize = 10;
+
+/// The force along the pads that brings about itself, by steps that follow how it answers.
+pub(super) struct Push {
+    pub(super) force: DVec2,
+    /// The last step, and what was left over before it.
+    last: Option<(DVec2, DVec2)>,
+}
+
+impl Push {
+    pub(super) fn new(force: DVec2) -> Self {
+        Self { force, last: None }
+    }
+
+    /// Whether the force brings about itself but for `close`; else the next one to try.
+    pub(super) fn is_found(&mut self, brought: DVec2, close: f64) -> bool {
+        let left = brought - self.force;
+        if left.length() <= close {
+            return true;
+        }
+        let slope = self.last.map_or(-1.0, |(step, before)| {
+            ((left - before).dot(step) / step.length_squared()).clamp(-4.0, -0.25)
+        });
+        let step = left / -slope;
+        self.last = Some((step, left));
+        self.force += step;
+        false
+    }
+}
 
 impl<'a> Problem<'a> {
     /// `(a1, a2)` for angles in their units: compression is `delta - h +- a . x`.
@@ -115,16 +146,20 @@ impl<'a> Problem<'a> {
         self.wrench.moment.truncate() + moment
     }
 
-    /// What friction would do with the pressure of a state if the force along the pads counted
-    /// that planes bring when they tilt; `None` where that changes it by less than the share
-    /// `least`.
+    /// The force along the pads that planes bring when they tilt.
+    pub(super) fn push(&self, faces: [&Pressed<'_>; 2]) -> DVec2 {
+        if self.pushes { faces[0].tilted + faces[1].tilted } else { DVec2::ZERO }
+    }
+
+    /// What friction would do with the pressure of a state if [`Self::push`] counted; `None` where that
+    /// changes it by less than the share `least`.
     pub(super) fn with_tilting_planes(
         &self,
         state: &State<'_>,
         least: f64,
     ) -> Option<(DVec2, Slipping)> {
         let faces = [&state.faces[0], &state.faces[1]];
-        let more = faces[0].tilted + faces[1].tilted;
+        let more = self.push(faces);
         // It cannot add more to the friction than it is.
         let mu = state.slip.map_or(0.0, |slip| slip.mu);
         if more.length() <= least * mu * (self.normal[0] + self.normal[1]) {

@@ -35,7 +35,7 @@ pub(super) struct Pressed<'a> {
     pub(super) slope: DVec2,
     /// Moment about `x3` of that push.
     pub(super) turn: f64,
-    /// What the tilt adds to the push, left out as for planar contacts.
+    /// What the tilt adds to the push.
     pub(super) tilted: DVec2,
     /// `int p x^2`.
     second: f64,

@@ -29,7 +29,7 @@ use crate::error::{Error, Result};
 use crate::model::{Face as Side, Score, Slip, Status, Wrench, check_area};
 
 use super::{COUPLING_SEARCH, refused};
-use equilibrium::{Problem, State};
+use equilibrium::{Problem, Push, State};
 use face::{Face, Pressed};
 pub use inverse::force_needed;
 pub use note::{Note, SoftLimit};
@@ -61,6 +61,17 @@ pub struct FaceAnswer {
 
 /// Change of `mu_s` from which [`Note::TiltPushes`] is given.
 const TILTING_PUSH: f64 = 1e-3;
+
+/// Rise of `mu_s`, as a share and by itself, from which the push of tilted planes is counted.
+const COUNTS: (f64, f64) = (0.01, 1e-4);
+
+/// Factor on what the push raises `mu_s` by at the tilt without it, that covers what it changes of it.
+const SURELY: f64 = 2.0;
+
+/// Solutions at most until that push and the tilt agree, and the share of the normal forces at which
+/// they do.
+const PUSHES: u32 = 40;
+const AGREED: f64 = 1e-12;
 
 /// Push across the axis of a part that can spin, over the normal forces, from which
 /// [`Note::OverEdge`] is given.
@@ -177,7 +188,13 @@ impl Pads {
         self.answer(distance, force, wrench, Asked::ALL)
     }
 
-    /// As [`Self::solve`] for a load whose status is known: where that is `ok` there is no other limit
+    /// As [`Self::solve`] with the push of tilted planes where that raises `mu_s` by over a hundredth,
+    /// as grips are ranked: the theory of [`solve`] leaves it out.
+    pub fn solve_pushed(&self, distance: f64, force: f64, wrench: &Wrench) -> Answer {
+        self.answer(distance, force, wrench, Asked { push: true, ..Asked::ALL })
+    }
+
+    /// As [`Self::solve_pushed`] for a load whose status is known: where that is `ok` there is no other limit
     /// state to look for.
     pub(crate) fn solve_again(
         &self,
@@ -186,10 +203,15 @@ impl Pads {
         wrench: &Wrench,
         status: Status,
     ) -> Answer {
-        self.answer(distance, force, wrench, Asked { others: status != Status::Ok, notes: true })
+        self.answer(
+            distance,
+            force,
+            wrench,
+            Asked { others: status != Status::Ok, notes: true, push: true },
+        )
     }
 
-    /// As [`Self::solve`] without notes.
+    /// As [`Self::solve_pushed`] without notes.
     pub fn score(&self, distance: f64, force: f64, wrench: &Wrench) -> Score {
         self.answer(distance, force, wrench, Asked::SCORE).score
     }
@@ -281,16 +303,20 @@ struct Asked {
     others: bool,
     /// What to know of the answer.
     notes: bool,
+    /// What the push of tilted planes adds, where that counts.
+    push: bool,
 }
 
 impl Asked {
-    const ALL: Self = Self { others: true, notes: true };
-    const SCORE: Self = Self { others: true, notes: false };
-    const FIRST: Self = Self { others: false, notes: false };
+    const ALL: Self = Self { others: true, notes: true, push: false };
+    const SCORE: Self = Self { others: true, notes: false, push: true };
+    const FIRST: Self = Self { others: false, notes: false, push: true };
 }
 
 /// Lever of a stiffness over the distance of the faces below which it is none.
 const NO_LEVER: f64 = 1e-6;
+/// Difference in what two pieces feel of a tilt that is rounding.
+const FELT: f64 = 1e-9;
 
 impl<'a> Case<'a, '_> {
     /// With the rotations free that are free in any case, and those that turn out to be.
@@ -343,9 +369,60 @@ impl<'a> Case<'a, '_> {
                     free[i] = true;
                     notes.push(Note::SettlesBy { angle });
                 }
-                None => return self.finish(&problem, status, state, notes),
+                None => {
+                    let Some((status, state, note)) = self.pushed(&problem, status, &state) else {
+                        return self.finish(&problem, status, state, notes);
+                    };
+                    notes.push(note);
+                    return self.finish(&problem, status, state, notes);
+                }
             }
         }
+    }
+
+    /// The state with the push of tilted planes, where that counts.
+    fn pushed(
+        &self,
+        problem: &Problem<'a>,
+        status: Status,
+        state: &Option<State<'a>>,
+    ) -> Option<(Status, Option<State<'a>>, Note)> {
+        let state = state.as_ref().filter(|_| self.asked.push && status.holds())?;
+        let without = state.slip?.mu;
+        // First for the pressure as it is.
+        let (force, first) = problem.with_tilting_planes(state, TILTING_PUSH)?;
+        if !counts(without + SURELY * (first.mu - without), without) {
+            return None;
+        }
+        let mut pushed = problem.clone();
+        let close = AGREED * (self.normal[0] + self.normal[1]);
+        let (mut push, mut near) = (Push::new(force), state.clone());
+        for _ in 0..PUSHES {
+            let force = push.force;
+            pushed.wrench.force = problem.wrench.force + force.extend(0.0);
+            let note = Note::TiltPushesMuch { force: force.to_array(), without };
+            let again = pushed.at(&near.angles, 1.0, Some(&near));
+            let again = again.and_then(|start| pushed.newton(start, 1.0));
+            near = match again.or_else(|| find(&pushed, self.pressed, false).1) {
+                Some(found) => found,
+                None => return Some((Status::NotConverged, None, note)),
+            };
+            if push.is_found(pushed.push([&near.faces[0], &near.faces[1]]), close) {
+                let mu = near.slip?.mu;
+                if !counts(mu, without) {
+                    return None;
+                }
+                // Other limit states are looked for with the push that was found.
+                let (status, found) = if self.asked.others && strong(&pushed, mu) {
+                    find(&pushed, self.pressed, true)
+                } else {
+                    (status, Some(near))
+                };
+                return Some((status, found, note));
+            }
+        }
+        let note = Note::TiltPushesMuch { force: push.force.to_array(), without };
+        Some((Status::NotConverged, None, note))
     }
 
     fn problem(&self, free: [bool; 2]) -> Problem<'a> {
@@ -373,7 +450,15 @@ impl<'a> Case<'a, '_> {
         let give = self.pressed[0].compression().max(self.pressed[1].compression());
         let units = widths.iter().map(|width| 2.0 * give / width).collect();
         let length = slip::length(self.pressed);
+        let fields = || self.faces.iter().flat_map(|face| &face.fields);
+        // Where all of both faces turns with the body, or none, the pushes cancel.
+        let pushes = held.iter().any(|e| {
+            let felt = fields().map(|field| field.felt(e.perp()).length());
+            let (least, most) = felt.fold((1.0, 0.0), |(a, b): (f64, f64), f| (a.min(f), b.max(f)));
+            most - least > FELT
+        });
         Problem {
+            pushes,
             faces: [&self.faces[0], &self.faces[1]],
             distance: self.distance,
             normal: self.normal,
@@ -440,7 +525,8 @@ impl<'a> Case<'a, '_> {
         if slip > give {
             notes.push(Note::TiltsFirst { angle, slip });
         }
-        if let Some((force, pushed)) = problem.with_tilting_planes(state, TILTING_PUSH)
+        if !notes.iter().any(|note| matches!(note, Note::TiltPushesMuch { .. }))
+            && let Some((force, pushed)) = problem.with_tilting_planes(state, TILTING_PUSH)
             && (pushed.mu - slipping.mu).abs() > TILTING_PUSH * slipping.mu
         {
             notes.push(Note::TiltPushes { force: force.to_array(), mu_s: pushed.mu });
@@ -482,6 +568,11 @@ impl<'a> Case<'a, '_> {
         }
         notes
     }
+}
+
+/// Whether a push of tilted planes that raises `mu_s` so is counted.
+fn counts(mu: f64, without: f64) -> bool {
+    mu - without > (COUNTS.0 * without).max(COUNTS.1)
 }
 
 /// Whether friction's lever is so long that there may be further limit states.

@@ -59,6 +59,13 @@ pub enum Note {
         /// `mu_s` with it, for the same pressure.
         mu_s: f64,
     },
+    /// The same where it raises `mu_s` by so much that it is counted.
+    TiltPushesMuch {
+        /// Force on the body along `x1`, `x2` \[N\].
+        force: [f64; 2],
+        /// `mu_s` without it.
+        without: f64,
+    },
 }
 
 /// Limits of [`Note::TooSoft`].
@@ -126,6 +133,12 @@ impl fmt::Display for Note {
                 out,
                 "the tilted flat pushes ({:.4}, {:.4}) N along the pads, which mu_s leaves out; \
                  with it {mu_s:.6}",
+                force[0], force[1]
+            ),
+            Self::TiltPushesMuch { force, without } => write!(
+                out,
+                "the tilted flat pushes ({:.4}, {:.4}) N along the pads, which mu_s counts; \
+                 without it {without:.6}",
                 force[0], force[1]
             ),
         }

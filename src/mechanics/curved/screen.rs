@@ -5,13 +5,14 @@
 //! its `mu_s`, or show, by how fast the steps shrink, that it stays below that of another load.
 
 use glam::DVec2;
+use nalgebra::Vector5;
 
-use super::equilibrium::Problem;
+use super::equilibrium::{Problem, Push};
 use super::face::Pressed;
 use super::floor::Floors;
 use super::joint::{Found, Joint, Mode, Near, Place, Reached};
 use super::space::{self, Kind, Rotation};
-use super::{Asked, Case, NO_LEVER, Pads, slip, strong};
+use super::{AGREED, Asked, COUNTS, Case, NO_LEVER, PUSHES, Pads, counts, slip, strong};
 use crate::model::Wrench;
 
 /// What is known of a load.
@@ -37,8 +38,27 @@ pub struct Screen<'a> {
     rolling: Vec<(usize, f64, f64)>,
     /// Of many loads.
     floors: Option<Floors>,
-    /// States found so far, with what tells how a load presses.
-    known: Vec<([f64; 3], Place)>,
+    /// States found so far.
+    known: Vec<Known>,
+    /// Whether one limit state is followed: others are of no interest.
+    follows: bool,
+}
+
+/// The state of a load.
+struct Known {
+    /// What tells how the load presses.
+    presses: [f64; 3],
+    place: Place,
+    /// Of planes that tilt, where they push.
+    push: DVec2,
+}
+
+/// The state of the load that presses most like one.
+fn nearest<'a>(known: &'a [Known], here: &[f64; 3]) -> Option<&'a Known> {
+    let apart = |other: &Known| -> f64 {
+        other.presses.iter().zip(here).map(|(a, b)| (a - b) * (a - b)).sum()
+    };
+    known.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))
 }
 
 /// Loads from which on floors are worth their pressing.
@@ -60,6 +80,10 @@ const ROUNDING: f64 = 1e-9;
 /// twentieth of the contact's width.
 const HARDLY: f64 = 0.1;
 const GROWN: f64 = 2.0;
+/// Factor on what the push of tilted planes asks for at most, that covers what it changes of the tilt;
+/// and the share of what counts up to which it certainly does not.
+const ROUGHLY: f64 = 1.2;
+const RARELY: f64 = 0.8;
 
 impl Pads {
     /// For the comparison of some loads; `None` where the part may settle or twist in a way that each
@@ -145,7 +169,8 @@ impl Pads {
         let floors =
             if wrenches.len() >= MANY { Floors::new(&problem, faces, force, pull) } else { None };
         let (near, known) = (Near::new(faces), Vec::new());
-        Some(Screen { problem, force, near, rolling, floors, known, pressed })
+        let follows = false;
+        Some(Screen { problem, force, near, rolling, floors, known, pressed, follows })
     }
 }
 
@@ -156,6 +181,8 @@ pub(super) struct Follow<'a> {
     /// Logarithm of the force, and the state.
     last: Option<(f64, Place)>,
     before: Option<(f64, Place)>,
+    /// Of planes that tilt, in the last state.
+    push: DVec2,
 }
 
 /// Growth of a round face's compression with the force.
@@ -164,11 +191,13 @@ const GROWTH: f64 = 2.0 / 3.0;
 impl Pads {
     /// As [`Pads::screen`], for one load.
     pub(super) fn follow(&self, distance: f64, force: f64, wrench: &Wrench) -> Option<Follow<'_>> {
-        let screen = self.screen(distance, force, std::slice::from_ref(wrench))?;
+        let mut screen = self.screen(distance, force, std::slice::from_ref(wrench))?;
+        screen.follows = true;
         if !screen.rolling.is_empty() {
             return None;
         }
-        Some(Follow { screen, wrench: *wrench, last: None, before: None })
+        let push = DVec2::ZERO;
+        Some(Follow { screen, wrench: *wrench, last: None, before: None, push })
     }
 }
 
@@ -196,9 +225,17 @@ impl Follow<'_> {
                     place.angles[k] += step * (last.angles[k] - before.angles[k]);
                 }
             }
-            screen.known.push((screen.presses(), place));
+            screen.keep(place, self.push);
         }
-        let Some((Compared::At(mu), place, _)) = screen.reach(0.0) else { return None };
+        let (mu, place) = if screen.problem.pushes {
+            let Some(Compared::At(mu)) = screen.pushed(0.0) else { return None };
+            let known = screen.known.last()?;
+            self.push = known.push;
+            (mu, known.place)
+        } else {
+            let Some((Compared::At(mu), place, _)) = screen.reach(0.0) else { return None };
+            (mu, place)
+        };
         self.before = self.last.replace((log, place));
         (mu > 0.0).then_some(mu)
     }
@@ -227,6 +264,9 @@ impl Screen<'_> {
         for &(held, stiffness, by_pull) in &self.rolling {
             self.problem.rolling[held] = stiffness * self.force + by_pull * wrench.force.z;
         }
+        if self.problem.pushes {
+            return self.compare_pushed(value);
+        }
         if let Some(floors) = &self.floors {
             if !strong(&self.problem, value / WEAK) && floors.below(&self.problem, value).is_some()
             {
@@ -236,14 +276,96 @@ impl Screen<'_> {
                 return Compared::At(mu);
             }
         }
-        let Some((compared, place, most)) = self.reach(value) else { return Compared::Open };
-        if strong(&self.problem, most / WEAK) || self.may_settle(&place) {
-            return Compared::Open;
-        }
-        if self.known.len() < MOST {
-            self.known.push((self.presses(), place));
-        }
+        let Some((compared, place, _)) = self.reach_settled(value) else { return Compared::Open };
+        self.keep(place, DVec2::ZERO);
         compared
+    }
+
+    /// As [`Self::compare`] where planes push along the pads when they tilt.
+    fn compare_pushed(&mut self, value: f64) -> Compared {
+        let outer = self.problem.wrench;
+        let compared = self.pushed(value);
+        self.problem.wrench = outer;
+        compared.unwrap_or(Compared::Open)
+    }
+
+    /// `None` where nothing is known.
+    fn pushed(&mut self, value: f64) -> Option<Compared> {
+        let outer = self.problem.wrench.force;
+        let (compared, place, most) = self.reach_settled(value)?;
+        let (push, asked) = self.push(&place, DVec2::ZERO)?;
+        // What holds two loads one by one holds both.
+        if most + ROUGHLY * asked < value {
+            return Some(Compared::Below);
+        }
+        let is_below = compared == Compared::Below;
+        let slight = |mu: f64| asked <= RARELY * COUNTS.0 * mu;
+        if !is_below && slight(most) {
+            self.keep(place, push);
+            return Some(Compared::At(most));
+        }
+        // With the push of the load that presses most like this one, and what follows from it.
+        let here = self.presses();
+        let nearest = nearest(&self.known, &here).map(|known| known.push);
+        let mut push = Push::new(nearest.unwrap_or(push));
+        let others = self.known.len().min(MOST);
+        let close = AGREED * (self.problem.normal[0] + self.problem.normal[1]);
+        let mut found = None;
+        for _ in 0..PUSHES {
+            let force = push.force;
+            self.problem.wrench.force = outer + force.extend(0.0);
+            let (mut compared, mut place, mut mu) = self.reach_settled(value)?;
+            let (mut next, asked) = self.push(&place, force)?;
+            if is_below && mu + ROUGHLY * asked < value {
+                return Some(Compared::Below);
+            }
+            if compared == Compared::Below {
+                (compared, place, mu) = self.reach_settled(0.0)?;
+                (next, _) = self.push(&place, force)?;
+            }
+            debug_assert!(compared != Compared::Below);
+            // The next one begins there.
+            self.known.truncate(others);
+            self.known.push(Known { presses: here, place, push: next });
+            if push.is_found(next, close) {
+                found = Some(mu);
+                break;
+            }
+        }
+        if found.is_none() || others >= MOST {
+            self.known.truncate(others);
+        }
+        let with = found?;
+        self.problem.wrench.force = outer;
+        let without = if is_below { self.reach_settled(0.0)?.2 } else { most };
+        Some(Compared::At(if counts(with, without) { with } else { without }))
+    }
+
+    /// As [`Self::reach`], if that does not depend on what the load decides by itself, or a state is
+    /// followed.
+    fn reach_settled(&self, value: f64) -> Option<(Compared, Place, f64)> {
+        let (compared, place, most) = self.reach(value)?;
+        let open = strong(&self.problem, most / WEAK) || self.may_settle(&place);
+        (self.follows || !open).then_some((compared, place, most))
+    }
+
+    fn keep(&mut self, place: Place, push: DVec2) {
+        if self.known.len() < MOST {
+            self.known.push(Known { presses: self.presses(), place, push });
+        }
+    }
+
+    /// The force along the pads that planes bring by their tilt at a place, and a friction that bears what
+    /// it is beyond `known`.
+    fn push(&self, place: &Place, known: DVec2) -> Option<(DVec2, f64)> {
+        let Problem { faces, normal, space, distance, .. } = &self.problem;
+        let tilt = self.problem.tilt(&place.angles);
+        let [one, two] = [0, 1].map(|k| faces[k].carry(normal[k], tilt, Some(place.delta[k])));
+        let (one, two) = (one?, two?);
+        let push = self.problem.push([&one, &two]);
+        let more = push - known;
+        let w = Vector5::new(more.x, more.y, 0.0, 0.0, 0.0);
+        Some((push, slip::enough(space, [&one, &two], *distance, w)?))
     }
 
     /// Whether the part may turn by more than the layers give about an axis that the faces' roundness
@@ -280,8 +402,8 @@ impl Screen<'_> {
             }
         }
         // From the motion that the load moves most.
-        let moved = self.known.iter().filter(|(_, place)| place.mode != Mode::Off);
-        let moved = moved.map(|(_, place)| (w.dot(&place.motion), place));
+        let moved = self.known.iter().filter(|known| known.place.mode != Mode::Off);
+        let moved = moved.map(|Known { place, .. }| (w.dot(&place.motion), place));
         let start = moved.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, place)| {
             let on = if let Mode::Rolls(k) = place.mode { Some(k) } else { None };
             (place.motion, on)
@@ -330,20 +452,15 @@ impl Screen<'_> {
 
     /// The state of the load that presses most like this one.
     fn nearest(&self) -> Place {
-        let here = self.presses();
-        let apart = |other: &[f64; 3]| -> f64 {
-            other.iter().zip(&here).map(|(a, b)| (a - b) * (a - b)).sum()
-        };
-        let nearest = self.known.iter().min_by(|a, b| apart(&a.0).total_cmp(&apart(&b.0)));
-        nearest
-            .map_or_else(|| Place::new([&self.pressed[0], &self.pressed[1]]), |(_, place)| *place)
+        nearest(&self.known, &self.presses())
+            .map_or_else(|| Place::new([&self.pressed[0], &self.pressed[1]]), |known| known.place)
     }
 
     /// The state to begin at, from those of other loads.
     fn start(&self, joint: &Joint<'_, '_>) -> Place {
         let mut start = self.nearest();
-        let slips = self.known.iter().filter(|(_, place)| place.mode == Mode::Slips);
-        let moved = slips.map(|(_, place)| (joint.power(&place.motion), place.motion));
+        let slips = self.known.iter().filter(|known| known.place.mode == Mode::Slips);
+        let moved = slips.map(|Known { place, .. }| (joint.power(&place.motion), place.motion));
         let most = moved.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
         start.mode = Mode::Off;
         if let Some((power, motion)) = most.filter(|(power, _)| *power != 0.0) {

@@ -20,13 +20,14 @@ fn facets(radius: f64, [x, y]: [f64; 2], off: f64) -> Vec<Piece> {
     cells.map(cell).collect()
 }
 
-/// Both faces alike, of a cylinder, a ball, a cone, planes or a ball's facets, with their distance.
+/// Both faces alike, of a cylinder, a ball, a cone, planes or a ball's facets, or a plane opposite a
+/// cylinder or a ball, with their distance.
 fn surfaces(kind: u32, half: [f64; 2], off: f64) -> (Surfaces, f64) {
     let radius = 0.01;
     let (axis, at, height) = (DVec2::X, DVec2::ZERO, 0.0);
     let gap = match kind {
-        0 => Gap::Cylinder { radius, axis, at, height },
-        1 => Gap::Sphere { radius, at, height },
+        0 | 5 => Gap::Cylinder { radius, axis, at, height },
+        1 | 6 => Gap::Sphere { radius, at, height },
         2 => Gap::Cone { radius, slope: 2e-3, axis, at, height },
         _ => Gap::default(),
     };
@@ -34,7 +35,10 @@ fn surfaces(kind: u32, half: [f64; 2], off: f64) -> (Surfaces, f64) {
     let outer = [(-x, -y), (x, -y), (x, y), (-x, y)].map(|(a, b)| DVec2::new(a + off, b)).to_vec();
     let piece = Piece { outer, holes: Vec::new(), gap };
     let pieces = if kind == 4 { facets(radius, half, off) } else { vec![piece] };
-    let (face_i, face_ii) = (pieces.clone(), pieces);
+    let (face_i, mut face_ii) = (pieces.clone(), pieces);
+    if kind > 4 {
+        face_ii[0].gap = Gap::default();
+    }
     (Surfaces { face_i, face_ii, stiffness: [5e9, 3e9], layer: None }, 2.0 * radius)
 }
 
@@ -44,7 +48,7 @@ proptest! {
     /// What the floors leave out is held at less, and what they say rolls has that friction.
     #[test]
     fn what_is_below_is_below(
-        kind in 0..5_u32,
+        kind in 0..7_u32,
         half in [0.004..0.012_f64, 0.006..0.01_f64],
         off in -0.004..0.004_f64,
         loads in prop::collection::vec(
@@ -63,7 +67,9 @@ proptest! {
                 moment: 0.01 * size * DVec3::from(m),
             })
             .collect();
-        let mut screen = pads.screen(distance, force, &wrenches).unwrap();
+        let screen = pads.screen(distance, force, &wrenches);
+        prop_assert!(screen.is_some() || kind > 4);
+        let Some(mut screen) = screen else { return Ok(()) };
         for wrench in &wrenches {
             let Some(mu) = pads.score(distance, force, wrench).mu_s else { continue };
             match screen.compare(wrench, share * mu) {
@@ -101,4 +107,39 @@ fn floors_take_most_loads() {
         }
         assert!(taken > 150, "{kind}: {taken}");
     }
+}
+
+/// Where a plane opposite something round pushes along the pads, most loads are compared too, many of
+/// them with a push that counts.
+#[test]
+fn loads_on_planes_that_push_are_compared() {
+    let (mut compared, mut counted, mut below) = (0, 0, 0);
+    for (kind, off) in [(5, 0.0), (5, 0.003), (6, 0.0), (6, 0.003)] {
+        let (surfaces, distance) = surfaces(kind, [0.01, 0.008], off);
+        let pads = Pads::new(&surfaces).unwrap();
+        let wrenches: Vec<Wrench> = (0..100)
+            .map(|i| {
+                let turn = |by: f64| (by * f64::from(i)).sin();
+                let force = 4.0 * DVec3::new(turn(1.3), turn(2.1), turn(0.7));
+                Wrench { force, moment: 0.02 * DVec3::new(turn(3.1), turn(1.9), turn(2.7)) }
+            })
+            .collect();
+        let mut screen = pads.screen(distance, 200.0, &wrenches).unwrap();
+        for wrench in &wrenches {
+            let answer = pads.solve_pushed(distance, 200.0, wrench);
+            let mu = answer.score.mu_s.unwrap();
+            let without = pads.solve(distance, 200.0, wrench).score.mu_s.unwrap();
+            let is_counted = counts(mu, without);
+            assert_eq!(mu == without, !is_counted, "{kind} {off}: {mu} {without}");
+            counted += usize::from(is_counted);
+            if let Compared::At(found) = screen.compare(wrench, 0.0) {
+                assert!((found / mu - 1.0).abs() < 1e-9, "{kind} {off}: {found} {mu}");
+                compared += 1;
+            }
+            below += usize::from(screen.compare(wrench, 1.5 * mu) == Compared::Below);
+            assert_ne!(screen.compare(wrench, 0.999 * mu), Compared::Below);
+        }
+    }
+    println!("{compared} compared, {counted} counted, {below} below");
+    assert!(compared > 300 && counted > 50 && below > 200);
 }
