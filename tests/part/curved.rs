@@ -501,9 +501,19 @@ fn real_parts_have_the_curved_faces_of_their_cad_models() {
 /// All corners of a chamfered cylinder as long as it is wide lie on a sphere.
 #[test]
 fn a_chamfered_cylinder_is_no_ball() {
-    for (n, radius, chamfer) in
-        [(24, 10.0, 1.0), (32, 10.0, 2.0), (64, 15.0, 5.0), (360, 15.0, 5.0)]
-    {
+    let of = [
+        (24, 10.0, 1.0),
+        (32, 10.0, 2.0),
+        (64, 15.0, 5.0),
+        (360, 15.0, 5.0),
+        (24, 15.0, 6.0),
+        (24, 15.0, 11.0),
+        (32, 15.0, 8.0),
+        (32, 15.0, 10.0),
+        (16, 15.0, 7.0),
+        (16, 15.0, 11.0),
+    ];
+    for (n, radius, chamfer) in of {
         for longer in [0.0, 0.1] {
             let (end, small) = (2.0 * radius + longer, radius - chamfer);
             let profile = [(0.0, small), (chamfer, radius), (end - chamfer, radius), (end, small)];

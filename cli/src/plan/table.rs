@@ -8,6 +8,7 @@ use glam::DVec3;
 use gripfast::geometry::patch_area;
 use gripfast::gripper::Gripper;
 use gripfast::lab::compare::places_by_score;
+use gripfast::mechanics::curved::{Note, SoftLimit};
 use gripfast::mechanics::squeeze_pressure;
 use gripfast::model::{Contact, Slip, Status};
 use gripfast::plan::OUTRANKED;
@@ -132,10 +133,81 @@ fn legend(
              no contact or no equilibrium. Interference is not tested again."
         ));
     }
+    texts.extend(cautions(shown));
     if !left_out.is_empty() {
         texts.push(format!("Left out to fit {width} columns: {}.", left_out.join(", ")));
     }
     texts
+}
+
+/// What to know of the grips shown beside their numbers, where they are near the end of what the theory
+/// knows: ranks and the worst value of each kind.
+fn cautions(shown: &[&RankedGrip]) -> Vec<String> {
+    // Ranks, and the largest value.
+    let of = |value: &dyn Fn(&Note) -> Option<f64>| {
+        let found: Vec<(u64, f64)> = shown
+            .iter()
+            .filter_map(|grip| {
+                let worst = grip.notes.iter().filter_map(value).reduce(f64::max)?;
+                Some((grip.rank, worst))
+            })
+            .collect();
+        let worst = found.iter().map(|grip| grip.1).reduce(f64::max)?;
+        Some((ranks(found.iter().map(|grip| grip.0)), worst))
+    };
+    let soft = of(&|note| match note {
+        Note::TooSoft { limit: SoftLimit::Compression, value, .. } => Some(*value),
+        _ => None,
+    });
+    let unstable = of(&|note| match note {
+        Note::Unstable { .. } | Note::OverEdge { .. } => Some(0.0),
+        _ => None,
+    });
+    let tilts = of(&|note| match note {
+        Note::TiltsFirst { angle, .. } => Some(*angle),
+        _ => None,
+    });
+    let mut texts = Vec::new();
+    if let Some((ranks, most)) = soft {
+        let beyond = if most < 1.0 { "" } else { " (more than there is: the pad bottoms out)" };
+        texts.push(format!(
+            "Soft: under rank {ranks} a pad's layer is compressed by up to {:.0} % of its \
+             thickness{beyond}; mu_s is reliable up to a third. Less force (--force) or a stiffer pad \
+             helps.",
+            100.0 * most
+        ));
+    }
+    if let Some((ranks, _)) = unstable {
+        texts.push(format!(
+            "Unstable: in rank {ranks} friction alone keeps the part from rolling out or sideways (see \
+             `gripfast why`)."
+        ));
+    }
+    if let Some((ranks, most)) = tilts {
+        texts.push(format!(
+            "Tilts: in rank {ranks} the part tilts by up to {:.1} deg before it slips under the worst \
+             load, more than its pads give.",
+            most.to_degrees()
+        ));
+    }
+    texts
+}
+
+/// Rising ranks as a text, those in a row by their ends.
+fn ranks(all: impl Iterator<Item = u64>) -> String {
+    let mut runs: Vec<[u64; 2]> = Vec::new();
+    for rank in all {
+        match runs.last_mut() {
+            Some(run) if run[1] + 1 == rank => run[1] = rank,
+            _ => runs.push([rank; 2]),
+        }
+    }
+    let texts = runs.iter().map(|[first, last]| match last - first {
+        0 => first.to_string(),
+        1 => format!("{first}, {last}"),
+        _ => format!("{first} to {last}"),
+    });
+    texts.collect::<Vec<_>>().join(", ")
 }
 
 /// A part that is smaller than the pads, as one is in a file of another unit than was taken.

@@ -40,6 +40,12 @@ const DEEP: f64 = 8.0;
 const BALL: [usize; 2] = [40, 60];
 /// Area of the caps about large facets of a ball over their own, at most: squares 1.6, triangles 2.4.
 const COMPACT: f64 = 6.0;
+/// Corners, area over the middle one of all facets, and half width over the radius, from which on a facet
+/// of a ball is the end of something turned.
+const END: (usize, f64, f64) = (8, 1.5, 0.25);
+/// Length over width that half of the surface of a ball does not pass: triangles of a twisted net with
+/// twice as many steps along as around have some three.
+const STRIP: f64 = 3.5;
 /// Side of a square as a share of the diagonal: three facets alone count when smaller.
 const SMALL: f64 = 0.02;
 
@@ -241,7 +247,7 @@ impl Growth<'_> {
         let (Some(middle), Some(last)) = (sags.get(sags.len() / 2), sags.last()) else {
             return false;
         };
-        if last.0 > DEEP * middle.0 + self.net.floor {
+        if last.0 > DEEP * middle.0 + self.net.floor || self.has_flat_or_strips(found) {
             return false;
         }
         // Half the angle that most of the surface's facets take up.
@@ -256,6 +262,38 @@ impl Growth<'_> {
             || caps <= COMPACT * area && found.members.len() >= BALL[usize::from(edge.outer > 0.0)]
     }
 
+    /// Whether facets on a sphere are those of something turned: a polygon of many corners that is much
+    /// larger than the others is its end, and most of the surface is of long strips.
+    fn has_flat_or_strips(&self, found: &Found) -> bool {
+        let net = self.net;
+        let mut shapes: Vec<(f64, f64, usize)> = found
+            .members
+            .iter()
+            .map(|&facet| {
+                let points: Vec<DVec3> = net.corners(facet).map(|x| net.point(x)).collect();
+                (elongation(&points, net.normal(facet)), net.area(facet), points.len())
+            })
+            .collect();
+        let mut areas: Vec<f64> = shapes.iter().map(|shape| shape.1).collect();
+        areas.sort_by(f64::total_cmp);
+        let middle = areas[areas.len() / 2];
+        let wide = END.2 * found.surface.radius();
+        let is_end = |&(_, area, corners): &(f64, f64, usize)| {
+            corners >= END.0 && area > (END.1 * middle).max(std::f64::consts::PI * wide * wide)
+        };
+        if shapes.iter().any(is_end) {
+            return true;
+        }
+        let all: f64 = areas.iter().sum();
+        shapes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut sum = 0.0;
+        let most = shapes.iter().find(|shape| {
+            sum += shape.1;
+            sum >= 0.5 * all
+        });
+        most.is_some_and(|shape| shape.0 > STRIP)
+    }
+
     /// Whether distances of the vertices from the surface are noise: neighbours along the rims of
     /// facets do not agree.
     fn is_random(&self, found: &Found) -> bool {
@@ -268,6 +306,20 @@ impl Growth<'_> {
         }
         found.points.len() >= MANY && products < 0.2 * squares
     }
+}
+
+/// Length over width of a facet, from how its corners spread.
+fn elongation(points: &[DVec3], normal: DVec3) -> f64 {
+    let (u, v) = normal.any_orthonormal_pair();
+    let middle = points.iter().sum::<DVec3>() / points.len() as f64;
+    let (mut uu, mut uv, mut vv) = (0.0, 0.0, 0.0);
+    for point in points {
+        let off = *point - middle;
+        let (a, b) = (off.dot(u), off.dot(v));
+        (uu, uv, vv) = (uu + a * a, uv + a * b, vv + b * b);
+    }
+    let (mean, apart) = (0.5 * (uu + vv), (0.25 * (uu - vv) * (uu - vv) + uv * uv).sqrt());
+    ((mean + apart) / (mean - apart).max(f64::MIN_POSITIVE)).sqrt()
 }
 
 /// Whether it is unlikely that the corners of a short arc lie so near to a circle by chance: three of
