@@ -403,9 +403,12 @@ impl<'a> Case<'a, '_> {
             let note = Note::TiltPushesMuch { force: force.to_array(), without };
             let again = pushed.at(&near.angles, 1.0, Some(&near));
             let again = again.and_then(|start| pushed.newton(start, 1.0));
-            near = match again.or_else(|| find(&pushed, self.pressed, false).1) {
+            near = match again {
                 Some(found) => found,
-                None => return Some((Status::NotConverged, None, note)),
+                None => match find(&pushed, self.pressed, false) {
+                    (_, Some(found)) => found,
+                    (status, None) => return Some((status, None, note)),
+                },
             };
             if push.is_found(pushed.push([&near.faces[0], &near.faces[1]]), close) {
                 let mu = near.slip?.mu;
