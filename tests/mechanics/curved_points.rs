@@ -308,7 +308,10 @@ fn agree_on_points(numbers: std::ops::Range<u64>, grid: usize) -> Seen {
             let posed = posed(number);
             let pads = Pads::new(&posed.surfaces).unwrap();
             let got = pads.solve_pushed(posed.distance, posed.force, &posed.wrench);
-            assert_ne!(got.score.status, Status::NotConverged, "case {number}");
+            // A push of tilted planes may find no tilt that brings it about.
+            let pushes = |note: &Note| matches!(note, Note::TiltPushesMuch { .. });
+            let found = got.score.status != Status::NotConverged;
+            assert!(found || got.notes.iter().any(pushes), "case {number}");
             let free = usize::from(got.dimensions) - 3;
             let mut spins = posed.spins.clone();
             // A barrel that would turn far along its meridian counts as free to.
