@@ -67,6 +67,8 @@ const MANY: usize = 16;
 const MOST: usize = 64;
 /// Share of the limit of a strong coupling from which on a load is solved.
 const WEAK: f64 = 0.8;
+/// The same where planes push: a state with the push and one without are then sure to be neighbours.
+const WEAK_PUSHED: f64 = 0.1;
 /// Sine of the angle between two axes that are one.
 const SAME_AXIS: f64 = 1e-6;
 /// Share of a stiffness by which it may differ from a line in the pull.
@@ -345,7 +347,8 @@ impl Screen<'_> {
     /// followed.
     fn reach_settled(&self, value: f64) -> Option<(Compared, Place, f64)> {
         let (compared, place, most) = self.reach(value)?;
-        let open = strong(&self.problem, most / WEAK) || self.may_settle(&place);
+        let weak = if self.problem.pushes { WEAK_PUSHED } else { WEAK };
+        let open = strong(&self.problem, most / weak) || self.may_settle(&place);
         (self.follows || !open).then_some((compared, place, most))
     }
 
