@@ -370,10 +370,13 @@ impl<'a> Case<'a, '_> {
                     notes.push(Note::SettlesBy { angle });
                 }
                 None => {
-                    let Some((status, state, note)) = self.pushed(&problem, status, &state) else {
-                        return self.finish(&problem, status, state, notes);
+                    let (status, state) = match self.pushed(&problem, status, &state) {
+                        Some((status, state, note)) => {
+                            notes.push(note);
+                            (status, state)
+                        }
+                        None => (status, state),
                     };
-                    notes.push(note);
                     return self.finish(&problem, status, state, notes);
                 }
             }

@@ -251,19 +251,15 @@ impl Growth<'_> {
             return false;
         }
         // Half the angle that most of the surface's facets take up.
-        let mut sum = 0.0;
-        let most = sags.iter().find(|(_, own)| {
-            sum += own;
-            sum >= 0.5 * area
-        });
-        let half = (1.0 - most.map_or(last.0, |one| one.0) / radius).clamp(-1.0, 1.0).acos();
+        let most = middle_by_area(sags.iter().copied(), area).unwrap_or(last.0);
+        let half = (1.0 - most / radius).clamp(-1.0, 1.0).acos();
         let caps = found.members.len() as f64 * std::f64::consts::PI * (half * radius).powi(2);
         2.0 * half <= COARSE
             || caps <= COMPACT * area && found.members.len() >= BALL[usize::from(edge.outer > 0.0)]
     }
 
     /// Whether facets on a sphere are those of something turned: a polygon of many corners that is much
-    /// larger than the others is its end, and most of the surface is of long strips.
+    /// larger than the others is its end, or most of the surface is of long strips.
     fn has_flat_or_strips(&self, found: &Found) -> bool {
         let net = self.net;
         let mut shapes: Vec<(f64, f64, usize)> = found
@@ -284,14 +280,9 @@ impl Growth<'_> {
         if shapes.iter().any(is_end) {
             return true;
         }
-        let all: f64 = areas.iter().sum();
         shapes.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut sum = 0.0;
-        let most = shapes.iter().find(|shape| {
-            sum += shape.1;
-            sum >= 0.5 * all
-        });
-        most.is_some_and(|shape| shape.0 > STRIP)
+        let by_area = shapes.iter().map(|&(elongation, area, _)| (elongation, area));
+        middle_by_area(by_area, areas.iter().sum()).is_some_and(|elongation| elongation > STRIP)
     }
 
     /// Whether distances of the vertices from the surface are noise: neighbours along the rims of
@@ -306,6 +297,16 @@ impl Growth<'_> {
         }
         found.points.len() >= MANY && products < 0.2 * squares
     }
+}
+
+/// Of rising values with the areas that have them: the one up to which half of `area` lies.
+fn middle_by_area(mut values: impl Iterator<Item = (f64, f64)>, area: f64) -> Option<f64> {
+    let mut sum = 0.0;
+    let most = values.find(|(_, own)| {
+        sum += own;
+        sum >= 0.5 * area
+    });
+    most.map(|(value, _)| value)
 }
 
 /// Length over width of a facet, from how its corners spread.

@@ -81,19 +81,23 @@ proptest! {
     }
 }
 
+/// Loads with forces and moments along all axes.
+fn loads(count: u32) -> Vec<Wrench> {
+    let load = |i| {
+        let turn = |by: f64| (by * f64::from(i)).sin();
+        let force = 4.0 * DVec3::new(turn(1.3), turn(2.1), turn(0.7));
+        Wrench { force, moment: 0.02 * DVec3::new(turn(3.1), turn(1.9), turn(2.7)) }
+    };
+    (0..count).map(load).collect()
+}
+
 /// Most loads far below the value never reach Newton's method.
 #[test]
 fn floors_take_most_loads() {
     for (kind, off) in [(0, 0.0), (1, 0.0), (4, 0.0), (4, 0.001)] {
         let (surfaces, distance) = surfaces(kind, [0.01, 0.008], off);
         let pads = Pads::new(&surfaces).unwrap();
-        let wrenches: Vec<Wrench> = (0..200)
-            .map(|i| {
-                let turn = |by: f64| (by * f64::from(i)).sin();
-                let force = 4.0 * DVec3::new(turn(1.3), turn(2.1), turn(0.7));
-                Wrench { force, moment: 0.02 * DVec3::new(turn(3.1), turn(1.9), turn(2.7)) }
-            })
-            .collect();
+        let wrenches = loads(200);
         let mut screen = pads.screen(distance, 200.0, &wrenches).unwrap();
         let mut taken = 0;
         for wrench in &wrenches {
@@ -117,13 +121,7 @@ fn loads_on_planes_that_push_are_compared() {
     for (kind, off) in [(5, 0.0), (5, 0.003), (6, 0.0), (6, 0.003)] {
         let (surfaces, distance) = surfaces(kind, [0.01, 0.008], off);
         let pads = Pads::new(&surfaces).unwrap();
-        let wrenches: Vec<Wrench> = (0..100)
-            .map(|i| {
-                let turn = |by: f64| (by * f64::from(i)).sin();
-                let force = 4.0 * DVec3::new(turn(1.3), turn(2.1), turn(0.7));
-                Wrench { force, moment: 0.02 * DVec3::new(turn(3.1), turn(1.9), turn(2.7)) }
-            })
-            .collect();
+        let wrenches = loads(100);
         let mut screen = pads.screen(distance, 200.0, &wrenches).unwrap();
         for wrench in &wrenches {
             let answer = pads.solve_pushed(distance, 200.0, wrench);
