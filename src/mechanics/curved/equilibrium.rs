@@ -17,6 +17,8 @@ use crate::model::Wrench;
 pub(super) struct Problem<'a> {
     /// Whether pieces of planes push along the pads when they tilt, and others do not.
     pub(super) pushes: bool,
+    /// Whether friction has to bear that push.
+    pub(super) push_counts: bool,
     pub(super) faces: [&'a Face; 2],
     pub(super) distance: f64,
     pub(super) normal: [f64; 2],
@@ -65,34 +67,6 @@ const RINGS: usize = 7;
 /// Starts of Newton's method in the plane.
 const STARTS: usize = 10;
 
-/// The force along the pads that brings about itself, by steps that follow how it answers.
-pub(super) struct Push {
-    pub(super) force: DVec2,
-    /// The last step, and what was left over before it.
-    last: Option<(DVec2, DVec2)>,
-}
-
-impl Push {
-    pub(super) fn new(force: DVec2) -> Self {
-        Self { force, last: None }
-    }
-
-    /// Whether the force brings about itself but for `close`; else the next one to try.
-    pub(super) fn is_found(&mut self, brought: DVec2, close: f64) -> bool {
-        let left = brought - self.force;
-        if left.length() <= close {
-            return true;
-        }
-        let slope = self.last.map_or(-1.0, |(step, before)| {
-            ((left - before).dot(step) / step.length_squared()).clamp(-4.0, -0.25)
-        });
-        let step = left / -slope;
-        self.last = Some((step, left));
-        self.force += step;
-        false
-    }
-}
-
 impl<'a> Problem<'a> {
     /// `(a1, a2)` for angles in their units: compression is `delta - h +- a . x`.
     pub(super) fn tilt(&self, angles: &[f64]) -> DVec2 {
@@ -101,16 +75,12 @@ impl<'a> Problem<'a> {
         DVec2::new(-turn.y, turn.x)
     }
 
-    /// The load along the space's motions: what comes from outside, what the pressure brings, and
-    /// `more` force along the pads.
-    pub(super) fn along(
-        &self,
-        faces: [&Pressed<'_>; 2],
-        moment: DVec2,
-        more: DVec2,
-    ) -> Vector5<f64> {
+    /// The load along the space's motions: what comes from outside and what the pressure brings, whose
+    /// moment in the pad plane with that from outside is `moment`.
+    pub(super) fn along(&self, faces: [&Pressed<'_>; 2], moment: DVec2) -> Vector5<f64> {
         let Wrench { force, moment: outer } = self.wrench;
-        let push = more - faces[0].slope - faces[1].slope;
+        let tilted = if self.push_counts { self.push(faces) } else { DVec2::ZERO };
+        let push = tilted - faces[0].slope - faces[1].slope;
         let turn = faces[0].turn + faces[1].turn;
         let mut w = Vector5::new(force.x + push.x, force.y + push.y, outer.z + turn, 0.0, 0.0);
         for (i, e) in self.space.spins.iter().enumerate() {
@@ -165,7 +135,8 @@ impl<'a> Problem<'a> {
         if more.length() <= least * mu * (self.normal[0] + self.normal[1]) {
             return None;
         }
-        let w = self.along(faces, self.moment_beyond(faces), more);
+        let with = Self { push_counts: true, ..self.clone() };
+        let w = with.along(faces, self.moment_beyond(faces));
         Some((more, slip::solve(&self.space, faces, self.distance, w, None)?))
     }
 
@@ -187,7 +158,7 @@ impl<'a> Problem<'a> {
         let (slip, left) = if coupling == 0.0 {
             (None, moment)
         } else {
-            let w = self.along(faces, moment, DVec2::ZERO);
+            let w = self.along(faces, moment);
             let near = near.and_then(|state| state.slip).map(|slip| (slip.zeta, slip.rolls_on));
             let slip = slip::solve(&self.space, faces, self.distance, w, near)?;
             let couple = slip.shares[0] - slip.shares[1];
@@ -253,7 +224,7 @@ impl<'a> Problem<'a> {
         place.angles[..state.angles.len()].copy_from_slice(&state.angles);
         let mut mu = 1.0;
         if let Some(slip) = state.slip.as_ref().filter(|slip| slip.mu > 0.0) {
-            let w = self.along(faces, self.moment_beyond(faces), DVec2::ZERO);
+            let w = self.along(faces, self.moment_beyond(faces));
             place.mode = slip.rolls_on.map_or(Mode::Slips, Mode::Rolls);
             (place.motion, mu) = (joint.motion(slip, &w), slip.mu);
         }
@@ -277,7 +248,7 @@ impl<'a> Problem<'a> {
         let Place { angles, delta, .. } = still.place;
         let faces = still.pressed(self.normal);
         let faces = [&faces[0], &faces[1]];
-        let w = self.along(faces, self.moment_beyond(faces), DVec2::ZERO);
+        let w = self.along(faces, self.moment_beyond(faces));
         let slip = slip::solve(&self.space, faces, self.distance, w, None)?;
         if slip.mu == 0.0 {
             return None;

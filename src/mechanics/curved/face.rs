@@ -53,6 +53,9 @@ pub(super) struct Trial<'a> {
     pub(super) carried: Carried,
     /// Per compression, and per tilt in each of the directions asked for.
     pub(super) by: [Carried; 3],
+    /// What the tilt adds to the push along the pad, and its derivatives.
+    pub(super) tilted: DVec2,
+    pub(super) tilted_by: [DVec2; 3],
 }
 
 /// Dissipation and its derivatives in the planar twist of a face.
@@ -111,6 +114,8 @@ impl Face {
             regions: Vec::with_capacity(self.fields.len()),
             carried: Carried::zeros(),
             by: [Carried::zeros(); 3],
+            tilted: DVec2::ZERO,
+            tilted_by: [DVec2::ZERO; 3],
         };
         for field in &self.fields {
             let region = field.pressed(delta, tilt);
@@ -119,9 +124,15 @@ impl Face {
                 let by = sums.map(|row| self.stiffness * Carried::from(field.carried(&row)));
                 trial.carried += by[0];
                 trial.by[0] += by[1];
-                for (sum, direction) in trial.by[1..].iter_mut().zip(directions) {
+                let felt = field.felt(tilt);
+                trial.tilted += by[0][0] * felt;
+                trial.tilted_by[0] += by[1][0] * felt;
+                for (i, direction) in directions.iter().enumerate() {
                     let (one, rise) = self.rise(field, *direction);
-                    *sum += one * by[1] + rise.x * by[2] + rise.y * by[3];
+                    let more = one * by[1] + rise.x * by[2] + rise.y * by[3];
+                    trial.by[1 + i] += more;
+                    let turned = by[0][0] * self.sign * field.felt(*direction);
+                    trial.tilted_by[1 + i] += more[0] * felt + turned;
                 }
             }
             trial.regions.push(region);

@@ -7,6 +7,9 @@ use crate::model::Wrench;
 const FOUND: f64 = 1e-9;
 /// The same on the way, so that what is found is right to [`FOUND`].
 const CLOSER: f64 = 1e-11;
+/// The same where the load is held at no less for want of a limit state: each try there is a search over
+/// all tilts.
+const HELD: f64 = 1e-7;
 /// Solves at most.
 const STEPS: i32 = 120;
 /// Force over the load's size beyond which none is enough.
@@ -124,7 +127,8 @@ impl Search {
             let push = if late { 1.0 + FOUND * GROWTH.powi(done - PATIENCE) } else { 1.0 };
             force = match (low, high) {
                 (Some((a, over)), Some((b, under))) => {
-                    if b - a <= FOUND * b {
+                    let width = if over.is_finite() { FOUND } else { HELD };
+                    if b - a <= width * b {
                         return end(Some(b), low);
                     }
                     let width = (b / a).ln();

@@ -260,7 +260,7 @@ impl<'p, 'a> Joint<'p, 'a> {
         let none = Carried::zeros();
         let ((w, moment), (outer, asked)) =
             (self.effect(&trials[0].carried, &trials[1].carried), self.outer());
-        let (w, moment) = (w + outer, moment + asked);
+        let (mut w, moment) = (w + outer, moment + asked);
         // Derivatives by the angles and the compressions.
         let mut by = [(Vector5::zeros(), DVec2::ZERO); 7];
         for i in 0..n {
@@ -268,6 +268,16 @@ impl<'p, 'a> Joint<'p, 'a> {
         }
         by[5] = self.effect(&(self.give * trials[0].by[0]), &none);
         by[6] = self.effect(&none, &(self.give * trials[1].by[0]));
+        if self.problem.push_counts {
+            let push = |v: DVec2| self.along(Vector3::new(v.x, v.y, 0.0), DVec2::ZERO);
+            let [one, two] = &trials;
+            w += push(one.tilted + two.tilted);
+            for i in 0..n {
+                by[self.active + i].0 += push(one.tilted_by[1 + i] + two.tilted_by[1 + i]);
+            }
+            by[5].0 += push(self.give * one.tilted_by[0]);
+            by[6].0 += push(self.give * two.tilted_by[0]);
+        }
         let (mut residual, mut jacobian) = (Vector7::zeros(), Matrix7::zeros());
         let friction = match mode {
             Mode::Slips => self.slips(x, &trials, size, (&w, &by), (&mut residual, &mut jacobian)),
@@ -483,9 +493,11 @@ impl<'p, 'a> Joint<'p, 'a> {
 
     /// The force along the pads that friction bears.
     fn asked_force(&self, trials: &[Trial<'_>; 2]) -> DVec2 {
-        let slope = |trial: &Trial<'_>| DVec2::new(trial.carried[3], trial.carried[4]);
-        let force = self.problem.wrench.force;
-        DVec2::new(force.x, force.y) - slope(&trials[0]) - slope(&trials[1])
+        let tilted = |trial: &Trial<'_>| {
+            if self.problem.push_counts { trial.tilted } else { DVec2::ZERO }
+        };
+        let push = |trial| tilted(trial) - DVec2::new(trial.carried[3], trial.carried[4]);
+        self.problem.wrench.force.truncate() + push(&trials[0]) + push(&trials[1])
     }
 
     /// The unknowns as a place. At the solution the square of the dissipation is the load's power.

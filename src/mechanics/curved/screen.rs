@@ -7,12 +7,13 @@
 use glam::DVec2;
 use nalgebra::Vector5;
 
-use super::equilibrium::{Problem, Push};
+use super::equilibrium::Problem;
 use super::face::Pressed;
 use super::floor::Floors;
 use super::joint::{Found, Joint, Mode, Near, Place, Reached};
+use super::limit::{Asked, COUNTS, Case, NO_LEVER, counts, strong};
 use super::space::{self, Kind, Rotation};
-use super::{AGREED, Asked, COUNTS, Case, NO_LEVER, PUSHES, Pads, counts, slip, strong};
+use super::{Pads, slip};
 use crate::model::Wrench;
 
 /// What is known of a load.
@@ -38,8 +39,8 @@ pub struct Screen<'a> {
     rolling: Vec<(usize, f64, f64)>,
     /// Of many loads.
     floors: Option<Floors>,
-    /// States found so far.
-    known: Vec<Known>,
+    /// States found so far: without the push of tilted planes, and with it.
+    known: [Vec<Known>; 2],
     /// Whether one limit state is followed: others are of no interest.
     follows: bool,
 }
@@ -49,8 +50,14 @@ struct Known {
     /// What tells how the load presses.
     presses: [f64; 3],
     place: Place,
-    /// Of planes that tilt, where they push.
-    push: DVec2,
+}
+
+/// What is known of a load, and from which state.
+struct Told {
+    compared: Compared,
+    place: Place,
+    /// Whether the state is that with the push of tilted planes.
+    counted: bool,
 }
 
 /// The state of the load that presses most like one.
@@ -170,7 +177,7 @@ impl Pads {
         let pull = f64::max(-low, high);
         let floors =
             if wrenches.len() >= MANY { Floors::new(&problem, faces, force, pull) } else { None };
-        let (near, known) = (Near::new(faces), Vec::new());
+        let (near, known) = (Near::new(faces), [Vec::new(), Vec::new()]);
         let follows = false;
         Some(Screen { problem, force, near, rolling, floors, known, pressed, follows })
     }
@@ -183,8 +190,6 @@ pub(super) struct Follow<'a> {
     /// Logarithm of the force, and the state.
     last: Option<(f64, Place)>,
     before: Option<(f64, Place)>,
-    /// Of planes that tilt, in the last state.
-    push: DVec2,
 }
 
 /// Growth of a round face's compression with the force.
@@ -198,8 +203,7 @@ impl Pads {
         if !screen.rolling.is_empty() {
             return None;
         }
-        let push = DVec2::ZERO;
-        Some(Follow { screen, wrench: *wrench, last: None, before: None, push })
+        Some(Follow { screen, wrench: *wrench, last: None, before: None })
     }
 }
 
@@ -213,7 +217,7 @@ impl Follow<'_> {
         }
         screen.force = force;
         (screen.problem.normal, screen.problem.wrench) = (normal, self.wrench);
-        screen.known.clear();
+        screen.known.iter_mut().for_each(Vec::clear);
         let log = force.ln();
         if let Some((at, last)) = &self.last {
             let mut place = *last;
@@ -227,17 +231,16 @@ impl Follow<'_> {
                     place.angles[k] += step * (last.angles[k] - before.angles[k]);
                 }
             }
-            screen.keep(place, self.push);
+            screen.keep(place);
         }
-        let (mu, place) = if screen.problem.pushes {
-            let Some(Compared::At(mu)) = screen.pushed(0.0) else { return None };
-            let known = screen.known.last()?;
-            self.push = known.push;
-            (mu, known.place)
+        let told = if screen.problem.pushes {
+            screen.compare_pushed(0.0)
         } else {
-            let Some((Compared::At(mu), place, _)) = screen.reach(0.0) else { return None };
-            (mu, place)
+            screen.reach(0.0).map(|(compared, place, _)| Told { compared, place, counted: false })
         };
+        let Some(Told { compared: Compared::At(mu), place, counted }) = told else { return None };
+        // What is foretold is put where it belongs.
+        screen.problem.push_counts = counted;
         self.before = self.last.replace((log, place));
         (mu > 0.0).then_some(mu)
     }
@@ -267,7 +270,7 @@ impl Screen<'_> {
             self.problem.rolling[held] = stiffness * self.force + by_pull * wrench.force.z;
         }
         if self.problem.pushes {
-            return self.compare_pushed(value);
+            return self.compare_pushed(value).map_or(Compared::Open, |told| told.compared);
         }
         if let Some(floors) = &self.floors {
             if !strong(&self.problem, value / WEAK) && floors.below(&self.problem, value).is_some()
@@ -279,68 +282,44 @@ impl Screen<'_> {
             }
         }
         let Some((compared, place, _)) = self.reach_settled(value) else { return Compared::Open };
-        self.keep(place, DVec2::ZERO);
+        self.keep(place);
         compared
     }
 
-    /// As [`Self::compare`] where planes push along the pads when they tilt.
-    fn compare_pushed(&mut self, value: f64) -> Compared {
-        let outer = self.problem.wrench;
-        let compared = self.pushed(value);
-        self.problem.wrench = outer;
-        compared.unwrap_or(Compared::Open)
-    }
-
-    /// `None` where nothing is known.
-    fn pushed(&mut self, value: f64) -> Option<Compared> {
-        let outer = self.problem.wrench.force;
-        let (compared, place, most) = self.reach_settled(value)?;
-        let (push, asked) = self.push(&place, DVec2::ZERO)?;
+    /// As [`Self::compare`] where planes push along the pads when they tilt; `None` where nothing is known.
+    fn compare_pushed(&mut self, value: f64) -> Option<Told> {
+        self.problem.push_counts = false;
+        let (compared, place, without) = self.reach_settled(value)?;
+        let asked = self.asked_by_push(&place)?;
+        let told = |compared, place, counted| Some(Told { compared, place, counted });
         // What holds two loads one by one holds both.
-        if most + ROUGHLY * asked < value {
-            return Some(Compared::Below);
+        if without + ROUGHLY * asked < value {
+            return told(Compared::Below, place, false);
         }
+        self.keep(place);
         let is_below = compared == Compared::Below;
-        let slight = |mu: f64| asked <= RARELY * COUNTS.0 * mu;
-        if !is_below && slight(most) {
-            self.keep(place, push);
-            return Some(Compared::At(most));
+        if !is_below && asked <= RARELY * COUNTS.0 * without {
+            return told(compared, place, false);
         }
-        // With the push of the load that presses most like this one, and what follows from it.
-        let here = self.presses();
-        let nearest = nearest(&self.known, &here).map(|known| known.push);
-        let mut push = Push::new(nearest.unwrap_or(push));
-        let others = self.known.len().min(MOST);
-        let close = AGREED * (self.problem.normal[0] + self.problem.normal[1]);
-        let mut found = None;
-        for _ in 0..PUSHES {
-            let force = push.force;
-            self.problem.wrench.force = outer + force.extend(0.0);
-            let (mut compared, mut place, mut mu) = self.reach_settled(value)?;
-            let (mut next, asked) = self.push(&place, force)?;
-            if is_below && mu + ROUGHLY * asked < value {
-                return Some(Compared::Below);
-            }
-            if compared == Compared::Below {
-                (compared, place, mu) = self.reach_settled(0.0)?;
-                (next, _) = self.push(&place, force)?;
-            }
-            debug_assert!(compared != Compared::Below);
-            // The next one begins there.
-            self.known.truncate(others);
-            self.known.push(Known { presses: here, place, push: next });
-            if push.is_found(next, close) {
-                found = Some(mu);
-                break;
-            }
+        self.problem.push_counts = true;
+        let (_, pushed, with) = self.reach_settled(value)?;
+        self.keep(pushed);
+        if with < value && (is_below || without < value) {
+            return told(Compared::Below, pushed, true);
         }
-        if found.is_none() || others >= MOST {
-            self.known.truncate(others);
+        let (without, place) = if is_below {
+            self.problem.push_counts = false;
+            let (_, place, without) = self.reach_settled(0.0)?;
+            (without, place)
+        } else {
+            (without, place)
+        };
+        // Where the push lowers it to less than the value that was enough to know.
+        if counts(with, without) {
+            told(Compared::At(with), pushed, true)
+        } else {
+            told(Compared::At(without), place, false)
         }
-        let with = found?;
-        self.problem.wrench.force = outer;
-        let without = if is_below { self.reach_settled(0.0)?.2 } else { most };
-        Some(Compared::At(if counts(with, without) { with } else { without }))
     }
 
     /// As [`Self::reach`], if that does not depend on what the load decides by itself, or a state is
@@ -352,23 +331,30 @@ impl Screen<'_> {
         (self.follows || !open).then_some((compared, place, most))
     }
 
-    fn keep(&mut self, place: Place, push: DVec2) {
-        if self.known.len() < MOST {
-            self.known.push(Known { presses: self.presses(), place, push });
+    fn keep(&mut self, place: Place) {
+        let presses = self.presses();
+        let known = &mut self.known[usize::from(self.problem.push_counts)];
+        if known.len() < MOST {
+            known.push(Known { presses, place });
         }
     }
 
-    /// The force along the pads that planes bring by their tilt at a place, and a friction that bears what
-    /// it is beyond `known`.
-    fn push(&self, place: &Place, known: DVec2) -> Option<(DVec2, f64)> {
+    /// States to begin at: of the same kind, if there are any.
+    fn known(&self) -> &[Known] {
+        let [without, with] = &self.known;
+        let counts = self.problem.push_counts && !with.is_empty() || without.is_empty();
+        if counts { with } else { without }
+    }
+
+    /// A friction that bears the force along the pads that planes bring by their tilt at a place.
+    fn asked_by_push(&self, place: &Place) -> Option<f64> {
         let Problem { faces, normal, space, distance, .. } = &self.problem;
         let tilt = self.problem.tilt(&place.angles);
         let [one, two] = [0, 1].map(|k| faces[k].carry(normal[k], tilt, Some(place.delta[k])));
         let (one, two) = (one?, two?);
         let push = self.problem.push([&one, &two]);
-        let more = push - known;
-        let w = Vector5::new(more.x, more.y, 0.0, 0.0, 0.0);
-        Some((push, slip::enough(space, [&one, &two], *distance, w)?))
+        let w = Vector5::new(push.x, push.y, 0.0, 0.0, 0.0);
+        slip::enough(space, [&one, &two], *distance, w)
     }
 
     /// Whether the part may turn by more than the layers give about an axis that the faces' roundness
@@ -397,7 +383,7 @@ impl Screen<'_> {
         let (one, two) = (one?, two?);
         place.delta = [one.delta, two.delta];
         let faces = [&one, &two];
-        let w = self.problem.along(faces, self.problem.moment_beyond(faces), DVec2::ZERO);
+        let w = self.problem.along(faces, self.problem.moment_beyond(faces));
         if value > 0.0 {
             let enough = slip::enough(space, faces, *distance, w)?;
             if enough * (1.0 + ROUNDING) < value {
@@ -405,7 +391,7 @@ impl Screen<'_> {
             }
         }
         // From the motion that the load moves most.
-        let moved = self.known.iter().filter(|known| known.place.mode != Mode::Off);
+        let moved = self.known().iter().filter(|known| known.place.mode != Mode::Off);
         let moved = moved.map(|Known { place, .. }| (w.dot(&place.motion), place));
         let start = moved.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, place)| {
             let on = if let Mode::Rolls(k) = place.mode { Some(k) } else { None };
@@ -440,7 +426,7 @@ impl Screen<'_> {
         let place = still.place;
         let faces = still.pressed(self.problem.normal);
         let faces = [&faces[0], &faces[1]];
-        let w = self.problem.along(faces, self.problem.moment_beyond(faces), DVec2::ZERO);
+        let w = self.problem.along(faces, self.problem.moment_beyond(faces));
         // So little friction hardly moves the pressure.
         let enough = GROWN * slip::enough(&self.problem.space, faces, self.problem.distance, w)?;
         if enough < value && !strong(&self.problem, enough / HARDLY) {
@@ -455,14 +441,14 @@ impl Screen<'_> {
 
     /// The state of the load that presses most like this one.
     fn nearest(&self) -> Place {
-        nearest(&self.known, &self.presses())
+        nearest(self.known(), &self.presses())
             .map_or_else(|| Place::new([&self.pressed[0], &self.pressed[1]]), |known| known.place)
     }
 
     /// The state to begin at, from those of other loads.
     fn start(&self, joint: &Joint<'_, '_>) -> Place {
         let mut start = self.nearest();
-        let slips = self.known.iter().filter(|known| known.place.mode == Mode::Slips);
+        let slips = self.known().iter().filter(|known| known.place.mode == Mode::Slips);
         let moved = slips.map(|Known { place, .. }| (joint.power(&place.motion), place.motion));
         let most = moved.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
         start.mode = Mode::Off;
