@@ -165,6 +165,14 @@ impl Field {
         self.outward(DVec2::new(along(self.gap.l.x, tilt.x), along(self.gap.l.y, tilt.y)))
     }
 
+    /// How the highest line or point of a surface moves on it when it rolls by a tilt, in the pad plane
+    /// \[m\]: by its radius times the part of the tilt across a curve.
+    pub(crate) fn rolled(&self, tilt: DVec2) -> DVec2 {
+        let tilt = self.inward(tilt);
+        let across = |l: f64, t: f64| if l == 0.0 { 0.0 } else { t / l };
+        self.outward(DVec2::new(across(self.gap.l.x, tilt.x), across(self.gap.l.y, tilt.y)))
+    }
+
     /// The part with compression `u = delta - gap + tilt . x > 0`. On a curve the tilt acts where
     /// the surface is highest; that the contact rolls away from there is left out.
     pub(crate) fn pressed(&self, delta: f64, tilt: DVec2) -> Region {

@@ -465,37 +465,40 @@ fn soft_pads_and_tilts_are_said() {
     assert!(soft >= 4, "{notes:?}");
     let tilted = answer(&cylinder(0.01, 0.04, 6e9, [5.0, 0.0, 0.0], [0.0, 1.3, 0.1])).notes;
     assert!(tilted.iter().any(|note| matches!(note, Note::TiltsFirst { .. })), "{tilted:?}");
-    // The flat of a D-bar pushes along the pads when it tilts; a cylinder does not.
+    // The flat of a D-bar pushes along the pads when it tilts, and its round rolls; a cylinder does neither.
     let mut bar = json!({"kind": "dbar", "R": 0.01, "L": 0.04, "d": 0.018, "bflat": 0.006,
         "k": [18.75e9, 18.75e9], "Fn": 50.0, "F": [0.0, 15.0, 0.0], "M": [0.16, 0.0, 0.1]});
-    let dbar = answer(&bar);
-    let push = dbar.notes.iter().find_map(|note| match note {
-        Note::TiltPushes { force, mu_s } => Some((force[1], *mu_s)),
-        _ => None,
-    });
-    let (force, with) = push.unwrap();
-    close(force, 50.0 * dbar.tilt.unwrap()[1], 1e-9, &dbar);
-    // A physics engine found 0.49 % more than the theory that leaves this out.
-    close(with / dbar.score.mu_s.unwrap(), 1.0044, 5e-4, &dbar);
-    // What is so little is not counted for the ranks of grips either.
     let counted = |case: &serde_json::Value| {
         let read = case::parse("a case", case.clone()).unwrap();
         let pads = Pads::new(&read.surfaces.unwrap()).unwrap();
         pads.solve_pushed(read.distance, read.force, &read.wrench)
     };
-    assert_eq!(counted(&bar).score.mu_s, dbar.score.mu_s);
-    // On softer pads it is more, and counted; the tilt follows the friction that is needed then.
+    let (dbar, with) = (answer(&bar), counted(&bar));
+    let push = dbar.notes.iter().find_map(|note| match note {
+        Note::TiltPushes { force, mu_s } => Some((force[1], mu_s.unwrap())),
+        _ => None,
+    });
+    let (force, told) = push.unwrap();
+    close(told, with.score.mu_s.unwrap(), 1e-9, &dbar);
+    close(force, 50.0 * with.tilt.unwrap()[1], 1e-9, &dbar);
+    // A physics engine found 0.49 % more than the theory that leaves this out; it agrees within 0.1 %.
+    close(told / dbar.score.mu_s.unwrap(), 1.0049, 1e-3, &dbar);
+    assert!(!with.notes.iter().any(|note| matches!(note, Note::TiltPushesMuch { .. })));
+    // On softer pads it is more, and told where it counts; the tilt follows the friction needed then.
     bar["k"] = json!([3e9, 3e9]);
     let (theory, found) = (answer(&bar), counted(&bar));
-    let Some(Note::TiltPushesMuch { force, without }) =
+    let Some(Note::TiltPushesMuch { force, without: Some(without) }) =
         found.notes.iter().find(|note| matches!(note, Note::TiltPushesMuch { .. }))
     else {
         panic!("{found:?}")
     };
     close(*without, theory.score.mu_s.unwrap(), 1e-12, &found);
-    close(force[1], 50.0 * found.tilt.unwrap()[1], 1e-9, &found);
+    let tilt = found.tilt.unwrap()[1];
+    close(force[1], 50.0 * tilt, 1e-9, &found);
+    // As a load: the push, and the moment by which the round face's axis moves under the grip origin.
     let mut loaded = bar.clone();
     loaded["F"][1] = json!(15.0 + force[1]);
+    loaded["M"][0] = json!(0.16 - 50.0 * (0.01 - 0.009) * tilt);
     close(found.score.mu_s.unwrap(), answer(&loaded).score.mu_s.unwrap(), 1e-9, &found);
     assert!(found.score.mu_s.unwrap() > 1.01 * without, "{found:?}");
     let round = answer(&cylinder(0.01, 0.04, 6e9, [0.0, 15.0, 0.0], [0.16, 0.0, 0.1])).notes;

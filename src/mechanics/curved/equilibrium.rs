@@ -7,7 +7,7 @@
 use glam::DVec2;
 use nalgebra::{Vector3, Vector5};
 
-use super::face::{Carried, Face, Pressed};
+use super::face::{Carried, Face, Moved, Pressed};
 use super::joint::{Joint, Mode, Near, Place, Reached};
 use super::slip::{self, Slipping, Space};
 use crate::model::Wrench;
@@ -15,10 +15,11 @@ use crate::model::Wrench;
 /// What is asked: both faces, their distance, normal forces, and the load.
 #[derive(Clone)]
 pub(super) struct Problem<'a> {
-    /// Whether pieces of planes push along the pads when they tilt, and others do not.
-    pub(super) pushes: bool,
-    /// Whether friction has to bear that push.
-    pub(super) push_counts: bool,
+    /// Whether a part of the faces turns with the body when it tilts, and another one rolls.
+    pub(super) rolls: bool,
+    /// Whether it counts that what turns is pushed along the pads then, and that what rolls carries its
+    /// pressure along.
+    pub(super) moves: bool,
     pub(super) faces: [&'a Face; 2],
     pub(super) distance: f64,
     pub(super) normal: [f64; 2],
@@ -79,7 +80,7 @@ impl<'a> Problem<'a> {
     /// moment in the pad plane with that from outside is `moment`.
     pub(super) fn along(&self, faces: [&Pressed<'_>; 2], moment: DVec2) -> Vector5<f64> {
         let Wrench { force, moment: outer } = self.wrench;
-        let tilted = if self.push_counts { self.push(faces) } else { DVec2::ZERO };
+        let tilted = self.moved(&(faces[0].moved + faces[1].moved)).0;
         let push = tilted - faces[0].slope - faces[1].slope;
         let turn = faces[0].turn + faces[1].turn;
         let mut w = Vector5::new(force.x + push.x, force.y + push.y, outer.z + turn, 0.0, 0.0);
@@ -110,34 +111,29 @@ impl<'a> Problem<'a> {
         (slide, (lever(one) - lever(two)).perp())
     }
 
+    /// The force along the pads and the moment in their plane that the tilt brings by what it moves, if
+    /// that counts.
+    pub(super) fn moved(&self, moved: &Moved) -> (DVec2, DVec2) {
+        if !self.moves {
+            return (DVec2::ZERO, DVec2::ZERO);
+        }
+        let [push, rest, rolled] = [0, 2, 4].map(|i| DVec2::new(moved[i], moved[i + 1]));
+        // The pads press where the surface is highest then: its centre of curvature goes with the body.
+        let mut moment = (rolled - 0.5 * self.distance * rest).perp();
+        for (e, rolling) in self.held.iter().zip(&self.rolling) {
+            // There it is in the stiffness.
+            if *rolling != 0.0 {
+                moment -= e.dot(moment) * *e;
+            }
+        }
+        (push, moment)
+    }
+
     /// The moment in the pad plane that the pressure leaves over.
     pub(super) fn moment_beyond(&self, faces: [&Pressed<'_>; 2]) -> DVec2 {
         let (_, moment) = self.brought(&faces[0].carried(), &faces[1].carried());
-        self.wrench.moment.truncate() + moment
-    }
-
-    /// The force along the pads that planes bring when they tilt.
-    pub(super) fn push(&self, faces: [&Pressed<'_>; 2]) -> DVec2 {
-        if self.pushes { faces[0].tilted + faces[1].tilted } else { DVec2::ZERO }
-    }
-
-    /// What friction would do with the pressure of a state if [`Self::push`] counted; `None` where that
-    /// changes it by less than the share `least`.
-    pub(super) fn with_tilting_planes(
-        &self,
-        state: &State<'_>,
-        least: f64,
-    ) -> Option<(DVec2, Slipping)> {
-        let faces = [&state.faces[0], &state.faces[1]];
-        let more = self.push(faces);
-        // It cannot add more to the friction than it is.
-        let mu = state.slip.map_or(0.0, |slip| slip.mu);
-        if more.length() <= least * mu * (self.normal[0] + self.normal[1]) {
-            return None;
-        }
-        let with = Self { push_counts: true, ..self.clone() };
-        let w = with.along(faces, self.moment_beyond(faces));
-        Some((more, slip::solve(&self.space, faces, self.distance, w, None)?))
+        let (_, rolled) = self.moved(&(faces[0].moved + faces[1].moved));
+        self.wrench.moment.truncate() + moment + rolled
     }
 
     /// The state at a tilt. `coupling`: share of the friction's lever `d/2` that counts; zero needs

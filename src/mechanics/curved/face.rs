@@ -1,7 +1,7 @@
 //! One face under its pad: the pressure for a given tilt and normal force, and what it carries.
 
 use glam::DVec2;
-use nalgebra::{Matrix3, Vector3, Vector6};
+use nalgebra::{Matrix3, SVector, Vector3, Vector6};
 
 use crate::contact::quadric::{Dissipation, Region};
 use crate::contact::surface::{Field, Piece};
@@ -35,8 +35,7 @@ pub(super) struct Pressed<'a> {
     pub(super) slope: DVec2,
     /// Moment about `x3` of that push.
     pub(super) turn: f64,
-    /// What the tilt adds to the push.
-    pub(super) tilted: DVec2,
+    pub(super) moved: Moved,
     /// `int p x^2`.
     second: f64,
 }
@@ -44,6 +43,11 @@ pub(super) struct Pressed<'a> {
 /// What a pressure carries, linear in it: the normal force, `int p x`, `int p grad h`, and the moment
 /// about `x3` of the push against the slope.
 pub(super) type Carried = Vector6<f64>;
+
+/// What a tilt moves besides, linear in it and in the pressure: the force on the body along the pad, of
+/// what turns with the body; and of what rolls on the pad the normal force times the tilt, and the
+/// first moment by which the pressure moves on the body.
+pub(super) type Moved = SVector<f64, 6>;
 
 /// A face under some compression and tilt, with the derivatives of what it carries.
 #[derive(Debug, Clone)]
@@ -53,9 +57,9 @@ pub(super) struct Trial<'a> {
     pub(super) carried: Carried,
     /// Per compression, and per tilt in each of the directions asked for.
     pub(super) by: [Carried; 3],
-    /// What the tilt adds to the push along the pad, and its derivatives.
-    pub(super) tilted: DVec2,
-    pub(super) tilted_by: [DVec2; 3],
+    /// The derivatives as of `by`.
+    pub(super) moved: Moved,
+    pub(super) moved_by: [Moved; 3],
 }
 
 /// Dissipation and its derivatives in the planar twist of a face.
@@ -108,14 +112,15 @@ impl Face {
     /// What a compression and tilt carry, with the derivatives for the compression and for more tilt
     /// in the `directions`, at most two.
     pub(super) fn trial(&self, delta: f64, tilt: DVec2, directions: &[DVec2]) -> Trial<'_> {
+        let body = tilt;
         let tilt = self.sign * tilt;
         let mut trial = Trial {
             face: self,
             regions: Vec::with_capacity(self.fields.len()),
             carried: Carried::zeros(),
             by: [Carried::zeros(); 3],
-            tilted: DVec2::ZERO,
-            tilted_by: [DVec2::ZERO; 3],
+            moved: Moved::zeros(),
+            moved_by: [Moved::zeros(); 3],
         };
         for field in &self.fields {
             let region = field.pressed(delta, tilt);
@@ -124,15 +129,15 @@ impl Face {
                 let by = sums.map(|row| self.stiffness * Carried::from(field.carried(&row)));
                 trial.carried += by[0];
                 trial.by[0] += by[1];
-                let felt = field.felt(tilt);
-                trial.tilted += by[0][0] * felt;
-                trial.tilted_by[0] += by[1][0] * felt;
+                let moved = self.moved(field, body);
+                trial.moved += by[0][0] * moved;
+                trial.moved_by[0] += by[1][0] * moved;
                 for (i, direction) in directions.iter().enumerate() {
                     let (one, rise) = self.rise(field, *direction);
                     let more = one * by[1] + rise.x * by[2] + rise.y * by[3];
                     trial.by[1 + i] += more;
-                    let turned = by[0][0] * self.sign * field.felt(*direction);
-                    trial.tilted_by[1 + i] += more[0] * felt + turned;
+                    let turned = by[0][0] * self.moved(field, *direction);
+                    trial.moved_by[1 + i] += more[0] * moved + turned;
                 }
             }
             trial.regions.push(region);
@@ -145,6 +150,13 @@ impl Face {
     fn rise(&self, field: &Field, direction: DVec2) -> (f64, DVec2) {
         let felt = self.sign * field.inward(field.felt(direction));
         (self.sign * direction.dot(field.origin), felt)
+    }
+
+    /// Per normal force.
+    fn moved(&self, field: &Field, tilt: DVec2) -> Moved {
+        let felt = field.felt(tilt);
+        let (push, rest, rolled) = (self.sign * felt, tilt - felt, field.rolled(tilt));
+        Moved::new(push.x, push.y, rest.x, rest.y, rolled.x, rolled.y)
     }
 
     /// The pressure that carries `load` at a tilt; `start`: a compression near that of the pad's plane.
@@ -251,7 +263,7 @@ impl Face {
             first: DVec2::ZERO,
             slope: DVec2::ZERO,
             turn: 0.0,
-            tilted: DVec2::ZERO,
+            moved: Moved::zeros(),
             second: 0.0,
         };
         for (field, region) in self.fields.iter().zip(&pressed.regions) {
@@ -265,7 +277,7 @@ impl Face {
             pressed.first += first;
             pressed.slope += DVec2::new(slope1, slope2);
             pressed.turn += turn;
-            pressed.tilted += load * self.sign * field.felt(tilt);
+            pressed.moved += load * self.moved(field, tilt);
             // About the origin of the pad plane, from that of the surface's axes.
             pressed.second += second + around.dot(2.0 * first - load * around);
         }

@@ -8,7 +8,7 @@ use glam::DVec2;
 use nalgebra::{Matrix3x5, SMatrix, SVector, Vector3, Vector5};
 
 use super::equilibrium::Problem;
-use super::face::{Carried, Pressed, Trial};
+use super::face::{Carried, Moved, Pressed, Trial};
 use super::slip::{self, Slipping};
 
 type Vector7 = SVector<f64, 7>;
@@ -260,7 +260,7 @@ impl<'p, 'a> Joint<'p, 'a> {
         let none = Carried::zeros();
         let ((w, moment), (outer, asked)) =
             (self.effect(&trials[0].carried, &trials[1].carried), self.outer());
-        let (mut w, moment) = (w + outer, moment + asked);
+        let (mut w, mut moment) = (w + outer, moment + asked);
         // Derivatives by the angles and the compressions.
         let mut by = [(Vector5::zeros(), DVec2::ZERO); 7];
         for i in 0..n {
@@ -268,15 +268,22 @@ impl<'p, 'a> Joint<'p, 'a> {
         }
         by[5] = self.effect(&(self.give * trials[0].by[0]), &none);
         by[6] = self.effect(&none, &(self.give * trials[1].by[0]));
-        if self.problem.push_counts {
-            let push = |v: DVec2| self.along(Vector3::new(v.x, v.y, 0.0), DVec2::ZERO);
+        if self.problem.moves {
+            let add = |to: (&mut Vector5<f64>, &mut DVec2), moved: Moved| {
+                let (push, moment) = self.problem.moved(&moved);
+                *to.0 += self.along(push.extend(0.0).to_array().into(), moment);
+                *to.1 += moment;
+            };
             let [one, two] = &trials;
-            w += push(one.tilted + two.tilted);
+            add((&mut w, &mut moment), one.moved + two.moved);
             for i in 0..n {
-                by[self.active + i].0 += push(one.tilted_by[1 + i] + two.tilted_by[1 + i]);
+                let (w, moment) = &mut by[self.active + i];
+                add((w, moment), one.moved_by[1 + i] + two.moved_by[1 + i]);
             }
-            by[5].0 += push(self.give * one.tilted_by[0]);
-            by[6].0 += push(self.give * two.tilted_by[0]);
+            for (k, trial) in trials.iter().enumerate() {
+                let (w, moment) = &mut by[5 + k];
+                add((w, moment), self.give * trial.moved_by[0]);
+            }
         }
         let (mut residual, mut jacobian) = (Vector7::zeros(), Matrix7::zeros());
         let friction = match mode {
@@ -493,11 +500,10 @@ impl<'p, 'a> Joint<'p, 'a> {
 
     /// The force along the pads that friction bears.
     fn asked_force(&self, trials: &[Trial<'_>; 2]) -> DVec2 {
-        let tilted = |trial: &Trial<'_>| {
-            if self.problem.push_counts { trial.tilted } else { DVec2::ZERO }
-        };
-        let push = |trial| tilted(trial) - DVec2::new(trial.carried[3], trial.carried[4]);
-        self.problem.wrench.force.truncate() + push(&trials[0]) + push(&trials[1])
+        let [one, two] = trials;
+        let slope = one.carried + two.carried;
+        let (push, _) = self.problem.moved(&(one.moved + two.moved));
+        self.problem.wrench.force.truncate() + push - DVec2::new(slope[3], slope[4])
     }
 
     /// The unknowns as a place. At the solution the square of the dissipation is the load's power.

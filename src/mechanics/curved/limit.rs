@@ -1,5 +1,4 @@
-//! The limit state of one load: which rotations are free, tilt and slip there, the push of tilted
-//! planes where it counts, and what to know beside.
+//! The limit state of one load: which rotations are free, tilt and slip there, and what to know beside.
 
 use glam::DVec2;
 use nalgebra::Vector5;
@@ -12,14 +11,9 @@ use super::{Answer, FaceAnswer, Note, Pads, SoftLimit};
 use crate::mechanics::{COUPLING_SEARCH, refused};
 use crate::model::{Face as Side, Score, Slip, Status, Wrench};
 
-/// Change of `mu_s` from which [`Note::TiltPushes`] is given.
-const TILTING_PUSH: f64 = 1e-3;
-
-/// Rise of `mu_s`, as a share and by itself, from which the push of tilted planes is counted.
-pub(super) const COUNTS: (f64, f64) = (0.01, 1e-4);
-
-/// Factor on what the push raises `mu_s` by at the tilt without it, that covers what it changes of it.
-const SURELY: f64 = 2.0;
+/// Share of `mu_s` by which what the tilt moves changes it from which on it is told: where it is left out,
+/// and where it counts.
+const TOLD: [f64; 2] = [1e-3, 1e-2];
 
 /// Push across the axis of a part that can spin, over the normal forces, from which
 /// [`Note::OverEdge`] is given.
@@ -45,14 +39,14 @@ pub(super) struct Asked {
     pub(super) others: bool,
     /// What to know of the answer.
     pub(super) notes: bool,
-    /// What the push of tilted planes adds, where that counts.
-    pub(super) push: bool,
+    /// That what the tilt moves counts.
+    pub(super) moves: bool,
 }
 
 impl Asked {
-    pub(super) const ALL: Self = Self { others: true, notes: true, push: false };
-    pub(super) const SCORE: Self = Self { others: true, notes: false, push: true };
-    pub(super) const FIRST: Self = Self { others: false, notes: false, push: true };
+    pub(super) const ALL: Self = Self { others: true, notes: true, moves: false };
+    pub(super) const SCORE: Self = Self { others: true, notes: false, moves: true };
+    pub(super) const FIRST: Self = Self { others: false, notes: false, moves: true };
 }
 
 /// Lever of a stiffness over the distance of the faces below which it is none.
@@ -112,52 +106,41 @@ impl<'a> Case<'a, '_> {
                     notes.push(Note::SettlesBy { angle });
                 }
                 None => {
-                    let (status, state) = match self.pushed(&problem, status, &state) {
-                        Some((status, state, note)) => {
-                            notes.push(note);
-                            (status, state)
-                        }
-                        None => (status, state),
-                    };
+                    if self.asked.notes && problem.rolls {
+                        notes.extend(self.told(&problem, &state));
+                    }
                     return self.finish(&problem, status, state, notes);
                 }
             }
         }
     }
 
-    /// The state with the push of tilted planes, where that counts.
-    fn pushed(
-        &self,
-        problem: &Problem<'a>,
-        status: Status,
-        state: &Option<State<'a>>,
-    ) -> Option<(Status, Option<State<'a>>, Note)> {
-        let state = state.as_ref().filter(|_| self.asked.push && status.holds())?;
-        let without = state.slip?.mu;
-        // First for the pressure as it is.
-        let (force, first) = problem.with_tilting_planes(state, TILTING_PUSH)?;
-        if !counts(without + SURELY * (first.mu - without), without) {
+    /// What comes of the tilt if what it moves counts, or does not, other than in the problem: told where
+    /// that changes much.
+    fn told(&self, problem: &Problem<'a>, state: &Option<State<'a>>) -> Option<Note> {
+        let other = Problem { moves: !problem.moves, ..problem.clone() };
+        let there = find(&other, self.pressed, false).1;
+        let mu = |state: &Option<State<'_>>| Some(state.as_ref()?.slip?.mu);
+        let (mine, theirs) = (mu(state), mu(&there));
+        let share = TOLD[usize::from(problem.moves)];
+        if match (mine, theirs) {
+            (Some(a), Some(b)) => (a - b).abs() <= share * a.max(b),
+            (None, None) => true,
+            _ => false,
+        } {
             return None;
         }
-        let pushed = Problem { push_counts: true, ..problem.clone() };
-        // The state next to the one without it, if there can be no other.
-        let near = pushed.at(&state.angles, 1.0, Some(state));
-        let near = near.and_then(|start| pushed.newton(start, 1.0));
-        let alone = |near: &State<'_>| {
-            !self.asked.others || near.slip.is_some_and(|slip| !strong(&pushed, slip.mu))
-        };
-        let (status, found) = match near.filter(alone) {
-            Some(near) => (status, Some(near)),
-            None => find(&pushed, self.pressed, self.asked.others),
-        };
-        let mut force = force;
-        if let Some(found) = &found {
-            if !counts(found.slip?.mu, without) {
-                return None;
-            }
-            force = pushed.push([&found.faces[0], &found.faces[1]]);
-        }
-        Some((status, found, Note::TiltPushesMuch { force: force.to_array(), without }))
+        let tilted = if problem.moves { state } else { &there };
+        let counted = Problem { moves: true, ..problem.clone() };
+        let force = tilted.as_ref().map_or(DVec2::ZERO, |state| {
+            counted.moved(&(state.faces[0].moved + state.faces[1].moved)).0
+        });
+        let force = force.to_array();
+        Some(if problem.moves {
+            Note::TiltPushesMuch { force, without: theirs }
+        } else {
+            Note::TiltPushes { force, mu_s: theirs }
+        })
     }
 
     pub(super) fn problem(&self, free: [bool; 2]) -> Problem<'a> {
@@ -186,15 +169,15 @@ impl<'a> Case<'a, '_> {
         let units = widths.iter().map(|width| 2.0 * give / width).collect();
         let length = slip::length(self.pressed);
         let fields = || self.faces.iter().flat_map(|face| &face.fields);
-        // Where all of both faces turns with the body, or none, the pushes cancel.
-        let pushes = held.iter().any(|e| {
+        // Where all of both faces turns with the body, or none, what it moves cancels.
+        let rolls = held.iter().any(|e| {
             let felt = fields().map(|field| field.felt(e.perp()).length());
             let (least, most) = felt.fold((1.0, 0.0), |(a, b): (f64, f64), f| (a.min(f), b.max(f)));
             most - least > FELT
         });
         Problem {
-            pushes,
-            push_counts: false,
+            rolls,
+            moves: rolls && self.asked.moves,
             faces: [&self.faces[0], &self.faces[1]],
             distance: self.distance,
             normal: self.normal,
@@ -223,7 +206,7 @@ impl<'a> Case<'a, '_> {
         };
         let tilt = problem.tilt(&state.angles);
         if self.asked.notes {
-            self.note(problem, state, &slipping, &mut notes);
+            self.note(problem, state, &mut notes);
         }
         let motion = motion(&problem.space, &slipping);
         Answer {
@@ -247,25 +230,13 @@ impl<'a> Case<'a, '_> {
     }
 
     /// Notes on a limit state.
-    fn note(
-        &self,
-        problem: &Problem<'_>,
-        state: &State<'_>,
-        slipping: &Slipping,
-        notes: &mut Vec<Note>,
-    ) {
+    fn note(&self, problem: &Problem<'_>, state: &State<'_>, notes: &mut Vec<Note>) {
         let tilt = problem.tilt(&state.angles);
         let give = 0.5 * (self.pressed[0].compression() + self.pressed[1].compression());
         let angle = tilt.length();
         let slip = 0.5 * self.distance.abs() * angle;
         if slip > give {
             notes.push(Note::TiltsFirst { angle, slip });
-        }
-        if !notes.iter().any(|note| matches!(note, Note::TiltPushesMuch { .. }))
-            && let Some((force, pushed)) = problem.with_tilting_planes(state, TILTING_PUSH)
-            && (pushed.mu - slipping.mu).abs() > TILTING_PUSH * slipping.mu
-        {
-            notes.push(Note::TiltPushes { force: force.to_array(), mu_s: pushed.mu });
         }
         for axis in &problem.space.spins {
             let push = -axis.perp().dot(state.faces[0].slope + state.faces[1].slope);
@@ -304,11 +275,6 @@ impl<'a> Case<'a, '_> {
         }
         notes
     }
-}
-
-/// Whether a push of tilted planes that raises `mu_s` so is counted.
-pub(super) fn counts(mu: f64, without: f64) -> bool {
-    mu - without > (COUNTS.0 * without).max(COUNTS.1)
 }
 
 /// Whether friction's lever is so long that there may be further limit states.

@@ -171,7 +171,7 @@ impl Pads {
     /// As [`Self::solve`] with the push of tilted planes where that raises `mu_s` by over a hundredth,
     /// as grips are ranked: the theory of [`solve`] leaves it out.
     pub fn solve_pushed(&self, distance: f64, force: f64, wrench: &Wrench) -> Answer {
-        self.answer(distance, force, wrench, Asked { push: true, ..Asked::ALL })
+        self.answer(distance, force, wrench, Asked { moves: true, ..Asked::ALL })
     }
 
     /// As [`Self::solve_pushed`] for a load whose status is known: where that is `ok` there is no other limit
@@ -187,7 +187,7 @@ impl Pads {
             distance,
             force,
             wrench,
-            Asked { others: status != Status::Ok, notes: true, push: true },
+            Asked { others: status != Status::Ok, notes: true, moves: true },
         )
     }
 

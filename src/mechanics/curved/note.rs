@@ -51,20 +51,20 @@ pub enum Note {
         /// Slip \[m\].
         slip: f64,
     },
-    /// Planes that tilt under their load push along the pads, which the theory leaves out as the
-    /// paper does; with a plane opposite a round face it does not cancel.
+    /// What tilts under the load is pushed along the pads where it is plane, and rolls where it is round:
+    /// left out as in the paper. Between two planes, and two round faces, it cancels.
     TiltPushes {
         /// Force on the body along `x1`, `x2` \[N\].
         force: [f64; 2],
-        /// `mu_s` with it, for the same pressure.
-        mu_s: f64,
+        /// `mu_s` with it; `None` where there is no limit state then.
+        mu_s: Option<f64>,
     },
-    /// The same where it raises `mu_s` by so much that it is counted.
+    /// The same where it is counted and changes `mu_s` by over a hundredth.
     TiltPushesMuch {
         /// Force on the body along `x1`, `x2` \[N\].
         force: [f64; 2],
-        /// `mu_s` without it.
-        without: f64,
+        /// `mu_s` without it; `None` where there is no limit state then.
+        without: Option<f64>,
     },
 }
 
@@ -124,23 +124,27 @@ impl fmt::Display for Note {
             ),
             Self::TiltsFirst { angle, slip } => write!(
                 out,
-                "the part tilts by {:.3} deg and slips {:.3} mm first; friction may hold a \
-                 little below mu_s",
+                "the part tilts by {:.3} deg and slips {:.3} mm first; less friction than mu_s may \
+                 hold",
                 angle.to_degrees(),
                 slip * mm
             ),
-            Self::TiltPushes { force, mu_s } => write!(
-                out,
-                "the tilted flat pushes ({:.4}, {:.4}) N along the pads, which mu_s leaves out; \
-                 with it {mu_s:.6}",
-                force[0], force[1]
-            ),
-            Self::TiltPushesMuch { force, without } => write!(
-                out,
-                "the tilted flat pushes ({:.4}, {:.4}) N along the pads, which mu_s counts; \
-                 without it {without:.6}",
-                force[0], force[1]
-            ),
+            Self::TiltPushes { force, mu_s } => {
+                write!(out, "{}, which mu_s leaves out; with it {}", tilts(force), or_none(mu_s))
+            }
+            Self::TiltPushesMuch { force, without } => {
+                write!(out, "{}, which mu_s counts; without it {}", tilts(force), or_none(without))
+            }
         }
     }
+}
+
+fn tilts([x, y]: [f64; 2]) -> String {
+    format!(
+        "the part tilts: its flat pushes ({x:.4}, {y:.4}) N along the pads, its round face rolls"
+    )
+}
+
+fn or_none(mu: Option<f64>) -> String {
+    mu.map_or_else(|| "no friction holds the load".to_owned(), |mu| format!("{mu:.6}"))
 }

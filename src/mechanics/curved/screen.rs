@@ -5,13 +5,12 @@
 //! its `mu_s`, or show, by how fast the steps shrink, that it stays below that of another load.
 
 use glam::DVec2;
-use nalgebra::Vector5;
 
 use super::equilibrium::Problem;
 use super::face::Pressed;
 use super::floor::Floors;
 use super::joint::{Found, Joint, Mode, Near, Place, Reached};
-use super::limit::{Asked, COUNTS, Case, NO_LEVER, counts, strong};
+use super::limit::{Asked, Case, NO_LEVER, strong};
 use super::space::{self, Kind, Rotation};
 use super::{Pads, slip};
 use crate::model::Wrench;
@@ -39,10 +38,8 @@ pub struct Screen<'a> {
     rolling: Vec<(usize, f64, f64)>,
     /// Of many loads.
     floors: Option<Floors>,
-    /// States found so far: without the push of tilted planes, and with it.
-    known: [Vec<Known>; 2],
-    /// Whether one limit state is followed: others are of no interest.
-    follows: bool,
+    /// States found so far.
+    known: Vec<Known>,
 }
 
 /// The state of a load.
@@ -50,14 +47,6 @@ struct Known {
     /// What tells how the load presses.
     presses: [f64; 3],
     place: Place,
-}
-
-/// What is known of a load, and from which state.
-struct Told {
-    compared: Compared,
-    place: Place,
-    /// Whether the state is that with the push of tilted planes.
-    counted: bool,
 }
 
 /// The state of the load that presses most like one.
@@ -74,8 +63,6 @@ const MANY: usize = 16;
 const MOST: usize = 64;
 /// Share of the limit of a strong coupling from which on a load is solved.
 const WEAK: f64 = 0.8;
-/// The same where planes push: a state with the push and one without are then sure to be neighbours.
-const WEAK_PUSHED: f64 = 0.1;
 /// Sine of the angle between two axes that are one.
 const SAME_AXIS: f64 = 1e-6;
 /// Share of a stiffness by which it may differ from a line in the pull.
@@ -89,10 +76,6 @@ const ROUNDING: f64 = 1e-9;
 /// twentieth of the contact's width.
 const HARDLY: f64 = 0.1;
 const GROWN: f64 = 2.0;
-/// Factor on what the push of tilted planes asks for at most, that covers what it changes of the tilt;
-/// and the share of what counts up to which it certainly does not.
-const ROUGHLY: f64 = 1.2;
-const RARELY: f64 = 0.8;
 
 impl Pads {
     /// For the comparison of some loads; `None` where the part may settle or twist in a way that each
@@ -177,9 +160,8 @@ impl Pads {
         let pull = f64::max(-low, high);
         let floors =
             if wrenches.len() >= MANY { Floors::new(&problem, faces, force, pull) } else { None };
-        let (near, known) = (Near::new(faces), [Vec::new(), Vec::new()]);
-        let follows = false;
-        Some(Screen { problem, force, near, rolling, floors, known, pressed, follows })
+        let (near, known) = (Near::new(faces), Vec::new());
+        Some(Screen { problem, force, near, rolling, floors, known, pressed })
     }
 }
 
@@ -198,8 +180,7 @@ const GROWTH: f64 = 2.0 / 3.0;
 impl Pads {
     /// As [`Pads::screen`], for one load.
     pub(super) fn follow(&self, distance: f64, force: f64, wrench: &Wrench) -> Option<Follow<'_>> {
-        let mut screen = self.screen(distance, force, std::slice::from_ref(wrench))?;
-        screen.follows = true;
+        let screen = self.screen(distance, force, std::slice::from_ref(wrench))?;
         if !screen.rolling.is_empty() {
             return None;
         }
@@ -217,7 +198,7 @@ impl Follow<'_> {
         }
         screen.force = force;
         (screen.problem.normal, screen.problem.wrench) = (normal, self.wrench);
-        screen.known.iter_mut().for_each(Vec::clear);
+        screen.known.clear();
         let log = force.ln();
         if let Some((at, last)) = &self.last {
             let mut place = *last;
@@ -233,14 +214,7 @@ impl Follow<'_> {
             }
             screen.keep(place);
         }
-        let told = if screen.problem.pushes {
-            screen.compare_pushed(0.0)
-        } else {
-            screen.reach(0.0).map(|(compared, place, _)| Told { compared, place, counted: false })
-        };
-        let Some(Told { compared: Compared::At(mu), place, counted }) = told else { return None };
-        // What is foretold is put where it belongs.
-        screen.problem.push_counts = counted;
+        let Some((Compared::At(mu), place, _)) = screen.reach(0.0) else { return None };
         self.before = self.last.replace((log, place));
         (mu > 0.0).then_some(mu)
     }
@@ -269,9 +243,6 @@ impl Screen<'_> {
         for &(held, stiffness, by_pull) in &self.rolling {
             self.problem.rolling[held] = stiffness * self.force + by_pull * wrench.force.z;
         }
-        if self.problem.pushes {
-            return self.compare_pushed(value).map_or(Compared::Open, |told| told.compared);
-        }
         if let Some(floors) = &self.floors {
             if !strong(&self.problem, value / WEAK) && floors.below(&self.problem, value).is_some()
             {
@@ -286,75 +257,17 @@ impl Screen<'_> {
         compared
     }
 
-    /// As [`Self::compare`] where planes push along the pads when they tilt; `None` where nothing is known.
-    fn compare_pushed(&mut self, value: f64) -> Option<Told> {
-        self.problem.push_counts = false;
-        let (compared, place, without) = self.reach_settled(value)?;
-        let asked = self.asked_by_push(&place)?;
-        let told = |compared, place, counted| Some(Told { compared, place, counted });
-        // What holds two loads one by one holds both.
-        if without + ROUGHLY * asked < value {
-            return told(Compared::Below, place, false);
-        }
-        self.keep(place);
-        let is_below = compared == Compared::Below;
-        if !is_below && asked <= RARELY * COUNTS.0 * without {
-            return told(compared, place, false);
-        }
-        self.problem.push_counts = true;
-        let (_, pushed, with) = self.reach_settled(value)?;
-        self.keep(pushed);
-        if with < value && (is_below || without < value) {
-            return told(Compared::Below, pushed, true);
-        }
-        let (without, place) = if is_below {
-            self.problem.push_counts = false;
-            let (_, place, without) = self.reach_settled(0.0)?;
-            (without, place)
-        } else {
-            (without, place)
-        };
-        // Where the push lowers it to less than the value that was enough to know.
-        if counts(with, without) {
-            told(Compared::At(with), pushed, true)
-        } else {
-            told(Compared::At(without), place, false)
-        }
-    }
-
-    /// As [`Self::reach`], if that does not depend on what the load decides by itself, or a state is
-    /// followed.
+    /// As [`Self::reach`], if that does not depend on what the load decides by itself.
     fn reach_settled(&self, value: f64) -> Option<(Compared, Place, f64)> {
         let (compared, place, most) = self.reach(value)?;
-        let weak = if self.problem.pushes { WEAK_PUSHED } else { WEAK };
-        let open = strong(&self.problem, most / weak) || self.may_settle(&place);
-        (self.follows || !open).then_some((compared, place, most))
+        let open = strong(&self.problem, most / WEAK) || self.may_settle(&place);
+        (!open).then_some((compared, place, most))
     }
 
     fn keep(&mut self, place: Place) {
-        let presses = self.presses();
-        let known = &mut self.known[usize::from(self.problem.push_counts)];
-        if known.len() < MOST {
-            known.push(Known { presses, place });
+        if self.known.len() < MOST {
+            self.known.push(Known { presses: self.presses(), place });
         }
-    }
-
-    /// States to begin at: of the same kind, if there are any.
-    fn known(&self) -> &[Known] {
-        let [without, with] = &self.known;
-        let counts = self.problem.push_counts && !with.is_empty() || without.is_empty();
-        if counts { with } else { without }
-    }
-
-    /// A friction that bears the force along the pads that planes bring by their tilt at a place.
-    fn asked_by_push(&self, place: &Place) -> Option<f64> {
-        let Problem { faces, normal, space, distance, .. } = &self.problem;
-        let tilt = self.problem.tilt(&place.angles);
-        let [one, two] = [0, 1].map(|k| faces[k].carry(normal[k], tilt, Some(place.delta[k])));
-        let (one, two) = (one?, two?);
-        let push = self.problem.push([&one, &two]);
-        let w = Vector5::new(push.x, push.y, 0.0, 0.0, 0.0);
-        slip::enough(space, [&one, &two], *distance, w)
     }
 
     /// Whether the part may turn by more than the layers give about an axis that the faces' roundness
@@ -391,7 +304,7 @@ impl Screen<'_> {
             }
         }
         // From the motion that the load moves most.
-        let moved = self.known().iter().filter(|known| known.place.mode != Mode::Off);
+        let moved = self.known.iter().filter(|known| known.place.mode != Mode::Off);
         let moved = moved.map(|Known { place, .. }| (w.dot(&place.motion), place));
         let start = moved.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, place)| {
             let on = if let Mode::Rolls(k) = place.mode { Some(k) } else { None };
@@ -441,14 +354,14 @@ impl Screen<'_> {
 
     /// The state of the load that presses most like this one.
     fn nearest(&self) -> Place {
-        nearest(self.known(), &self.presses())
+        nearest(&self.known, &self.presses())
             .map_or_else(|| Place::new([&self.pressed[0], &self.pressed[1]]), |known| known.place)
     }
 
     /// The state to begin at, from those of other loads.
     fn start(&self, joint: &Joint<'_, '_>) -> Place {
         let mut start = self.nearest();
-        let slips = self.known().iter().filter(|known| known.place.mode == Mode::Slips);
+        let slips = self.known.iter().filter(|known| known.place.mode == Mode::Slips);
         let moved = slips.map(|Known { place, .. }| (joint.power(&place.motion), place.motion));
         let most = moved.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
         start.mode = Mode::Off;

@@ -113,11 +113,11 @@ fn floors_take_most_loads() {
     }
 }
 
-/// Where a plane opposite something round pushes along the pads, most loads are compared too, many of
-/// them with a push that counts.
+/// Where a plane opposite something round is moved by its tilt, most loads are compared too, many of them
+/// with another `mu_s` for it.
 #[test]
-fn loads_on_planes_that_push_are_compared() {
-    let (mut compared, mut counted, mut below) = (0, 0, 0);
+fn loads_on_what_rolls_are_compared() {
+    let (mut compared, mut moved, mut below) = (0, 0, 0);
     for (kind, off) in [(5, 0.0), (5, 0.003), (6, 0.0), (6, 0.003)] {
         let (surfaces, distance) = surfaces(kind, [0.01, 0.008], off);
         let pads = Pads::new(&surfaces).unwrap();
@@ -127,9 +127,7 @@ fn loads_on_planes_that_push_are_compared() {
             let answer = pads.solve_pushed(distance, 200.0, wrench);
             let mu = answer.score.mu_s.unwrap();
             let without = pads.solve(distance, 200.0, wrench).score.mu_s.unwrap();
-            let is_counted = counts(mu, without);
-            assert_eq!(mu == without, !is_counted, "{kind} {off}: {mu} {without}");
-            counted += usize::from(is_counted);
+            moved += usize::from((mu / without - 1.0).abs() > 0.01);
             if let Compared::At(found) = screen.compare(wrench, 0.0) {
                 assert!((found / mu - 1.0).abs() < 1e-9, "{kind} {off}: {found} {mu}");
                 compared += 1;
@@ -138,6 +136,6 @@ fn loads_on_planes_that_push_are_compared() {
             assert_ne!(screen.compare(wrench, 0.999 * mu), Compared::Below);
         }
     }
-    println!("{compared} compared, {counted} counted, {below} below");
-    assert!(compared > 300 && counted > 50 && below > 200);
+    println!("{compared} compared, {moved} moved, {below} below");
+    assert!(compared > 300 && moved > 50 && below > 200);
 }
