@@ -215,6 +215,7 @@ fn on_points(posed: &Posed, spins: &[DVec2], answer: &Answer, grid: usize) -> Ve
         for spot in &spots {
             let pressed = DVec3::Z * if spot.face == 0 { -spot.p } else { spot.p };
             moment += spot.along.extend(0.0).cross(pressed);
+            moment.z += spot.p * spot.x.perp_dot(spot.felt);
         }
         let told = answer.notes.iter().find_map(|note| match note {
             Note::TiltPushesMuch { force, .. } => Some(DVec2::from(*force)),

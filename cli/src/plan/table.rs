@@ -160,7 +160,11 @@ fn cautions(shown: &[&RankedGrip]) -> Vec<String> {
         _ => None,
     });
     let unstable = of(&|note| match note {
-        Note::Unstable { .. } | Note::OverEdge { .. } => Some(0.0),
+        Note::Unstable { .. } => Some(0.0),
+        _ => None,
+    });
+    let edge = of(&|note| match note {
+        Note::OverEdge { force } => Some(force.abs()),
         _ => None,
     });
     let tilts = of(&|note| match note {
@@ -179,8 +183,14 @@ fn cautions(shown: &[&RankedGrip]) -> Vec<String> {
     }
     if let Some((ranks, _)) = unstable {
         texts.push(format!(
-            "Unstable: in rank {ranks} friction alone keeps the part from rolling out or sideways (see \
+            "Unstable: in rank {ranks} friction alone keeps the part from rolling out of the grip (see \
              `gripfast why`)."
+        ));
+    }
+    if let Some((ranks, most)) = edge {
+        texts.push(format!(
+            "Pushed aside: in rank {ranks} a pad ends on a round face and pushes the part off sideways with \
+             up to {most:.2} N, which friction bears."
         ));
     }
     if let Some((ranks, most)) = tilts {
@@ -193,7 +203,10 @@ fn cautions(shown: &[&RankedGrip]) -> Vec<String> {
     texts
 }
 
-/// Rising ranks as a text, those in a row by their ends.
+/// Runs of ranks that are told one by one.
+const RUNS: usize = 8;
+
+/// Rising ranks as a text, those in a row by their ends, and how many more there are.
 fn ranks(all: impl Iterator<Item = u64>) -> String {
     let mut runs: Vec<[u64; 2]> = Vec::new();
     for rank in all {
@@ -202,12 +215,14 @@ fn ranks(all: impl Iterator<Item = u64>) -> String {
             _ => runs.push([rank; 2]),
         }
     }
-    let texts = runs.iter().map(|[first, last]| match last - first {
+    let texts = runs.iter().take(RUNS).map(|[first, last]| match last - first {
         0 => first.to_string(),
         1 => format!("{first}, {last}"),
         _ => format!("{first} to {last}"),
     });
-    texts.collect::<Vec<_>>().join(", ")
+    let told = texts.collect::<Vec<_>>().join(", ");
+    let more: u64 = runs.iter().skip(RUNS).map(|[first, last]| last - first + 1).sum();
+    if more == 0 { told } else { format!("{told} and {more} more") }
 }
 
 /// A part that is smaller than the pads, as one is in a file of another unit than was taken.

@@ -5,7 +5,7 @@
 //! or none.
 
 use glam::DVec2;
-use nalgebra::{Vector3, Vector5};
+use nalgebra::{Vector2, Vector3, Vector5};
 
 use super::face::{Carried, Face, Moved, Pressed};
 use super::joint::{Joint, Mode, Near, Place, Reached};
@@ -81,8 +81,8 @@ impl<'a> Problem<'a> {
     pub(super) fn along(&self, faces: [&Pressed<'_>; 2], moment: DVec2) -> Vector5<f64> {
         let Wrench { force, moment: outer } = self.wrench;
         let tilted = self.moved(&(faces[0].moved + faces[1].moved)).0;
-        let push = tilted - faces[0].slope - faces[1].slope;
-        let turn = faces[0].turn + faces[1].turn;
+        let push = tilted.xy() - Vector2::from((faces[0].slope + faces[1].slope).to_array());
+        let turn = tilted.z + faces[0].turn + faces[1].turn;
         let mut w = Vector5::new(force.x + push.x, force.y + push.y, outer.z + turn, 0.0, 0.0);
         for (i, e) in self.space.spins.iter().enumerate() {
             w[3 + i] = e.dot(moment);
@@ -111,13 +111,13 @@ impl<'a> Problem<'a> {
         (slide, (lever(one) - lever(two)).perp())
     }
 
-    /// The force along the pads and the moment in their plane that the tilt brings by what it moves, if
-    /// that counts.
-    pub(super) fn moved(&self, moved: &Moved) -> (DVec2, DVec2) {
+    /// The force along the pads with the moment about the closing axis, and the moment in the pad plane,
+    /// that the tilt brings by what it moves, if that counts.
+    pub(super) fn moved(&self, moved: &Moved) -> (Vector3<f64>, DVec2) {
         if !self.moves {
-            return (DVec2::ZERO, DVec2::ZERO);
+            return (Vector3::zeros(), DVec2::ZERO);
         }
-        let [push, rest, rolled] = [0, 2, 4].map(|i| DVec2::new(moved[i], moved[i + 1]));
+        let [rest, rolled] = [3, 5].map(|i| DVec2::new(moved[i], moved[i + 1]));
         // The pads press where the surface is highest then: its centre of curvature goes with the body.
         let mut moment = (rolled - 0.5 * self.distance * rest).perp();
         for (e, rolling) in self.held.iter().zip(&self.rolling) {
@@ -126,7 +126,7 @@ impl<'a> Problem<'a> {
                 moment -= e.dot(moment) * *e;
             }
         }
-        (push, moment)
+        (moved.xyz(), moment)
     }
 
     /// The moment in the pad plane that the pressure leaves over.

@@ -44,10 +44,10 @@ pub(super) struct Pressed<'a> {
 /// about `x3` of the push against the slope.
 pub(super) type Carried = Vector6<f64>;
 
-/// What a tilt moves besides, linear in it and in the pressure: the force on the body along the pad, of
-/// what turns with the body; and of what rolls on the pad the normal force times the tilt, and the
-/// first moment by which the pressure moves on the body.
-pub(super) type Moved = SVector<f64, 6>;
+/// What a tilt moves besides, linear in it and in the pressure: of what turns with the body the force on
+/// it along the pad and its moment about the closing axis; and of what rolls on the pad the normal force
+/// times the tilt, and the first moment by which the pressure moves on the body.
+pub(super) type Moved = SVector<f64, 7>;
 
 /// A face under some compression and tilt, with the derivatives of what it carries.
 #[derive(Debug, Clone)]
@@ -129,15 +129,14 @@ impl Face {
                 let by = sums.map(|row| self.stiffness * Carried::from(field.carried(&row)));
                 trial.carried += by[0];
                 trial.by[0] += by[1];
-                let moved = self.moved(field, body);
-                trial.moved += by[0][0] * moved;
-                trial.moved_by[0] += by[1][0] * moved;
+                trial.moved += self.moved(field, &by[0], body);
+                trial.moved_by[0] += self.moved(field, &by[1], body);
                 for (i, direction) in directions.iter().enumerate() {
                     let (one, rise) = self.rise(field, *direction);
                     let more = one * by[1] + rise.x * by[2] + rise.y * by[3];
                     trial.by[1 + i] += more;
-                    let turned = by[0][0] * self.moved(field, *direction);
-                    trial.moved_by[1 + i] += more[0] * moved + turned;
+                    trial.moved_by[1 + i] +=
+                        self.moved(field, &more, body) + self.moved(field, &by[0], *direction);
                 }
             }
             trial.regions.push(region);
@@ -152,11 +151,13 @@ impl Face {
         (self.sign * direction.dot(field.origin), felt)
     }
 
-    /// Per normal force.
-    fn moved(&self, field: &Field, tilt: DVec2) -> Moved {
+    /// What a tilt moves of a pressure on a piece that carries so much.
+    fn moved(&self, field: &Field, carried: &Carried, tilt: DVec2) -> Moved {
+        let (load, first) = (carried[0], DVec2::new(carried[1], carried[2]));
         let felt = field.felt(tilt);
-        let (push, rest, rolled) = (self.sign * felt, tilt - felt, field.rolled(tilt));
-        Moved::new(push.x, push.y, rest.x, rest.y, rolled.x, rolled.y)
+        let (push, turn) = (self.sign * load * felt, self.sign * first.perp_dot(felt));
+        let (rest, rolled) = (load * (tilt - felt), load * field.rolled(tilt));
+        Moved::from([push.x, push.y, turn, rest.x, rest.y, rolled.x, rolled.y])
     }
 
     /// The pressure that carries `load` at a tilt; `start`: a compression near that of the pad's plane.
@@ -272,12 +273,13 @@ impl Face {
             }
             let [sums @ .., second] =
                 region.pressure_moments(&field.gap).map(|sum| self.stiffness * sum);
-            let [load, x1, x2, slope1, slope2, turn] = field.carried(&sums);
+            let carried = field.carried(&sums);
+            let [load, x1, x2, slope1, slope2, turn] = carried;
             let (first, around) = (DVec2::new(x1, x2), field.origin);
             pressed.first += first;
             pressed.slope += DVec2::new(slope1, slope2);
             pressed.turn += turn;
-            pressed.moved += load * self.moved(field, tilt);
+            pressed.moved += self.moved(field, &Carried::from(carried), tilt);
             // About the origin of the pad plane, from that of the surface's axes.
             pressed.second += second + around.dot(2.0 * first - load * around);
         }

@@ -270,8 +270,8 @@ impl<'p, 'a> Joint<'p, 'a> {
         by[6] = self.effect(&none, &(self.give * trials[1].by[0]));
         if self.problem.moves {
             let add = |to: (&mut Vector5<f64>, &mut DVec2), moved: Moved| {
-                let (push, moment) = self.problem.moved(&moved);
-                *to.0 += self.along(push.extend(0.0).to_array().into(), moment);
+                let (slide, moment) = self.problem.moved(&moved);
+                *to.0 += self.along(slide, moment);
                 *to.1 += moment;
             };
             let [one, two] = &trials;
@@ -503,7 +503,8 @@ impl<'p, 'a> Joint<'p, 'a> {
         let [one, two] = trials;
         let slope = one.carried + two.carried;
         let (push, _) = self.problem.moved(&(one.moved + two.moved));
-        self.problem.wrench.force.truncate() + push - DVec2::new(slope[3], slope[4])
+        let brought = DVec2::new(push.x - slope[3], push.y - slope[4]);
+        self.problem.wrench.force.truncate() + brought
     }
 
     /// The unknowns as a place. At the solution the square of the dissipation is the load's power.
