@@ -66,8 +66,9 @@ pub(crate) fn score_curved_watched(
 struct Seen {
     /// Held, with their `mu_s` but for rounding.
     near: Vec<(usize, f64)>,
-    /// Solved.
+    /// Solved, but for other limit states of those in `first`.
     solved: Vec<(usize, Score)>,
+    first: Vec<usize>,
     compared: usize,
 }
 
@@ -158,8 +159,10 @@ impl CurvedProblem<'_> {
             }
         }
         seen.solved.sort_by_key(|&(load, _)| load);
-        let Seen { solved, compared, .. } = seen;
-        let worst = worst(solved.iter().copied());
+        let Seen { solved, compared, first, .. } = seen;
+        let whole = |load| if first.contains(&load) { Some(self.solve(load)) } else { None };
+        let worst =
+            worst(solved.iter().copied()).map(|(load, score)| (load, whole(load).unwrap_or(score)));
         Scored { worst, all: Vec::new(), solved: solved.len(), compared, outranked: false }
     }
 
@@ -186,7 +189,13 @@ impl CurvedProblem<'_> {
                 Some(mu)
             }
             Compared::Open => {
-                let score = self.solve(load);
+                let score = match self.pads {
+                    Some(pads) => {
+                        seen.first.push(load);
+                        pads.score_first(self.distance, self.force, &self.wrenches[load])
+                    }
+                    None => self.solve(load),
+                };
                 seen.solved.push((load, score));
                 usable(&score)
             }

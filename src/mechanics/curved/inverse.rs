@@ -1,6 +1,6 @@
 //! How hard to squeeze what is not plane.
 
-use super::{Asked, Pads};
+use super::Pads;
 use crate::model::Wrench;
 
 /// Relative width at which the force counts as found.
@@ -43,7 +43,7 @@ pub fn force_needed(
     // The logarithm of mu_s over the friction; infinite where there is no limit state.
     let over = |mu: Option<f64>| mu.map_or(f64::INFINITY, |mu| (mu / friction).ln());
     let solved = |force: f64| {
-        let score = pads.answer(distance, force, wrench, Asked::FIRST).score;
+        let score = pads.score_first(distance, force, wrench);
         over(score.mu_s.filter(|_| score.status.holds()))
     };
     if size == 0.0 {

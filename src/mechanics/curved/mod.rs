@@ -191,6 +191,12 @@ impl Pads {
         )
     }
 
+    /// As [`Self::score`], without a look for other limit states where there is one: only the status
+    /// may differ, `ok` for `ambiguous`.
+    pub(crate) fn score_first(&self, distance: f64, force: f64, wrench: &Wrench) -> Score {
+        self.answer(distance, force, wrench, Asked::FIRST).score
+    }
+
     /// As [`Self::solve_pushed`] without notes.
     pub fn score(&self, distance: f64, force: f64, wrench: &Wrench) -> Score {
         self.answer(distance, force, wrench, Asked::SCORE).score
