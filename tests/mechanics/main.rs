@@ -7,6 +7,7 @@ mod curved;
 mod curved_points;
 mod earlier_method;
 mod exact;
+mod exact_motion;
 mod invariances;
 mod named;
 mod near_lift_off;
