@@ -8,7 +8,7 @@ use glam::DVec3;
 use gripfast::geometry::patch_area;
 use gripfast::gripper::Gripper;
 use gripfast::lab::compare::places_by_score;
-use gripfast::mechanics::curved::{Note, SoftLimit};
+use gripfast::mechanics::curved::{LARGE_TILT, Note, SoftLimit};
 use gripfast::mechanics::squeeze_pressure;
 use gripfast::model::{Contact, Slip, Status};
 use gripfast::plan::OUTRANKED;
@@ -194,9 +194,11 @@ fn cautions(shown: &[&RankedGrip]) -> Vec<String> {
         ));
     }
     if let Some((ranks, most)) = tilts {
+        let beyond =
+            if most > LARGE_TILT { "; tilts over 6 deg are beyond the theory" } else { "" };
         texts.push(format!(
             "Tilts: in rank {ranks} the part tilts by up to {:.1} deg before it slips under the worst \
-             load, more than its pads give.",
+             load, more than its pads give{beyond}.",
             most.to_degrees()
         ));
     }

@@ -31,7 +31,7 @@ use crate::model::{Score, Status, Wrench, check_area};
 use face::{Face, Pressed};
 pub use inverse::force_needed;
 use limit::{Asked, Case, no_answer};
-pub use note::{Note, SoftLimit};
+pub use note::{LARGE_TILT, Note, SoftLimit};
 pub use screen::{Compared, Screen};
 use space::{Kind, Rotation};
 
