@@ -98,8 +98,12 @@ impl CurvedProblem<'_> {
     }
 
     fn solve(&self, load: usize) -> Score {
+        self.solve_by(load, Pads::score)
+    }
+
+    fn solve_by(&self, load: usize, by: fn(&Pads, f64, f64, &Wrench) -> Score) -> Score {
         match self.pads {
-            Some(pads) => pads.score(self.distance, self.force, &self.wrenches[load]),
+            Some(pads) => by(pads, self.distance, self.force, &self.wrenches[load]),
             None => refused(Status::NoContact, 0),
         }
     }
@@ -160,9 +164,11 @@ impl CurvedProblem<'_> {
         }
         seen.solved.sort_by_key(|&(load, _)| load);
         let Seen { solved, compared, first, .. } = seen;
-        let whole = |load| if first.contains(&load) { Some(self.solve(load)) } else { None };
-        let worst =
-            worst(solved.iter().copied()).map(|(load, score)| (load, whole(load).unwrap_or(score)));
+        let whole = |(load, score)| {
+            let score = if first.contains(&load) { self.solve(load) } else { score };
+            (load, score)
+        };
+        let worst = worst(solved.iter().copied()).map(whole);
         Scored { worst, all: Vec::new(), solved: solved.len(), compared, outranked: false }
     }
 
@@ -189,13 +195,8 @@ impl CurvedProblem<'_> {
                 Some(mu)
             }
             Compared::Open => {
-                let score = match self.pads {
-                    Some(pads) => {
-                        seen.first.push(load);
-                        pads.score_first(self.distance, self.force, &self.wrenches[load])
-                    }
-                    None => self.solve(load),
-                };
+                let score = self.solve_by(load, Pads::score_first);
+                seen.first.push(load);
                 seen.solved.push((load, score));
                 usable(&score)
             }

@@ -100,7 +100,6 @@ pub(super) fn measure(
             (0.0, 0.0, 0.0, 0.0, 0.0_f64);
         let (mut singles, mut rough, mut products, mut own_squares) = (0, 0.0, 0.0, 0.0);
         let mut fragments: FxHashMap<u32, ()> = FxHashMap::default();
-        let mut bent = Bent::new(region.plane.normal, region.centre, region.area);
         for &triangle in triangles {
             let own = fine.of[triangle as usize];
             fragments.insert(own, ());
@@ -121,7 +120,6 @@ pub(super) fn measure(
                 own_squares += x * x + y * y + z * z;
             }
             squares += area * heights.iter().map(|height| height * height).sum::<f64>() / 3.0;
-            bent.add(area, corners, heights);
             for k in 0..3 {
                 let twin = part.edges.twin[triangle as usize * 3 + k];
                 if twin == NONE {
@@ -152,7 +150,13 @@ pub(super) fn measure(
             _ => both_ways && 2.0 * alone > region.area,
         };
         if is_broken {
-            let left = bent.left().filter(|_| triangles.len() >= BENT);
+            let straight = || {
+                let mut bent = Bent::new(region.plane.normal, region.centre, region.area);
+                let corners = triangles.iter().map(|&triangle| part.mesh.corners(triangle));
+                corners.for_each(|corners| bent.add(corners));
+                bent.left()
+            };
+            let left = if triangles.len() < BENT { None } else { straight() };
             broken.push((region.area, left.unwrap_or(squares) / region.area));
         }
         let square = own_squares / (3 * singles) as f64;
@@ -170,7 +174,8 @@ pub(super) fn measure(
 /// The surface of second degree over a region's plane that fits its corners by least squares.
 struct Bent {
     origin: DVec3,
-    axes: [DVec3; 2],
+    /// Two in the plane and its normal.
+    axes: [DVec3; 3],
     /// Unit of length \[m\].
     unit: f64,
     matrix: Matrix6<f64>,
@@ -184,7 +189,7 @@ impl Bent {
         let (one, two) = normal.any_orthonormal_pair();
         Self {
             origin,
-            axes: [one, two],
+            axes: [one, two, normal],
             unit: area.sqrt(),
             matrix: Matrix6::zeros(),
             right: Vector6::zeros(),
@@ -192,12 +197,14 @@ impl Bent {
         }
     }
 
-    /// A triangle of this area by its corners and their distances from the plane.
-    fn add(&mut self, area: f64, corners: [DVec3; 3], heights: [f64; 3]) {
-        for (corner, height) in corners.into_iter().zip(heights) {
-            let [x, y] = self.axes.map(|axis| axis.dot(corner - self.origin) / self.unit);
+    /// A triangle.
+    fn add(&mut self, corners: [DVec3; 3]) {
+        let [a, b, c] = corners;
+        let weight = (b - a).cross(c - a).length() / 6.0;
+        for corner in corners {
+            let [x, y, height] = self.axes.map(|axis| axis.dot(corner - self.origin));
+            let (x, y) = (x / self.unit, y / self.unit);
             let row = Vector6::new(1.0, x, y, x * x, x * y, y * y);
-            let weight = area / 3.0;
             self.matrix += weight * row * row.transpose();
             self.right += weight * height * row;
             self.squares += weight * height * height;
@@ -245,11 +252,7 @@ mod tests {
             for (i, j) in (-8..8).flat_map(|i| (0..8).map(move |j| (i, j))) {
                 let [a, b, c, d] =
                     [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(k, l)| height(i + k, j + l));
-                for corners in [[a, b, c], [a, c, d]] {
-                    let area =
-                        (corners[1] - corners[0]).cross(corners[2] - corners[0]).length() / 2.0;
-                    bent.add(area, corners, corners.map(|x| x.z));
-                }
+                [[a, b, c], [a, c, d]].into_iter().for_each(|corners| bent.add(corners));
             }
             let area = 2.0 * half * long;
             (bent.left().map(|left| (left / area).sqrt()), (bent.squares / area).sqrt())

@@ -80,7 +80,7 @@ impl<'a> Problem<'a> {
     /// moment in the pad plane with that from outside is `moment`.
     pub(super) fn along(&self, faces: [&Pressed<'_>; 2], moment: DVec2) -> Vector5<f64> {
         let Wrench { force, moment: outer } = self.wrench;
-        let tilted = self.moved(&(faces[0].moved + faces[1].moved)).0;
+        let (tilted, _) = self.moved_of(faces);
         let push = tilted.xy() - Vector2::from((faces[0].slope + faces[1].slope).to_array());
         let turn = tilted.z + faces[0].turn + faces[1].turn;
         let mut w = Vector5::new(force.x + push.x, force.y + push.y, outer.z + turn, 0.0, 0.0);
@@ -129,10 +129,15 @@ impl<'a> Problem<'a> {
         (moved.xyz(), moment)
     }
 
+    /// The same of both faces.
+    pub(super) fn moved_of(&self, faces: [&Pressed<'_>; 2]) -> (Vector3<f64>, DVec2) {
+        self.moved(&(faces[0].moved + faces[1].moved))
+    }
+
     /// The moment in the pad plane that the pressure leaves over.
     pub(super) fn moment_beyond(&self, faces: [&Pressed<'_>; 2]) -> DVec2 {
         let (_, moment) = self.brought(&faces[0].carried(), &faces[1].carried());
-        let (_, rolled) = self.moved(&(faces[0].moved + faces[1].moved));
+        let (_, rolled) = self.moved_of(faces);
         self.wrench.moment.truncate() + moment + rolled
     }
 

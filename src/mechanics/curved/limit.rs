@@ -131,10 +131,9 @@ impl<'a> Case<'a, '_> {
             return None;
         }
         let tilted = if problem.moves { state } else { &there };
-        let counted = Problem { moves: true, ..problem.clone() };
-        let force = tilted.as_ref().map_or([0.0; 2], |state| {
-            counted.moved(&(state.faces[0].moved + state.faces[1].moved)).0.xy().into()
-        });
+        let force = tilted
+            .as_ref()
+            .map_or([0.0; 2], |state| (state.faces[0].moved + state.faces[1].moved).xy().into());
         Some(if problem.moves {
             Note::TiltPushesMuch { force, without: theirs }
         } else {

@@ -168,8 +168,8 @@ impl Pads {
         self.answer(distance, force, wrench, Asked::ALL)
     }
 
-    /// As [`Self::solve`] with the push of tilted planes where that raises `mu_s` by over a hundredth,
-    /// as grips are ranked: the theory of [`solve`] leaves it out.
+    /// As [`Self::solve`] with what the tilt moves, as grips are ranked: flats are pushed along the pads,
+    /// round faces roll; the theory of [`solve`] leaves it out.
     pub fn solve_pushed(&self, distance: f64, force: f64, wrench: &Wrench) -> Answer {
         self.answer(distance, force, wrench, Asked { moves: true, ..Asked::ALL })
     }
