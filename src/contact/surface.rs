@@ -263,10 +263,43 @@ pub(crate) fn numbers(gap: &Gap) -> [f64; 8] {
     [kind, a, b, axis.x, axis.y, at.x, at.y, height]
 }
 
-/// Compression at the pad plane \[m\] under a force \[N\] on a layer of this stiffness [Pa/m] where a
-/// piece presses with a whole ellipse about its crest: `N = pi k sqrt(R_1 R_2) (delta - h)^2`. `None`
-/// where it is another shape or its outline cuts the ellipse.
-pub(crate) fn spot(piece: &Piece, stiffness: f64, force: f64) -> Option<f64> {
+/// A whole ellipse about the crest of one piece: all that is pressed of a pad's pieces.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Spot {
+    /// Compression at the pad plane \[m\].
+    pub(crate) delta: f64,
+    at: DVec2,
+    /// Its first axis.
+    axis: DVec2,
+    half: [f64; 2],
+}
+
+impl Spot {
+    /// What a force \[N\] presses on a layer of this stiffness [Pa/m]: `N = pi k sqrt(R_1 R_2) (delta -
+    /// h)^2`. `None` where it is another shape, the outline cuts it or another piece is pressed as well.
+    pub(crate) fn of(pieces: &[Piece], stiffness: f64, force: f64) -> Option<Self> {
+        let is_round =
+            |piece: &&Piece| matches!(piece.gap, Gap::Sphere { .. } | Gap::Barrel { .. });
+        let round = pieces.iter().find(is_round)?;
+        let spot = whole_spot(round, stiffness, force)?;
+        let is_clear = |piece: &Piece| match piece.gap {
+            Gap::Plane { height, slope } => {
+                piece.outer.iter().all(|x| height + slope.dot(*x) >= spot.delta)
+            }
+            _ => std::ptr::eq(piece, round),
+        };
+        pieces.iter().all(is_clear).then_some(spot)
+    }
+
+    /// Its outline, as [`pressed`] has it.
+    pub(crate) fn outline(&self) -> Polygon {
+        let mut outer = ellipse(self.at, self.axis, self.half).to_vec();
+        begin(&mut outer);
+        Polygon { outer, holes: Vec::new() }
+    }
+}
+
+fn whole_spot(piece: &Piece, stiffness: f64, force: f64) -> Option<Spot> {
     let (radii, axis, at, height) = match piece.gap {
         Gap::Sphere { radius, at, height } => ([radius; 2], DVec2::X, at, height),
         Gap::Barrel { radius, meridian, axis, at, height } => {
@@ -279,11 +312,12 @@ pub(crate) fn spot(piece: &Piece, stiffness: f64, force: f64) -> Option<f64> {
     }
     let deep = (force / (std::f64::consts::PI * stiffness * (radii[0] * radii[1]).sqrt())).sqrt();
     let half = radii.map(|radius| (2.0 * radius * deep).sqrt());
-    // In units of the half axes the ellipse is the circle of radius one.
+    // In units of the half axes the ellipse is the circle of radius one, its polygon a little more.
     let place = |x: DVec2| {
         let way = x - at;
         DVec2::new(axis.dot(way) / half[0], axis.perp_dot(way) / half[1])
     };
+    let outer = CIRCLE[0].length_squared();
     // How often the outline goes round it: passes of the negative first axis.
     let mut turns = 0;
     let mut from = place(*piece.outer.last()?);
@@ -292,7 +326,7 @@ pub(crate) fn spot(piece: &Piece, stiffness: f64, force: f64) -> Option<f64> {
         let edge = to - from;
         let along =
             (-from.dot(edge) / edge.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        if (from + along * edge).length_squared() < 1.0 {
+        if (from + along * edge).length_squared() < outer {
             return None;
         }
         let turn = from.perp_dot(to);
@@ -300,16 +334,21 @@ pub(crate) fn spot(piece: &Piece, stiffness: f64, force: f64) -> Option<f64> {
         turns -= i32::from(from.y < 0.0 && to.y >= 0.0 && turn < 0.0);
         from = to;
     }
-    (turns != 0).then_some(height + deep)
+    (turns != 0).then_some(Spot { delta: height + deep, at, axis, half })
 }
 
 /// Sides of the polygon in place of an ellipse, of equal area.
 const SIDES: usize = 48;
-/// Its corners on the circle.
+/// Its corners, of a circle of radius one: a little outside of it.
 static CIRCLE: LazyLock<[DVec2; SIDES]> = LazyLock::new(|| {
     let step = std::f64::consts::TAU / SIDES as f64;
-    std::array::from_fn(|k| DVec2::from_angle(step * k as f64))
+    let grown = (step / step.sin()).sqrt();
+    std::array::from_fn(|k| grown * DVec2::from_angle(step * k as f64))
 });
+
+fn ellipse(at: DVec2, axis: DVec2, half: [f64; 2]) -> [DVec2; SIDES] {
+    CIRCLE.each_ref().map(|e| at + half[0] * e.x * axis + half[1] * e.y * axis.perp())
+}
 
 /// The part of a piece whose gap is less than `delta`: what a layer compressed so far presses.
 /// Ellipses are polygons of the same area, so that this is for pictures and first estimates.
@@ -367,13 +406,8 @@ pub(crate) fn pressed(piece: &Piece, delta: f64) -> Patch {
             if height >= delta {
                 return Patch::new();
             }
-            let step = std::f64::consts::TAU / SIDES as f64;
-            // For the area of the ellipse.
-            let grown = (step / step.sin()).sqrt();
-            let half = radii.map(|radius| grown * (2.0 * radius * (delta - height)).sqrt());
-            let axis = axis.normalize();
-            let corner = |e: &DVec2| at + half[0] * e.x * axis + half[1] * e.y * axis.perp();
-            within(&CIRCLE.each_ref().map(corner));
+            let half = radii.map(|radius| (2.0 * radius * (delta - height)).sqrt());
+            within(&ellipse(at, axis.normalize(), half));
         }
         Gap::Cone { radius, slope, axis, at, height } => {
             if slope == 0.0 {
@@ -513,11 +547,23 @@ mod tests {
                 layer: None,
             };
             let found = Pads::new(&surfaces).unwrap().squeezed(force).unwrap()[0].delta;
-            let spot = spot(&whole, stiffness, force).unwrap();
-            assert!((spot / found - 1.0).abs() < 1e-9, "{spot:e} {found:e}");
-            assert_eq!(super::spot(&piece(gap, 0.0011), stiffness, force), None);
-            let beside = Piece { outer: square(0.0002), ..whole };
-            assert_eq!(super::spot(&beside, stiffness, force), None);
+            let spot = |pieces: &[Piece]| Spot::of(pieces, stiffness, force);
+            let one = spot(&[whole.clone()]).unwrap();
+            let delta = one.delta;
+            assert!((delta / found - 1.0).abs() < 1e-9, "{delta:e} {found:e}");
+            let outline = pressed(&whole, delta);
+            let area = |patch: &Polygon| ring_area(&patch.outer);
+            assert!((area(&outline[0]) / area(&one.outline()) - 1.0).abs() < 1e-9);
+            assert!(spot(&[piece(gap, 0.0011)]).is_none());
+            let beside = Piece { outer: square(0.0002), ..whole.clone() };
+            assert!(spot(&[beside]).is_none());
+            // A plane beside it that the layer does not reach, or does.
+            let plane = |height: f64| {
+                let gap = Gap::Plane { height, slope: DVec2::ZERO };
+                Piece { gap, ..piece(gap, 0.003) }
+            };
+            assert!(spot(&[plane(1.01 * delta), whole.clone()]).is_some());
+            assert!(spot(&[plane(0.99 * delta), whole.clone()]).is_none());
         }
     }
 }

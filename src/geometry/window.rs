@@ -57,7 +57,9 @@ pub(crate) fn within_window(ring: &[DVec2], window: &[DVec2]) -> Option<Vec<Ring
         }
         if from > 0.0 {
             let point = crossing(b, a, window, sides[0]);
-            let (points, entry) = (vec![point], along(window, sides[0], point));
+            let mut points = Ring::with_capacity(ring.len() + window.len().min(4));
+            points.push(point);
+            let entry = along(window, sides[0], point);
             chains.push(Chain { points, entry, exit: f64::NAN });
         }
         let chain = chains.last_mut()?;
@@ -129,7 +131,7 @@ fn along(window: &[DVec2], side: usize, point: DVec2) -> f64 {
 }
 
 /// Closes chains along the window: from each exit counter-clockwise to the next entry.
-fn joined(chains: Vec<Chain>, window: &[DVec2]) -> Option<Vec<Ring>> {
+fn joined(mut chains: Vec<Chain>, window: &[DVec2]) -> Option<Vec<Ring>> {
     let count = window.len() as f64;
     let mut taken = vec![false; chains.len()];
     let mut rings = Vec::new();
@@ -144,7 +146,10 @@ fn joined(chains: Vec<Chain>, window: &[DVec2]) -> Option<Vec<Ring>> {
                 return None;
             }
             taken[at] = true;
-            ring.extend(&chains[at].points);
+            match ring.is_empty() {
+                true => ring = std::mem::take(&mut chains[at].points),
+                false => ring.extend(&chains[at].points),
+            }
             let exit = chains[at].exit;
             let ahead = |chain: &Chain| (chain.entry - exit).rem_euclid(count);
             let (next, way) = chains

@@ -14,7 +14,7 @@ use crate::clash::{Phase, Room, Sweep, Tree};
 use crate::contact::surface;
 use crate::geometry::{clip_ring_convex, polygon, ring_area};
 use crate::gripper::{Jaws, half_turn, rectangle};
-use crate::model::{Contact, Frame, Grip, Patch, Piece, Polygon, Ring, Surfaces};
+use crate::model::{Contact, Frame, Gap, Grip, Patch, Piece, Polygon, Ring, Surfaces};
 use crate::part::PairKind;
 
 /// What came of an item.
@@ -437,6 +437,15 @@ impl Proposer<'_> {
         jaws: Jaws,
         known: &mut Known,
     ) -> Touched {
+        let touched = |surfaces: Surfaces| Touched {
+            contact: Arc::new(relief.outlines(&surfaces, jaws)),
+            surfaces: Some(Arc::new(surfaces)),
+        };
+        let mut pieces = surfaces.face_i.iter().chain(&surfaces.face_ii);
+        // About one point every place has a contact of its own.
+        if pieces.any(|piece| matches!(piece.gap, Gap::Sphere { .. } | Gap::Barrel { .. })) {
+            return touched(surfaces);
+        }
         let step = self.same();
         let key = &mut known.key;
         key.clear();
@@ -447,11 +456,7 @@ impl Proposer<'_> {
             key.extend(numbers.map(|x| rounded(x / step)));
             key.push(i64::MIN);
         }
-        let touched = || Touched {
-            contact: Arc::new(relief.outlines(&surfaces, jaws)),
-            surfaces: Some(Arc::new(surfaces)),
-        };
-        known.or_insert(touched)
+        known.or_insert(|| touched(surfaces))
     }
 }
 

@@ -5,7 +5,7 @@ use glam::{DAffine2, DVec2, DVec3};
 
 use super::places::Edge;
 use super::shapes::to_site;
-use crate::contact::surface::{Shape, mapped, pressed, spot};
+use crate::contact::surface::{Shape, Spot, mapped, pressed};
 use crate::geometry::polygon;
 use crate::gripper::{Jaws, Layer};
 use crate::mechanics::curved::Pads;
@@ -126,16 +126,14 @@ impl Relief {
             Jaws::Straight => self.deltas,
             Jaws::Exchanged => [self.deltas[1], self.deltas[0]],
         };
-        let whole = |pieces: &[Piece], stiffness: f64| match pieces {
-            [piece] => spot(piece, stiffness, self.force),
-            _ => None,
-        };
         let [k_i, k_ii] = surfaces.stiffness;
-        let whole = (whole(&surfaces.face_i, k_i), whole(&surfaces.face_ii, k_ii));
-        let deltas = match whole {
-            (Some(one), Some(two)) => Some([one, two]),
-            _ => Pads::new(surfaces).ok().and_then(|pads| pads.compressions(self.force, near)),
-        };
+        if let Some(one) = Spot::of(&surfaces.face_i, k_i, self.force)
+            && let Some(two) = Spot::of(&surfaces.face_ii, k_ii, self.force)
+        {
+            return Contact { face_i: vec![one.outline()], face_ii: vec![two.outline()] };
+        }
+        let pads = Pads::new(surfaces).ok();
+        let deltas = pads.and_then(|pads| pads.compressions(self.force, near));
         let Some([one, two]) = deltas else { return Contact::default() };
         let outline = |pieces: &[Piece], delta: f64| -> Patch {
             pieces.iter().flat_map(|piece| pressed(piece, delta)).collect()

@@ -462,14 +462,20 @@ impl Look<'_> {
         }
         let mut seen: Vec<u32> = Vec::new();
         for &triangle in triangles {
-            let corners = self.survey.corners(triangle);
-            let [a, b, c] = corners.map(DVec3::truncate);
-            let bounds = Bounds2 { min: a.min(b).min(c), max: a.max(b).max(c) };
-            let behind = corners.map(|corner| self.side * (self.height - corner.z));
-            if behind.into_iter().fold(f64::INFINITY, f64::min) <= deepest
-                && bounds.meets(within)
-                && (b - a).perp_dot(c - a) * self.side > 0.0
-            {
+            let [a, b, c] = self.survey.corners(triangle);
+            // Most end at the first of these.
+            let nearest = match self.side > 0.0 {
+                true => self.height - a.z.max(b.z).max(c.z),
+                false => a.z.min(b.z).min(c.z) - self.height,
+            };
+            if nearest > deepest {
+                continue;
+            }
+            let [a, b, c] = [a, b, c].map(DVec3::truncate);
+            if (b - a).perp_dot(c - a) * self.side <= 0.0 {
+                continue;
+            }
+            if (Bounds2 { min: a.min(b).min(c), max: a.max(b).max(c) }).meets(within) {
                 seen.push(triangle);
             }
         }
