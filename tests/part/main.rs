@@ -20,4 +20,5 @@ mod step_faces;
 mod step_solids;
 #[path = "../support/mod.rs"]
 mod support;
+mod trimmed;
 mod truth;

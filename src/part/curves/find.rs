@@ -235,7 +235,14 @@ impl Growth<'_> {
                 cut.turn = turn(left, std::f64::consts::TAU / cut.facets);
             }
         }
-        faces.push(Face { found, cut, rim: Vec::new() });
+        // Corners on chords, which say nothing of the surface but how far it goes.
+        let all = self.points(&found.members);
+        let rim = if all.len() > found.points.len() { all } else { Vec::new() };
+        let mut face = Face { found, cut, rim };
+        if !face.rim.is_empty() {
+            face.turn_again();
+        }
+        faces.push(face);
     }
 
     /// Whether chords rise above the uncertainty of the vertices: of finer facets a few in a row lie
@@ -282,8 +289,11 @@ impl Growth<'_> {
                 }
                 (Some(found), None) | (None, Some(found)) => Some(found),
                 (None, None) => {
-                    let found = self.by_patch(seed);
-                    judged(self, found).map(|found| self.straightened(found))
+                    let found = self.by_creases(seed);
+                    judged(self, found).or_else(|| {
+                        let found = self.by_patch(seed);
+                        judged(self, found).map(|found| self.straightened(found))
+                    })
                 }
             };
             match found {
@@ -374,9 +384,8 @@ impl Growth<'_> {
         }
     }
 
-    /// Joins neighbours that lie on one surface: pieces of different fineness, and a helical strip
-    /// whose windings were found one by one.
-    fn join_same(&mut self, faces: &mut [Face]) {
+    /// Faces in sets with those of their neighbours that lie on the same surface.
+    pub(super) fn same(&self, faces: &[Face]) -> UnionFind {
         let mut pairs: Vec<(usize, usize)> = Vec::new();
         for (number, face) in faces.iter().enumerate() {
             for &facet in &face.found.members {
@@ -402,33 +411,42 @@ impl Growth<'_> {
                 sets.join(a, b);
             }
         }
+        sets
+    }
+
+    /// Joins neighbours that lie on one surface: pieces of different fineness, a helical strip whose
+    /// windings were found one by one, and strips between what was cut off.
+    pub(super) fn join_same(&mut self, faces: &mut [Face]) {
+        let mut sets = self.same(faces);
+        let mut grown: Vec<usize> = Vec::new();
         for number in 0..faces.len() {
             let root = sets.root(number);
-            if root == number {
+            if root == number || faces[number].found.members.is_empty() {
                 continue;
             }
-            let moved = std::mem::take(&mut faces[number].found.members);
-            for &facet in &moved {
+            let Face { found, rim, .. } = &mut faces[number];
+            let (surface, members) = (found.surface, std::mem::take(&mut found.members));
+            let (points, rim) = (std::mem::take(&mut found.points), std::mem::take(rim));
+            for &facet in &members {
                 self.owner[facet as usize] = root as u32;
             }
-            faces[root].found.members.extend(moved);
-            if faces[number].found.points.len() > faces[root].found.points.len() {
-                faces[root].found.surface = faces[number].found.surface;
+            let face = &mut faces[root];
+            if points.len() > face.found.points.len() {
+                face.found.surface = surface;
             }
+            face.found.members.extend(members);
+            face.found.points.extend(points);
+            face.rim.extend(rim);
+            grown.push(root);
         }
-        for face in faces.iter_mut() {
-            let found = &mut face.found;
-            let points = self.points(&found.members);
-            if points.len() <= found.points.len() {
-                continue;
-            }
-            found.surface = found.surface.fitted(found.kind, &points).unwrap_or(found.surface);
-            found.residual = found.surface.residual(&points);
-            found.points = points;
-            face.cut.turn = match found.kind {
-                Kind::Cylinder | Kind::Cone => turn(found, std::f64::consts::TAU / face.cut.facets),
-                _ => face.cut.turn,
-            };
+        grown.sort_unstable();
+        grown.dedup();
+        for root in grown {
+            let Face { found, .. } = &mut faces[root];
+            let fitted = found.surface.fitted(found.kind, &found.points);
+            found.surface = fitted.unwrap_or(found.surface);
+            found.residual = found.surface.residual(&found.points);
+            faces[root].turn_again();
         }
     }
 

@@ -153,7 +153,7 @@ impl<'a> Growth<'a> {
     }
 
     /// How far vertices may lie off \[m\].
-    fn tolerance(&self, surface: &Surface, sag: f64, exactness: Exactness) -> f64 {
+    pub(super) fn tolerance(&self, surface: &Surface, sag: f64, exactness: Exactness) -> f64 {
         let share = RESIDUAL * surface.radius();
         self.net.floor
             + match exactness {

@@ -125,7 +125,11 @@ impl Growth<'_> {
                 if (0.5 * step..2.0 * step).contains(&bend)
                     && (0.4..2.5).contains(&widths)
                     && miss < net.floor + 0.35 * found.sag
-                    && !(found.kind == Kind::Cylinder && self.is_cut_strip(found, other))
+                    && !match found.kind {
+                        Kind::Cylinder => self.is_cut(found, other),
+                        Kind::Sphere => self.is_cut_rim(found, other),
+                        _ => false,
+                    }
                 {
                     edge.runs_on += border.length;
                 }
@@ -140,7 +144,8 @@ impl Growth<'_> {
         let triangles = found.members.iter().flat_map(|&facet| net.triangles(facet)).copied();
         let is_one = |triangle: u32| self.is_marked(net.regions.of[triangle as usize]);
         let rim = net.part.edges.rim(&net.part.mesh.triangles, triangles, is_one);
-        found.points.len() - rim.iter().filter(|&&vertex| net.is_corner(vertex)).count()
+        let outer = rim.iter().filter(|&&vertex| net.is_corner(vertex)).count();
+        found.points.len().saturating_sub(outer)
     }
 
     /// Whether the surface is what the facets were made from, and how they cut it.

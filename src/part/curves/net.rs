@@ -107,6 +107,17 @@ impl<'a> Net<'a> {
             .filter(|&vertex| self.is_corner[vertex as usize])
     }
 
+    /// Edges of a facet's triangles between it and others, each with the other and its ends.
+    pub(super) fn outer_edges(&self, facet: u32) -> impl Iterator<Item = (u32, [u32; 2])> + '_ {
+        let halves = self.triangles(facet).iter().flat_map(|&t| 3 * t..3 * t + 3);
+        halves.filter_map(move |half| {
+            let other = self.part.edges.twin[half as usize];
+            let other = (other != NONE).then(|| self.regions.of[other as usize / 3])?;
+            let (from, to) = ends(&self.part.mesh.triangles, half);
+            (other != facet).then_some((other, [from, to]))
+        })
+    }
+
     /// Pairs of corners that follow each other along the rim of a facet, however finely that is cut.
     pub(super) fn rim(&self, facet: u32) -> Vec<[u32; 2]> {
         let Mesh { triangles, .. } = &self.part.mesh;

@@ -19,8 +19,10 @@ const PATCH_RATIO: f64 = 10.0;
 const PATCH: usize = 12;
 /// Distance of corners from a first guess as a multiple of the facets' sag that a fit can mend.
 const POOR: f64 = 2.0;
+/// Sine of the angle between the strips of a cylinder and the direction about which they bend, at most.
+pub(super) const STEEPEST: f64 = 0.1;
 /// Points that a fit needs beyond its parameters, to be a test.
-const SPARE: usize = 2;
+pub(super) const SPARE: usize = 2;
 /// ... and as many again for a torus, which comes near to many a surface.
 const SPARE_TORUS: usize = 7;
 
@@ -187,12 +189,13 @@ impl Growth<'_> {
         self.grow(surface, kind, sign, facets, exactness)
     }
 
-    /// A cylinder or cone by a row of three facets with `seed` in the middle.
-    pub(super) fn by_row(&mut self, seed: u32) -> Option<Found> {
+    /// Rows of three facets with `seed` in the middle, bent the same way, each with the direction about
+    /// which it bends.
+    pub(super) fn rows(&self, seed: u32) -> Vec<([u32; 3], DVec3)> {
         let net = self.net;
         let others = neighbours(net, seed, COMPARABLE);
         let centre = net.centre(seed);
-        let mut best: Option<Found> = None;
+        let mut rows = Vec::new();
         for (index, &one) in others.iter().enumerate().take(4) {
             for &other in others.iter().skip(index + 1).take(4) {
                 let (a, b) = (net.centre(one) - centre, net.centre(other) - centre);
@@ -204,30 +207,37 @@ impl Growth<'_> {
                 }
                 let row = [one, seed, other];
                 let [first, middle, last] = row.map(|facet| net.normal(facet));
-                let Some(direction) = (middle - first).cross(last - middle).try_normalize() else {
-                    continue;
-                };
-                let points = self.points(&row);
-                let rise = direction.dot(middle).abs();
-                let mut guesses = Vec::new();
-                if rise < 0.1 {
-                    guesses.push((Kind::Cylinder, cylinder_along(direction, &points)));
-                }
-                if (1e-4..0.998).contains(&rise) {
-                    guesses.push((Kind::Cone, cone_along(net, direction, row, &points)));
-                }
-                for (kind, guess) in guesses {
-                    let found = self.attempt(guess, kind, &row, &points, Exactness::Exact);
-                    // Of a row about the axis and one along the tube of a torus the first is
-                    // larger.
-                    if let Some(found) = found
-                        && self.is_even_row(&found, &row)
-                        && best
-                            .as_ref()
-                            .is_none_or(|best| self.area_of(&found) > 1.02 * self.area_of(best))
-                    {
-                        best = Some(found);
-                    }
+                let about = (middle - first).cross(last - middle).try_normalize();
+                rows.extend(about.map(|direction| (row, direction)));
+            }
+        }
+        rows
+    }
+
+    /// A cylinder or cone by a row of three facets with `seed` in the middle.
+    pub(super) fn by_row(&mut self, seed: u32) -> Option<Found> {
+        let net = self.net;
+        let mut best: Option<Found> = None;
+        for (row, direction) in self.rows(seed) {
+            let points = self.points(&row);
+            let rise = direction.dot(net.normal(seed)).abs();
+            let mut guesses = Vec::new();
+            if rise < STEEPEST {
+                guesses.push((Kind::Cylinder, cylinder_along(direction, &points)));
+            }
+            if (1e-4..0.998).contains(&rise) {
+                guesses.push((Kind::Cone, cone_along(net, direction, row, &points)));
+            }
+            for (kind, guess) in guesses {
+                let found = self.attempt(guess, kind, &row, &points, Exactness::Exact);
+                // Of a row about the axis and one along the tube of a torus the first is larger.
+                if let Some(found) = found
+                    && self.is_even_row(&found, &row)
+                    && best
+                        .as_ref()
+                        .is_none_or(|best| self.area_of(&found) > 1.02 * self.area_of(best))
+                {
+                    best = Some(found);
                 }
             }
         }
@@ -270,7 +280,29 @@ impl Growth<'_> {
             return None;
         }
         let points = self.points(&patch);
-        self.sphere_of(&patch, &points, Exactness::Exact)
+        let found = self.sphere_of(&patch, &points, Exactness::Exact);
+        if found.is_some() {
+            return found;
+        }
+        // Others about it may be cut off: three that share a corner.
+        let net = self.net;
+        let beside = neighbours(net, seed, COMPARABLE);
+        let beside = &beside[..beside.len().min(4)];
+        let corner = |one: u32, other: u32| {
+            let [a, b] = [one, other].map(|facet| net.centre(facet) - net.centre(seed));
+            a.dot(b).abs() < 0.5 * a.length() * b.length()
+        };
+        for (index, &one) in beside.iter().enumerate() {
+            for &other in beside[index + 1..].iter().filter(|&&other| corner(one, other)) {
+                let three = [one, seed, other];
+                let points = self.points(&three);
+                let found = self.sphere_of(&three, &points, Exactness::Exact);
+                if found.is_some() {
+                    return found;
+                }
+            }
+        }
+        None
     }
 
     pub(super) fn sphere_of(
