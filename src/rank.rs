@@ -4,6 +4,7 @@
 mod filter;
 mod turns;
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use glam::DVec3;
@@ -111,7 +112,7 @@ pub struct Ranking {
 /// Grips that hold come first, then those that slip, and both in the order of falling score. Among
 /// scores within [`TIE`] of each other the grip nearest to the centre of mass comes first, then the
 /// one whose contacts are more symmetric about the plane in which the jaws close and more alike, then
-/// the lower id. The order depends neither on that in which the grips come nor on differences below
+/// the one with the larger contacts, then the lower id. The order depends neither on that in which the grips come nor on differences below
 /// [`TIE`].
 pub fn rank(
     grips: Vec<RankedGrip>,
@@ -218,8 +219,8 @@ fn order(grips: &mut [(f64, RankedGrip)], centre_of_mass: DVec3) {
 }
 
 /// What is preferred among equal scores, smallest first: distance of the grip from the centre of
-/// mass, asymmetry of its contacts (both in steps of [`SAME_LENGTH`]), id.
-fn preference(grip: &RankedGrip, centre_of_mass: DVec3) -> (u64, u64, u64) {
+/// mass, asymmetry of its contacts, their size (all in steps of [`SAME_LENGTH`]), id.
+fn preference(grip: &RankedGrip, centre_of_mass: DVec3) -> (u64, u64, Reverse<u64>, u64) {
     let steps = |length: f64| (length / SAME_LENGTH).round() as u64;
     let contact = &grip.grip.contact;
     let [one, two] =
@@ -227,10 +228,11 @@ fn preference(grip: &RankedGrip, centre_of_mass: DVec3) -> (u64, u64, u64) {
     let aside = |moments: &crate::geometry::Moments| {
         if moments.area > 0.0 { moments.centroid.y.abs() } else { 0.0 }
     };
-    let unlike = (one.area.max(0.0).sqrt() - two.area.max(0.0).sqrt()).abs();
+    let [one_size, two_size] = [one, two].map(|moments| moments.area.max(0.0).sqrt());
     (
         steps(grip.grip.part_from_grip.origin.distance(centre_of_mass)),
-        steps(aside(&one) + aside(&two) + unlike),
+        steps(aside(&one) + aside(&two) + (one_size - two_size).abs()),
+        Reverse(steps(one_size + two_size)),
         grip.grip.id,
     )
 }

@@ -548,7 +548,7 @@ mod tests {
             };
             let found = Pads::new(&surfaces).unwrap().squeezed(force).unwrap()[0].delta;
             let spot = |pieces: &[Piece]| Spot::of(pieces, stiffness, force);
-            let one = spot(&[whole.clone()]).unwrap();
+            let one = spot(std::slice::from_ref(&whole)).unwrap();
             let delta = one.delta;
             assert!((delta / found - 1.0).abs() < 1e-9, "{delta:e} {found:e}");
             let outline = pressed(&whole, delta);

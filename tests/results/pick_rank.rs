@@ -107,7 +107,7 @@ fn scores_equal_up_to_rounding_follow_the_ids() {
 }
 
 #[test]
-fn ties_go_to_the_centre_of_mass_then_to_symmetry_then_to_the_lower_number() {
+fn ties_go_to_the_centre_of_mass_then_to_symmetry_then_to_the_larger_contact() {
     let com = DVec3::new(0.01, 0.0, 0.0);
     let mut list = vec![
         at(0, com + DVec3::Y * 0.004, 0.2),
@@ -115,14 +115,20 @@ fn ties_go_to_the_centre_of_mass_then_to_symmetry_then_to_the_lower_number() {
         at(2, com - DVec3::X * 0.002, 0.2),
         at(3, com + DVec3::Z * (0.002 + 1e-12), 0.2),
         at(4, com, 0.2001),
+        at(5, com + DVec3::Y * 0.002, 0.2),
     ];
+    // Those of 5 are larger.
+    let contact = std::sync::Arc::make_mut(&mut list[5].grip.contact);
+    for polygon in contact.face_i.iter_mut().chain(&mut contact.face_ii) {
+        polygon.outer.iter_mut().for_each(|point| *point *= 1.1);
+    }
     // The contacts of 1 lie beside the plane in which the jaws close.
     let contact = std::sync::Arc::make_mut(&mut list[1].grip.contact);
     for point in contact.face_i.iter_mut().flat_map(|polygon| &mut polygon.outer) {
         point.y += 1e-3;
     }
     let found = rank(list, com, SIZE, &Options::default());
-    assert_eq!(ids(&found.grips), [2, 3, 1, 0, 4]);
+    assert_eq!(ids(&found.grips), [5, 2, 3, 1, 0, 4]);
 }
 
 #[test]

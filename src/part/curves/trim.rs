@@ -2,6 +2,7 @@
 //! round leaves facets whose corners lie on chords of the round ones. They belong to the round face.
 
 use glam::DVec3;
+use rustc_hash::FxHashSet;
 
 use super::find::Face;
 use super::fit::{Kind, Profile};
@@ -87,7 +88,10 @@ impl Growth<'_> {
     pub(super) fn by_creases(&mut self, seed: u32) -> Option<Found> {
         let net = self.net;
         let rows = self.rows(seed).into_iter();
-        let rows = rows.filter(|(_, about)| about.dot(net.normal(seed)).abs() < STEEPEST);
+        let rows = rows.filter(|(row, about)| {
+            about.dot(net.normal(seed)).abs() < STEEPEST
+                && row.iter().all(|&facet| self.owner[facet as usize] == FREE)
+        });
         let mut found: Vec<Found> =
             rows.filter_map(|(row, about)| self.cut_cylinder(seed, row, about)).collect();
         found.sort_by(|a, b| self.area_of(b).total_cmp(&self.area_of(a)));
@@ -144,9 +148,10 @@ impl Growth<'_> {
             sag,
             is_row: false,
         };
-        if !(sag > tolerance) || found.residual > tolerance {
+        if sag.is_nan() || sag <= tolerance || found.residual > tolerance {
             return None;
         }
+        let mut taken = FxHashSet::from_iter(row);
         let mut next = 0;
         while next < found.members.len() {
             let facet = found.members[next];
@@ -155,8 +160,8 @@ impl Growth<'_> {
                 let other = border.other;
                 if self.owner[other as usize] == FREE
                     && net.is_smooth(facet, other)
-                    && !found.members.contains(&other)
                     && self.is_cut(&found, other)
+                    && taken.insert(other)
                 {
                     found.members.push(other);
                 }
