@@ -1,7 +1,7 @@
 //! The order of the grips: score, ties, flips, rejections, duplicates, diverse choice.
 
 use crate::support::grips;
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DVec3};
 use gripfast::model::{Frame, Status};
 use gripfast::rank::{Options, Weights, rank};
 use gripfast::results::{PadFriction, RankedGrip};
@@ -117,11 +117,14 @@ fn ties_go_to_the_centre_of_mass_then_to_symmetry_then_to_the_larger_contact() {
         at(4, com, 0.2001),
         at(5, com + DVec3::Y * 0.002, 0.2),
     ];
+    for grip in &mut list {
+        let contact = std::sync::Arc::make_mut(&mut grip.grip.contact);
+        contact.face_i = contact.face_ii.clone();
+    }
     // Those of 5 are larger.
     let contact = std::sync::Arc::make_mut(&mut list[5].grip.contact);
     for polygon in contact.face_i.iter_mut().chain(&mut contact.face_ii) {
-        let middle = polygon.outer.iter().sum::<DVec2>() / polygon.outer.len() as f64;
-        polygon.outer.iter_mut().for_each(|point| *point = middle + 1.1 * (*point - middle));
+        polygon.outer.iter_mut().for_each(|point| *point *= 1.1);
     }
     // The contacts of 1 lie beside the plane in which the jaws close.
     let contact = std::sync::Arc::make_mut(&mut list[1].grip.contact);
