@@ -123,7 +123,10 @@ fn surface(out: &mut impl Write, ranked: &RankedGrip) -> std::io::Result<()> {
         });
         writeln!(out, "  about to turn about its own axis: it {how}")?;
     }
-    for note in &ranked.notes {
+    let mut notes: Vec<String> = ranked.notes.iter().map(ToString::to_string).collect();
+    // One that holds about two axes reads the same of both.
+    notes.dedup();
+    for note in notes {
         writeln!(out, "  note: {note}")?;
     }
     Ok(())

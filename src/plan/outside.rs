@@ -150,7 +150,7 @@ impl Plan {
             let scoring = &self.request.scoring;
             let selection = select(scoring.backend, scoring.adapter.as_deref())?;
             let assessor = self.assessor(&selection.backend);
-            let proposer = Proposer::new(&self.part, &self.gripper, &self.propose)?;
+            let proposer = self.proposer_for(poses, turn)?;
             let poses = self.assess_on(&proposer, &assessor, poses, turn)?;
             let set = self.set_of(&proposer, &selection.backend.name(), &poses)?;
             Ok(Assessment { poses, set })
@@ -171,13 +171,14 @@ impl Plan {
             let scoring = &self.request.scoring;
             let selection = select(scoring.backend, scoring.adapter.as_deref())?;
             let assessor = self.assessor(&selection.backend);
-            let mut proposer = Proposer::new(&self.part, &self.gripper, &self.propose)?;
-            let pose = Pose::of_grip("pose", *part_from_grip);
-            let mut assessed = self.assess_on(&proposer, &assessor, &[pose], turn)?;
+            let pose = [Pose::of_grip("pose", *part_from_grip)];
+            let proposer = self.proposer_for(&pose, turn)?;
+            let mut assessed = self.assess_on(&proposer, &assessor, &pose, turn)?;
             let assessed = assessed.remove(0);
             if !assessed.is_grip() {
                 return Ok((assessed, None));
             }
+            let mut proposer = Proposer::new(&self.part, &self.gripper, &self.propose)?;
             // Every grip counts for a rank.
             let search = Search {
                 assessor: &assessor,
@@ -197,6 +198,49 @@ impl Plan {
             let standing = assessed.ranked.as_ref().map(|ranked| standing(ranked, &all, pads));
             Ok((assessed, standing.map(|standing| (standing, all.ranked))))
         })
+    }
+
+    /// With the plan's candidates and, on tapers, those of poses beside their rows.
+    fn proposer_for(&self, poses: &[Pose], turn: f64) -> Result<Proposer<'_>> {
+        let plain = Proposer::new(&self.part, &self.gripper, &self.propose)?;
+        if !plain.has_rows() {
+            return Ok(plain);
+        }
+        let frame = |pose: &Pose| {
+            let (gap, _) = self.fitted(&plain, pose, turn)?;
+            self.grip_frame(pose, gap)
+        };
+        let frames = poses.par_iter().map(frame).collect::<Result<_>>()?;
+        // Those rows must not be the ones that make curved faces too many.
+        let options = self.propose.clone().with_curved(Some(true)).with_rows_at(frames);
+        Proposer::new(&self.part, &self.gripper, &options)
+    }
+
+    /// The grip frame of a pose with the pads `gap` apart.
+    fn grip_frame(&self, pose: &Pose, gap: f64) -> Result<Frame> {
+        let tool = tool_in_grip(pose.convention, pose.origin, Some(&self.gripper), gap)?;
+        Ok(pose.part_from_tool.compose(&tool.inverse()))
+    }
+
+    /// Distance of the pads in a pose, and what it fits: flange and tool stand by how far the jaws close,
+    /// which the faces decide.
+    fn fitted(
+        &self,
+        proposer: &Proposer<'_>,
+        pose: &Pose,
+        turn: f64,
+    ) -> Result<(f64, std::result::Result<Fit, Misfit>)> {
+        let mut gap =
+            pose.gap.unwrap_or(f64::midpoint(self.gripper.stroke[0], self.gripper.stroke[1]));
+        let mut fit = proposer.fit(&self.grip_frame(pose, gap)?, turn);
+        for _ in 0..4 {
+            match &fit {
+                Ok(found) if (found.gap - gap).abs() > 1e-9 => gap = found.gap,
+                _ => break,
+            }
+            fit = proposer.fit(&self.grip_frame(pose, gap)?, turn);
+        }
+        Ok((gap, fit))
     }
 
     fn assess_on(
@@ -240,21 +284,7 @@ impl Plan {
         id: u64,
         turn: f64,
     ) -> Result<(Assessed, Option<Grip>)> {
-        let grip_frame = |gap: f64| -> Result<Frame> {
-            let tool = tool_in_grip(pose.convention, pose.origin, Some(&self.gripper), gap)?;
-            Ok(pose.part_from_tool.compose(&tool.inverse()))
-        };
-        // Flange and tool stand by how far the jaws close, which the faces decide.
-        let mut gap =
-            pose.gap.unwrap_or(f64::midpoint(self.gripper.stroke[0], self.gripper.stroke[1]));
-        let mut fit = proposer.fit(&grip_frame(gap)?, turn);
-        for _ in 0..4 {
-            match &fit {
-                Ok(found) if (found.gap - gap).abs() > 1e-9 => gap = found.gap,
-                _ => break,
-            }
-            fit = proposer.fit(&grip_frame(gap)?, turn);
-        }
+        let (_, fit) = self.fitted(proposer, pose, turn)?;
         let mut assessed =
             Assessed { name: pose.name.clone(), fit, explanation: None, ranked: None, over: None };
         let Ok(fit) = fit else { return Ok((assessed, None)) };

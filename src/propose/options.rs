@@ -7,6 +7,7 @@ use serde::{Serialize, Serializer};
 
 use crate::error::{Error, Result};
 use crate::gripper::Gripper;
+use crate::model::Frame;
 use crate::request::{Candidates, Region, Side};
 use crate::scene::Scene;
 
@@ -76,6 +77,10 @@ pub struct ProposeOptions {
     /// Gripping force, by which pads are pressed into what is not plane \[N\]; `None`: the gripper's
     /// largest.
     pub force: Option<f64>,
+    /// Poses of grip frames in the part frame for which there is a row of grips, too, where rows lie
+    /// across a taper: those of others lie beside the rows of the grid.
+    #[serde(skip)]
+    pub rows_at: Vec<Frame>,
 }
 
 setters!(ProposeOptions {
@@ -101,6 +106,7 @@ setters!(ProposeOptions {
     with_scene: scene: Option<Arc<Scene>>,
     with_chunk: chunk: usize,
     with_force: force: Option<f64>,
+    with_rows_at: rows_at: Vec<Frame>,
 });
 
 /// A scene's meshes are too long to be written down.
@@ -163,6 +169,7 @@ impl From<&Candidates> for ProposeOptions {
             scene: None,
             chunk: 65_536,
             force: None,
+            rows_at: Vec::new(),
         }
     }
 }

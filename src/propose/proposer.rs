@@ -134,6 +134,11 @@ impl<'a> Proposer<'a> {
         Self::within_budget(part, gripper, &every)
     }
 
+    /// Whether there are sites whose width holds along their own places only.
+    pub(crate) fn has_rows(&self) -> bool {
+        self.sites.iter().any(|site| site.row)
+    }
+
     /// Whether any candidate is free of interference; looks at them until one is.
     fn is_any_free(&mut self) -> bool {
         let (next, tally) = (self.next, self.tally.clone());

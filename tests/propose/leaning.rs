@@ -3,16 +3,16 @@
 use std::f64::consts::TAU;
 use std::sync::atomic::AtomicBool;
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use gripfast::geometry::patch_area;
-use gripfast::gripper::{self, Jaw};
+use gripfast::gripper::{self, Jaw, Travel};
 use gripfast::load::wrench_in_grip;
 use gripfast::mechanics::curved::Pads;
 use gripfast::mechanics::squeeze_pressure;
-use gripfast::model::{LoadCase, Status, Wrench};
+use gripfast::model::{Frame, LoadCase, Status, Wrench};
 use gripfast::part::{Part, Shape};
 use gripfast::plan::{Observer, Plan};
-use gripfast::propose::{ProposeOptions, Proposer};
+use gripfast::propose::{ProposeOptions, Proposer, Rejection};
 use gripfast::request::{Choice, Request, Side};
 use gripfast::results::{GripSet, RankedGrip};
 use gripfast::units::{Angle, Force, Length, Mass, Pressure};
@@ -493,4 +493,60 @@ fn no_grip_is_told_in_words_of_the_part() {
     assert!(thick.contains(barrel), "{thick}");
     assert!(thick.contains("turned is 250 mm wide between opposite faces"), "{thick}");
     assert!(thick.contains("no gripper of the catalogue reaches it"), "{thick}");
+}
+
+/// A taper's width is that at the pose, not that of the nearest row of the grid.
+#[test]
+fn poses_beside_the_rows_of_a_taper_have_widths_of_their_own() {
+    let gripper = gripper::find("robotiq-2f85").unwrap();
+    let slope = 4_f64.to_radians().tan();
+    let part = wedge([4_f64.to_radians(); 2]);
+    // Approached along the rows: the pads, 20 mm wide, lie across them.
+    let pose = |z: f64| Frame {
+        rotation: DMat3::from_cols(DVec3::NEG_X, DVec3::Z, DVec3::Y),
+        origin: DVec3::new(0.0, 0.0, z),
+    };
+    let heights = [0.0120, 0.0131, 0.0142, 0.0153, 0.0164];
+    let options = ProposeOptions::default()
+        .with_curved(Some(true))
+        .with_force(Some(FORCE))
+        .with_rows_at(heights.map(pose).to_vec());
+    let proposer = Proposer::new(&part, &gripper, &options).unwrap();
+    for z in heights {
+        let fit = proposer.fit(&pose(z), 0.05).unwrap();
+        // The draft is widest below, where the pads end or the part does.
+        let wanted = 2.0 * (0.010 - slope * (z - 0.010_f64).max(0.0));
+        assert!((fit.gap - wanted).abs() < 1e-7, "{z}: {} {wanted}", fit.gap);
+    }
+}
+
+/// The way of the jaws along the approach while they open takes none of the places on a taper.
+#[test]
+fn jaws_on_an_arc_reach_as_much_of_a_taper_as_straight_ones() {
+    let arc = gripper::find("robotiq-2f85").unwrap();
+    let mut straight = arc.clone();
+    assert_ne!(straight.travel, Travel::Parallel);
+    straight.travel = Travel::Parallel;
+    let parts = [
+        ("wedge 2", wedge([2_f64.to_radians(); 2])),
+        ("wedge 6", wedge([6_f64.to_radians(); 2])),
+        ("cone", lathe([0.015, 0.012], 0.05, 68, false)),
+        ("fine cone", lathe([0.015, 0.012], 0.05, 724, false)),
+    ];
+    let options = ProposeOptions::default()
+        .with_curved(Some(true))
+        .with_spacing(Some(0.008))
+        .with_angle_step(std::f64::consts::FRAC_PI_4)
+        .with_edge_angles(false)
+        .with_force(Some(80.0));
+    for (name, part) in parts {
+        let [one, two] = [&arc, &straight].map(|gripper| {
+            let mut proposer = Proposer::new(&part, gripper, &options).unwrap();
+            let grips: Vec<_> = proposer.by_ref().flat_map(|chunk| chunk.grips).collect();
+            let leaning = grips.iter().filter(|grip| grip.surfaces.is_some()).count();
+            let met = Rejection::PartInterference { body: "fingertip".into() }.name();
+            (leaning, proposer.tally().rejections.get(&met).copied().unwrap_or(0))
+        });
+        assert!(one.0 > 20 && one == two && one.1 == 0, "{name}: {one:?} {two:?}");
+    }
 }

@@ -26,6 +26,10 @@ use crate::propose::stroke::Stroke;
 const LAYER_SHARE: f64 = 1.0 / 3.0;
 /// Reaches of a pad that differ by less are one \[m\].
 const SAME_REACH: f64 = 1e-9;
+/// Rows nearer to each other than this are one \[m\].
+const SAME_ROW: f64 = 1e-7;
+/// Cosine of the angle by which closing jaws right a pose, and more: 10 degrees.
+const RIGHTED: f64 = 0.985;
 /// A direction that lies this far out of the pads' plane has no angle in it (cosine).
 const ALONG: f64 = 1e-3;
 
@@ -109,6 +113,29 @@ impl Finder<'_> {
     }
 
     /// Adds the rows of places on two surfaces; the reason where there are none.
+    /// How far jaws leave a straight line along the approach while they open, see [`Gripper::bulge`].
+    fn bulge(&self, kind: PairKind, width: f64, from: f64) -> f64 {
+        let (gripper, opening) = (self.gripper, self.options.opening);
+        let (gap, sense) = match kind {
+            PairKind::External => (width, 1.0),
+            PairKind::Internal => (width - 2.0 * gripper.outer_pad.unwrap_or(0.0), -1.0),
+        };
+        let bulge = |jaw: Jaw| {
+            let outs = [from, gripper.way(jaw, opening).max(from)];
+            gripper.bulge(jaw, gap, outs.map(|out| sense * out))
+        };
+        Jaw::BOTH.into_iter().map(bulge).fold(0.0, f64::max)
+    }
+
+    /// Places along `y`, between two, of the poses for which rows are asked for.
+    fn rows_at(&self, taper: &Taper, [low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
+        let closing = self.directions[taper.direction];
+        let poses = self.options.rows_at.iter();
+        let poses = poses.filter(move |pose| pose.rotation.z_axis.dot(closing).abs() > RIGHTED);
+        let place = move |pose: &Frame| taper.uphill.dot((axes(closing) * pose.origin).truncate());
+        poses.map(place).filter(move |y| (low..=high).contains(y))
+    }
+
     fn rows(&self, taper: &Taper, survey: &Survey<'_>, sites: &mut Vec<Site>) -> Option<Rejection> {
         let mut reason = None;
         let mut any = false;
@@ -122,7 +149,14 @@ impl Finder<'_> {
                 // As far as a pad leaves as much of itself uncovered as it covers.
                 _ => {
                     let beyond = posture.reach[0] + posture.reach[1] - (max.y - min.y);
-                    steps([min.y, max.y], 0.5 * beyond.max(0.0), spacing, com)
+                    let beyond = 0.5 * beyond.max(0.0);
+                    let mut rows = steps([min.y, max.y], beyond, spacing, com);
+                    for y in self.rows_at(taper, [min.y - beyond, max.y + beyond]) {
+                        if !rows.iter().any(|row| (row - y).abs() < SAME_ROW) {
+                            rows.push(y);
+                        }
+                    }
+                    rows
                 }
             };
             for y in rows {
@@ -255,6 +289,8 @@ impl Finder<'_> {
         let layer = self.gripper.layer();
         // The layers give as much as that beside the pads too.
         let off = off.min(sag + LAYER_SHARE * layer.reach()) + taper.chords;
+        // The way of a jaw along the approach, which counts as if it had not opened yet.
+        let off = off + taper.slope * self.bulge(taper.kind, width, off);
         let Some(deltas) = self.takes(taper, posture, (y, top), layer)? else { return Ok(None) };
         let level = taper.level();
         let reach = self.reach;
