@@ -245,7 +245,8 @@ struct ChoiceArgs {
     /// Prints also grips that a turn about the axis of a round part maps to one printed.
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "true|false", hide_possible_values = true)]
     every_turn: Option<bool>,
-    /// Only the candidates with these ids, e.g. 3,17 from an earlier table of the same search.
+    /// Only the candidates with these ids, e.g. 3,17 from an earlier table of the same search. On curved
+    /// faces another force makes another search: what is pressed there depends on it.
     #[arg(long, value_delimiter = ',', value_name = "IDS", value_parser = id)]
     ids: Option<Vec<u64>>,
 }

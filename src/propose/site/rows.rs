@@ -287,11 +287,16 @@ impl Finder<'_> {
         };
         Stroke::new(taper.kind, self.gripper, self.options).check(width)?;
         let layer = self.gripper.layer();
-        // The layers give as much as that beside the pads too.
-        let off = off.min(sag + LAYER_SHARE * layer.reach()) + taper.chords;
+        let Some(deltas) = self.takes(taper, posture, (y, top), layer)? else { return Ok(None) };
+        // In a bore the layers give as much as that beside the pads too. What is beyond a pad on a taper, a
+        // link of metal perhaps, must not be there before the pad is pressed.
+        let most = match taper.surface {
+            Surface::Bore | Surface::TaperedBore => sag + LAYER_SHARE * layer.reach(),
+            Surface::Plane | Surface::Cone => deltas[0].min(deltas[1]),
+        };
+        let off = off.min(most) + taper.chords;
         // The way of a jaw along the approach, which counts as if it had not opened yet.
         let off = off + taper.slope * self.bulge(taper.kind, width, off);
-        let Some(deltas) = self.takes(taper, posture, (y, top), layer)? else { return Ok(None) };
         let level = taper.level();
         let reach = self.reach;
         let window = |low: DVec2, high: DVec2| -> Ring {
