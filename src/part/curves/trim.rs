@@ -174,10 +174,10 @@ impl Growth<'_> {
         (is_one && found.residual <= tolerance).then_some(found)
     }
 
-    /// Whether a cylinder or cone is a row of facets that are cut off from a sphere.
+    /// Whether a face is a row of facets that are cut off from a sphere, or a rest of it.
     fn is_cut_row(&self, sphere: &Found, row: &Found) -> bool {
         sphere.kind == Kind::Sphere
-            && matches!(row.kind, Kind::Cylinder | Kind::Cone)
+            && row.kind != Kind::Sphere
             && row.members.iter().all(|&facet| self.is_cut(sphere, facet))
     }
 
