@@ -396,7 +396,12 @@ impl Gripper {
     /// Distance of the pads in a grip \[m\]: the faces' own, or less by the fingers where these
     /// spread into a slot.
     pub fn jaw_gap(&self, grip: &Grip) -> f64 {
-        if grip.inside { grip.width - 2.0 * self.outer_pad.unwrap_or(0.0) } else { grip.width }
+        self.gap_on(grip.width, grip.inside)
+    }
+
+    /// [`Gripper::jaw_gap`] on faces `width` apart \[m\].
+    pub(crate) fn gap_on(&self, width: f64, inside: bool) -> f64 {
+        if inside { width - 2.0 * self.outer_pad.unwrap_or(0.0) } else { width }
     }
 
     /// Distance of the pads before they close on a grip \[m\], each jaw having `opening` to go or as

@@ -112,8 +112,8 @@ pub struct Ranking {
 /// Grips that hold come first, then those that slip, and both in the order of falling score. Among
 /// scores within [`TIE`] of each other the grip nearest to the centre of mass comes first, then the
 /// one whose contacts are more symmetric about the plane in which the jaws close and more alike, then
-/// the one with the larger contacts, then the lower id. The order depends neither on that in which the grips come nor on differences below
-/// [`TIE`].
+/// the one with the larger contacts, then the lower id. The order depends neither on that in which the
+/// grips come nor on differences below [`TIE`].
 pub fn rank(
     grips: Vec<RankedGrip>,
     centre_of_mass: DVec3,

@@ -70,12 +70,9 @@ pub(crate) fn sweeps(gripper: &Gripper, motion: &Motion) -> Vec<Sweep> {
     // Outside grips: jaw I stands at +x3 and opens along +x3. Inside grips: its outer pad pushes
     // face I, which lies at -x3, so it is the jaw at -x3, and it draws in along +x3 for the
     // approach.
-    let (gap, way) = match motion.kind {
-        PairKind::External => (motion.width, motion.opening),
-        PairKind::Internal => {
-            (motion.width - 2.0 * gripper.outer_pad.unwrap_or(0.0), -motion.opening)
-        }
-    };
+    let is_inside = motion.kind == PairKind::Internal;
+    let gap = gripper.gap_on(motion.width, is_inside);
+    let way = if is_inside { -motion.opening } else { motion.opening };
     let back = motion.approach * DVec3::NEG_X;
     let turn = Frame { rotation: motion.jaws.turn(), origin: DVec3::ZERO };
     let (mut grip, mut approach) = (Vec::new(), Vec::new());

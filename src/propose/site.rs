@@ -477,10 +477,7 @@ impl Site {
 
     /// Distance of the pads in its grips \[m\].
     pub(super) fn gap(&self, gripper: &Gripper) -> f64 {
-        match self.kind {
-            PairKind::External => self.width,
-            PairKind::Internal => self.width - 2.0 * gripper.outer_pad.unwrap_or(0.0),
-        }
+        gripper.gap_on(self.width, self.kind == PairKind::Internal)
     }
 
     /// The outlines that touch side I and II, in the grip frame before the half turn.

@@ -385,7 +385,7 @@ impl Growth<'_> {
     }
 
     /// Faces in sets with those of their neighbours that lie on the same surface.
-    pub(super) fn same(&self, faces: &[Face]) -> UnionFind {
+    fn same(&self, faces: &[Face]) -> UnionFind {
         let mut pairs: Vec<(usize, usize)> = Vec::new();
         for (number, face) in faces.iter().enumerate() {
             for &facet in &face.found.members {

@@ -92,10 +92,9 @@ impl Growth<'_> {
             about.dot(net.normal(seed)).abs() < STEEPEST
                 && row.iter().all(|&facet| self.owner[facet as usize] == FREE)
         });
-        let mut found: Vec<Found> =
-            rows.filter_map(|(row, about)| self.cut_cylinder(seed, row, about)).collect();
-        found.sort_by(|a, b| self.area_of(b).total_cmp(&self.area_of(a)));
-        found.into_iter().next()
+        let found = rows.filter_map(|(row, about)| self.cut_cylinder(seed, row, about));
+        // The first of the largest.
+        found.min_by(|a, b| self.area_of(b).total_cmp(&self.area_of(a)))
     }
 
     /// Ends of the borders between some facets and others that carry on as they do, each once: along a

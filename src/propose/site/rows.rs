@@ -112,14 +112,12 @@ impl Finder<'_> {
         (!sites.is_empty()).then_some(sites)
     }
 
-    /// Adds the rows of places on two surfaces; the reason where there are none.
     /// How far jaws leave a straight line along the approach while they open, see [`Gripper::bulge`].
     fn bulge(&self, kind: PairKind, width: f64, from: f64) -> f64 {
         let (gripper, opening) = (self.gripper, self.options.opening);
-        let (gap, sense) = match kind {
-            PairKind::External => (width, 1.0),
-            PairKind::Internal => (width - 2.0 * gripper.outer_pad.unwrap_or(0.0), -1.0),
-        };
+        let is_inside = kind == PairKind::Internal;
+        let gap = gripper.gap_on(width, is_inside);
+        let sense = if is_inside { -1.0 } else { 1.0 };
         let bulge = |jaw: Jaw| {
             let outs = [from, gripper.way(jaw, opening).max(from)];
             gripper.bulge(jaw, gap, outs.map(|out| sense * out))
@@ -136,6 +134,7 @@ impl Finder<'_> {
         poses.map(place).filter(move |y| (low..=high).contains(y))
     }
 
+    /// Adds the rows of places on two surfaces; the reason where there are none.
     fn rows(&self, taper: &Taper, survey: &Survey<'_>, sites: &mut Vec<Site>) -> Option<Rejection> {
         let mut reason = None;
         let mut any = false;
@@ -175,10 +174,8 @@ impl Finder<'_> {
     /// Approaches along and across the rows, and towards the middle of the cone asked for.
     fn postures(&self, taper: &Taper) -> Vec<Posture> {
         let [one, two] = taper.heights_at(taper.bounds.centre().y);
-        let gap = match taper.kind {
-            PairKind::External => one - two,
-            PairKind::Internal => two - one - 2.0 * self.gripper.outer_pad.unwrap_or(0.0),
-        };
+        let is_inside = taper.kind == PairKind::Internal;
+        let gap = self.gripper.gap_on(if is_inside { two - one } else { one - two }, is_inside);
         let [least, most] = self.gripper.stroke;
         let mut pads = self.gripper.pads(gap.clamp(least, most));
         if taper.kind == PairKind::Internal {
