@@ -39,6 +39,8 @@ pub fn write(
         _ => Path::new("."),
     };
     let temporary = builder().tempfile_in(folder).map_err(failed)?;
+    // While it is held no other run takes it for what was left behind.
+    let _ = temporary.as_file().try_lock();
     let mut writer = BufWriter::new(temporary.as_file().try_clone().map_err(failed)?);
     content(&mut writer)
         .and_then(|()| writer.flush())
@@ -50,6 +52,20 @@ pub fn write(
     #[cfg(unix)]
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
     Ok(())
+}
+
+/// Removes what runs killed within [`write`] have left behind in a folder; files that a run still
+/// writes stay.
+pub(crate) fn sweep(folder: &Path) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let named = entry.file_name().as_encoded_bytes().starts_with(TEMPORARY.as_bytes());
+        let file = named.then(|| File::options().write(true).open(entry.path()));
+        if let Some(Ok(file)) = file
+            && file.try_lock().is_ok()
+        {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// Makes sure that the folder of a file is there; `place` names the file.
@@ -77,7 +93,8 @@ pub struct Lock {
 
 impl Lock {
     /// Takes the lock of `output`; of a pipe or device there is none. It lies in the user's folder
-    /// of run-time files, or in the one for temporary files, and holds on this machine.
+    /// of run-time files, or in the one for temporary files, and holds on this machine. What
+    /// killed runs have left beside the output is removed.
     ///
     /// # Errors
     /// [`ErrorKind::Busy`] when another process holds it.
@@ -110,7 +127,10 @@ impl Lock {
                 "wait for that run, or name another file",
             )
             .with_options(&["output"])),
-            _ => Ok(Self { _file: Some(file) }),
+            _ => {
+                sweep(folder);
+                Ok(Self { _file: Some(file) })
+            }
         }
     }
 }
@@ -180,6 +200,9 @@ pub fn text(bytes: Vec<u8>, path: &Path) -> Result<String> {
     })
 }
 
+/// How the names of temporary files begin.
+const TEMPORARY: &str = ".gripfast-";
+
 /// Standard input by its name, which a terminal may be behind.
 #[cfg(unix)]
 fn is_standard_input(path: &Path) -> bool {
@@ -192,14 +215,14 @@ fn builder() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     // As any new file, less the user's mask; the default of temporary files would shut other users
     // out of results.
-    builder.prefix(".gripfast-").permissions(std::fs::Permissions::from_mode(0o666));
+    builder.prefix(TEMPORARY).permissions(std::fs::Permissions::from_mode(0o666));
     builder
 }
 
 #[cfg(not(unix))]
 fn builder() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".gripfast-");
+    builder.prefix(TEMPORARY);
     builder
 }
 
@@ -233,6 +256,29 @@ mod tests {
         Lock::take(&folder.path().join("other.json")).unwrap();
         drop(held);
         Lock::take(&path).unwrap();
+    }
+
+    #[test]
+    fn what_a_killed_run_left_is_removed_and_what_is_being_written_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.txt");
+        std::fs::write(folder.path().join(".gripfast-AbC123"), b"half").unwrap();
+        std::fs::write(folder.path().join(".gripfast.toml"), b"the user's").unwrap();
+        let names = || {
+            let entries = std::fs::read_dir(folder.path()).unwrap();
+            let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
+            names.sort();
+            names
+        };
+        write(&path, |writer| {
+            // Another run begins in the same folder.
+            let _held = Lock::take(&folder.path().join("other.txt")).unwrap();
+            assert_eq!(names().len(), 2, "{:?}", names());
+            writer.write_all(b"new")
+        })
+        .unwrap();
+        assert_eq!(names(), [".gripfast.toml", "out.txt"]);
+        assert_eq!(std::fs::read(&path).unwrap(), b"new");
     }
 
     #[test]

@@ -143,6 +143,15 @@ impl Rows {
     }
 }
 
+/// Removes what runs killed within [`Rows::write`] have left in the folder of a batch.
+pub(super) fn sweep(folder: &Path) {
+    for set in ["grips.jsonl", "grips.parquet", "negatives.jsonl", "negatives.parquet"] {
+        for partition in std::fs::read_dir(folder.join(set)).into_iter().flatten().flatten() {
+            crate::file::sweep(&partition.path());
+        }
+    }
+}
+
 /// A name as the folder of a partition has it: readers undo percent signs.
 fn partition(name: &str) -> String {
     let mut text = String::new();

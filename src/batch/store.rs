@@ -150,6 +150,7 @@ impl Store {
         let failed = |error| Error::io(folder, "make the folder", error);
         std::fs::create_dir_all(folder.join(WORK)).map_err(failed)?;
         let lock = Lock::take(&folder.join(MANIFEST))?;
+        shard::sweep(folder);
         let description = Description::of(jobs)?;
         let old = folder.join(DESCRIPTION);
         let known = old.exists();

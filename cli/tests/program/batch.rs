@@ -253,6 +253,12 @@ fn killed_at_any_moment_and_resumed_it_comes_to_the_same_bytes() {
         killed += usize::from(child.wait().unwrap().code().is_none());
     }
     assert!(killed > 0);
+    // What a kill in the middle of a file leaves of it.
+    let sets = out.join("grips.jsonl/gripper=generic");
+    std::fs::create_dir_all(&sets).unwrap();
+    for folder in [&out, &sets] {
+        std::fs::write(folder.join(".gripfast-AbC123"), "half").unwrap();
+    }
     let output = many(&out, &["--resume"]).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     assert_eq!(data(&out), expected);
