@@ -3,6 +3,7 @@
 mod flags;
 mod layout;
 mod several;
+mod summary;
 mod table;
 mod watch;
 

@@ -253,7 +253,7 @@ struct ChoiceArgs {
 
 #[derive(Debug, ClapArgs)]
 struct OutputArgs {
-    /// Grips to print.
+    /// Grips to print; 0 prints what became of the candidates only.
     #[arg(long, value_name = "N")]
     top: Option<usize>,
     /// Best grips to keep in the result file, and with --diverse that many that differ [default:

@@ -129,6 +129,25 @@ pub(super) fn wrapped(text: &str, width: usize) -> String {
     lines.join("\n")
 }
 
+/// A number to three digits, all of those before the point.
+pub(super) fn significant(value: f64) -> String {
+    let digits = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0);
+    format!("{value:.*}", digits as usize)
+}
+
+/// Numbers in brackets.
+pub(super) fn tuple(numbers: &[f64], places: usize) -> String {
+    let text: Vec<String> = numbers.iter().map(|x| fixed(*x, places)).collect();
+    format!("({})", text.join(", "))
+}
+
+/// A number to so many places, without negative zeros.
+pub(super) fn fixed(number: f64, places: usize) -> String {
+    let text = format!("{number:.places$}");
+    let zero = text.trim_start_matches('-').chars().all(|sign| sign == '0' || sign == '.');
+    text[usize::from(zero && text.starts_with('-'))..].to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -12,7 +12,7 @@ use gripfast::units::{Force, Mass, decimal};
 
 use super::layout::{self, Column, number, width, words, wrapped};
 use super::watch::{Interrupt, Watch};
-use super::{agreed, notes, table};
+use super::{agreed, notes, summary, table};
 use crate::terminal;
 
 /// One of the plans that are compared.
@@ -155,14 +155,14 @@ fn print(outcomes: &[Compared]) -> anyhow::Result<()> {
         let set = &compared.outcome.set;
         let mass = |compared: &Compared| compared.outcome.set.part.mass.mass;
         let same = outcomes.iter().all(|other| mass(other) == mass(compared));
-        writeln!(out, "{}", if same { table::part(set) } else { table::solid(set) })?;
+        writeln!(out, "{}", if same { summary::part(set) } else { summary::solid(set) })?;
     }
     for Compared { name, outcome, .. } in outcomes {
         let unsolved =
-            table::unsolved(&outcome.set).map_or(String::new(), |text| format!("; {text}"));
-        writeln!(out, "{name}: {}{unsolved}", table::verdict(&outcome.set))?;
+            summary::unsolved(&outcome.set).map_or(String::new(), |text| format!("; {text}"));
+        writeln!(out, "{name}: {}{unsolved}", summary::verdict(&outcome.set))?;
         if !outcome.set.any_holds()
-            && let Some(reasons) = table::reasons(&outcome.set)
+            && let Some(reasons) = summary::reasons(&outcome.set)
         {
             writeln!(out, "  rejected: {reasons}")?;
         }
@@ -181,7 +181,7 @@ fn print(outcomes: &[Compared]) -> anyhow::Result<()> {
     if !left_out.is_empty() {
         writeln!(out, "Left out to fit {width} columns: {}.", left_out.join(", "))?;
     }
-    let usable = table::usable(outcomes[0].outcome.set.pads().safety);
+    let usable = summary::usable(outcomes[0].outcome.set.pads().safety);
     let text = format!(
         "force N: gripping force per jaw with which it {usable}; + more than the gripper has, - less \
          than its least. pad: share of the pad that touches; left: share of that contact left under \

@@ -3,9 +3,10 @@
 use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 use gripfast::plan::{Observer, Progress};
-use indicatif::{HumanCount, ProgressBar, ProgressState, ProgressStyle};
+use indicatif::{HumanCount, HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 
 use crate::{flags, terminal};
 
@@ -13,6 +14,8 @@ use crate::{flags, terminal};
 pub(super) struct Watch {
     quiet: bool,
     bar: Option<ProgressBar>,
+    /// Where a bar cannot be drawn.
+    log: Option<Log>,
     /// What the notes are about, where there are several plans.
     about: String,
     /// Warnings that were given.
@@ -23,7 +26,7 @@ pub(super) struct Watch {
 
 impl Watch {
     pub(super) fn new(quiet: bool) -> Self {
-        Self { quiet, bar: None, about: String::new(), given: Vec::new(), at_once: None }
+        Self { quiet, bar: None, log: None, about: String::new(), given: Vec::new(), at_once: None }
     }
 
     /// From now on notes are about this plan.
@@ -39,6 +42,7 @@ impl Watch {
 
     /// Takes the bar away.
     pub(super) fn end(&mut self) {
+        self.log = None;
         if let Some(bar) = self.bar.take() {
             bar.finish_and_clear();
         }
@@ -63,8 +67,14 @@ impl Observer for Watch {
         bar.set_position(progress.done);
         if first {
             bar.reset_eta();
+            self.log = (!quiet && !drawn()).then(|| Log::new(progress.done));
         } else {
             bar.set_message(format!("{} grips", progress.grips));
+        }
+        if let Some(text) = self.log.as_mut().and_then(|log| {
+            log.line([progress.done, progress.total, progress.grips], Instant::now())
+        }) {
+            terminal::say(&format!("{}{text}", self.about));
         }
     }
 
@@ -89,9 +99,54 @@ impl Observer for Watch {
     }
 }
 
+/// Whether somebody sees a bar.
+fn drawn() -> bool {
+    std::io::stderr().is_terminal()
+}
+
+/// Lines about a long run, for a file or a pipe.
+struct Log {
+    begun: Instant,
+    /// Candidates that an earlier run had done.
+    before: u64,
+    next: Instant,
+}
+
+impl Log {
+    /// Before the first line, and after that between two.
+    const FIRST: Duration = Duration::from_secs(10);
+    const PAUSE: Duration = Duration::from_secs(30);
+
+    fn new(before: u64) -> Self {
+        let begun = Instant::now();
+        Self { begun, before, next: begun + Self::FIRST }
+    }
+
+    /// How far the run is, where it is time to say it.
+    fn line(&mut self, [done, total, grips]: [u64; 3], now: Instant) -> Option<String> {
+        if now < self.next || done >= total {
+            return None;
+        }
+        self.next = now + Self::PAUSE;
+        let left = match done - self.before {
+            0 => String::new(),
+            since => {
+                let left = (now - self.begun).mul_f64((total - done) as f64 / since as f64);
+                format!("; about {} left", HumanDuration(left))
+            }
+        };
+        Some(format!(
+            "{} of {} candidates, {} grips{left}",
+            HumanCount(done),
+            HumanCount(total),
+            HumanCount(grips)
+        ))
+    }
+}
+
 /// A bar with rate and time left; hidden when asked for or when nobody watches.
 fn progress_bar(total: u64, quiet: bool) -> ProgressBar {
-    if quiet || !std::io::stderr().is_terminal() {
+    if quiet || !drawn() {
         return ProgressBar::hidden();
     }
     let bar = ProgressBar::new(total);
@@ -140,5 +195,25 @@ impl Interrupt {
     /// The exit code of an interrupted program.
     pub(crate) fn code(&self) -> Option<u8> {
         u8::try_from(self.code.load(Ordering::Relaxed)).ok().filter(|&code| code > 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_run_is_told_of_now_and_then() {
+        let mut log = Log::new(100);
+        let begun = log.begun;
+        let mut at = |seconds: u64, done: u64| {
+            log.line([done, 2100, 1234], begun + Duration::from_secs(seconds))
+        };
+        assert_eq!(at(9, 300), None);
+        let text = "600 of 2,100 candidates, 1,234 grips; about 60 seconds left";
+        assert_eq!(at(20, 600).as_deref(), Some(text));
+        assert_eq!(at(49, 700), None);
+        assert!(at(50, 800).is_some());
+        assert_eq!(at(100, 2100), None, "the answer follows at once");
     }
 }
