@@ -263,6 +263,14 @@ impl Jaws {
     /// Both ways.
     pub const BOTH: [Self; 2] = [Self::Straight, Self::Exchanged];
 
+    /// The sides of a site that face I and II of the pose lie on.
+    pub(crate) fn sides(self) -> [usize; 2] {
+        match self {
+            Self::Straight => [0, 1],
+            Self::Exchanged => [1, 0],
+        }
+    }
+
     /// The turn of the gripper within the pose.
     pub fn turn(self) -> DMat3 {
         match self {

@@ -50,7 +50,7 @@ pub(crate) struct Field {
     pub(crate) origin: DVec2,
     /// Their first axis.
     pub(crate) axis: DVec2,
-    rings: Vec<Ring>,
+    pub(crate) rings: Vec<Ring>,
     /// The gap in these axes.
     pub(crate) gap: Quadratic,
 }

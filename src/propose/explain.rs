@@ -136,7 +136,7 @@ impl Proposer<'_> {
             let closing = part_from_grip.rotation.z_axis;
             let along = closing.cross(site.part_from_site.rotation.z_axis).length() < SAME_CLOSING;
             ((has(0, face_i) && has(1, face_ii)) || (has(0, face_ii) && has(1, face_i)))
-                && (site.relief.is_none() || along)
+                && (!site.is_round() || along)
         };
         let local = |site: &Site| site.part_from_site.point_inverse(part_from_grip.origin);
         let nearest = self.sites.iter().enumerate().filter(|(_, site)| holds(site)).min_by(
@@ -257,11 +257,12 @@ impl Proposer<'_> {
         verdict: &mut Verdict,
     ) {
         let pads = Pads::new(prepared.site.pads(self.gripper, jaws), angle);
-        let sides: [usize; 2] = match jaws {
-            Jaws::Straight => [0, 1],
-            Jaws::Exchanged => [1, 0],
-        };
+        let sides = jaws.sides();
+        let beside = self.pressed_beside(prepared.site, &pads, position, angle);
         let areas = sides.map(|side| {
+            if let Some(areas) = beside {
+                return areas[side];
+            }
             let mut scratch = Scratch::default();
             let patch = &prepared.patches[side.min(prepared.patches.len() - 1)];
             let pad = &pads.turned[side];

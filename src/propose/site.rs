@@ -4,6 +4,7 @@
 //! One pad may touch several faces that lie in one plane, so pairs whose planes coincide are joined
 //! first, and split again into stretches too far apart for one pad.
 
+mod beside;
 mod crest;
 mod freeform;
 mod net;
@@ -30,6 +31,7 @@ pub(super) use round::{MOST_CANDIDATES, Round};
 pub(super) use rows::steepest;
 use shapes::{project, same_shape, stretches, to_site};
 use special::{Landmarks, Posture};
+use survey::Survey;
 
 use super::environment::Environment;
 use super::options::ProposeOptions;
@@ -167,11 +169,12 @@ pub(super) fn sites(
     };
     let mut sites = Vec::new();
     let mut leaning = Vec::new();
+    let mut surveys = Surveys::default();
     for (kind, pairs) in &groups {
         let rows = if options.curved == Some(false) { None } else { finder.lean(pairs) };
         match rows {
             Some(rows) => leaning.extend(rows),
-            None => sites.extend(finder.sites(*kind, pairs)?),
+            None => sites.extend(finder.sites(*kind, pairs, &mut surveys)?),
         }
     }
     let plane = sites.len();
@@ -217,6 +220,25 @@ struct Base<'a> {
     rise: f64,
 }
 
+/// Looks along the closing directions of planes.
+#[derive(Default)]
+struct Surveys<'a> {
+    loose: Option<Vec<u32>>,
+    known: rustc_hash::FxHashMap<usize, Survey<'a>>,
+}
+
+impl<'a> Surveys<'a> {
+    /// The one along a direction; `None` where only planes are to be gripped.
+    fn of(&mut self, finder: &Finder<'a>, direction: usize) -> Option<&Survey<'a>> {
+        if finder.options.curved == Some(false) {
+            return None;
+        }
+        let loose = self.loose.get_or_insert_with(|| finder.loose());
+        let axes = axes(finder.directions[direction]);
+        Some(self.known.entry(direction).or_insert_with(|| Survey::new(finder.part, loose, axes)))
+    }
+}
+
 /// Main direction of a stretch, unless it is known, and the middle of its bounds along it.
 fn lie(overlap: &[Polygon], known: Option<f64>) -> (f64, DVec2) {
     let turn = known.unwrap_or_else(|| main_direction(overlap));
@@ -248,9 +270,14 @@ struct Finder<'a> {
     budget: Budget,
 }
 
-impl Finder<'_> {
+impl<'a> Finder<'a> {
     /// The sites of pairs whose planes coincide.
-    fn sites(&mut self, kind: PairKind, pairs: &[&FacePair]) -> Result<Vec<Site>> {
+    fn sites(
+        &mut self,
+        kind: PairKind,
+        pairs: &[&FacePair],
+        surveys: &mut Surveys<'a>,
+    ) -> Result<Vec<Site>> {
         let (part, size, reach) = (self.part, self.size, self.reach);
         let (direction, sides) = self.sides(pairs);
         let face = |id: u32| &part.faces[id as usize];
@@ -266,8 +293,16 @@ impl Finder<'_> {
             let rise =
                 rise(&sides, part, &axes_from_part, axis, &overlap, heights) + SAME_PLANE * size;
             let sides = &sides;
+            let bounds = polygon::bounds(&overlap);
             let base = Base { kind, direction, sides, overlap, turn, middle, heights, rise };
             let mut site = self.site(base, None)?;
+            if let Some(survey) = surveys.of(self, direction)
+                && let Some((relief, overlap)) = self.beside(&site, (heights, bounds), survey)
+            {
+                let (turn, middle) = lie(&overlap, Some(turn));
+                let base = Base { kind, direction, sides, overlap, turn, middle, heights, rise };
+                site = self.site(base, Some(relief))?;
+            }
             site.touched = self.touched(&site, reach);
             found.push(site);
         }
@@ -303,12 +338,12 @@ impl Finder<'_> {
         };
         let mut edges = straight_edges(&local);
         let angles = match &relief {
-            None => angles(&edges, options, one.min(two).min_element()),
-            Some(relief) => {
+            Some(relief) if relief.is_round() => {
                 edges.retain(|edge| !relief.runs_along(edge));
                 let cone = options.approach_cone.map(|cone| frame.rotation.transpose() * cone.axis);
                 relief.angles(options, cone)
             }
+            _ => angles(&edges, options, one.min(two).min_element()),
         };
         let mut site = Site {
             kind,
@@ -450,6 +485,11 @@ impl Site {
         self.grid() + self.special.iter().map(Vec::len).sum::<usize>()
     }
 
+    /// Whether it lies on round or leaning surface.
+    pub(super) fn is_round(&self) -> bool {
+        self.relief.as_ref().is_some_and(Relief::is_round)
+    }
+
     /// Number of candidates of the grid.
     pub(super) fn grid(&self) -> usize {
         self.positions.len() * self.angles.len()
@@ -530,7 +570,7 @@ impl Site {
             if let Some(relief) = &self.relief {
                 // Facets beside each other are one area.
                 return match &relief.pressed[side] {
-                    facets if facets.len() > 1 => even_odd(
+                    facets if relief.is_round() && facets.len() > 1 => even_odd(
                         &facets.iter().flat_map(rings).map(<[DVec2]>::to_vec).collect::<Vec<_>>(),
                     ),
                     one => one.clone(),
@@ -556,7 +596,7 @@ impl Site {
             return faces[0];
         }
         let point = self.part_from_site.point(point.extend(0.0));
-        if self.relief.is_some() {
+        if self.is_round() {
             let plane = part.faces.len();
             let centre = |id: u32| match (id as usize).checked_sub(plane) {
                 Some(curved) => part.curved[curved].centroid,

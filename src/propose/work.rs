@@ -12,7 +12,7 @@ use super::proposer::{Item, Prepared, Proposer};
 use super::site::{Relief, Site};
 use crate::clash::{Phase, Room, Sweep, Tree};
 use crate::contact::surface;
-use crate::geometry::{clip_ring_convex, polygon, ring_area};
+use crate::geometry::{clip_ring_convex, patch_area, polygon, ring_area};
 use crate::gripper::{Jaws, half_turn, rectangle};
 use crate::model::{Contact, Frame, Gap, Grip, Patch, Piece, Polygon, Ring, Surfaces};
 use crate::part::PairKind;
@@ -137,6 +137,7 @@ impl Proposer<'_> {
             let site = prepared.site;
             let (angle, places) = (site.angles[item.angle], site.places(item.places, item.angle));
             let pads = Pads::new(site.pads(self.gripper, jaws), angle);
+            let floors = jaws.sides().map(|side| self.contact_floor(site, &pads.turned[side]));
             let alive = std::mem::take(&mut buffers.alive);
             for &index in &alive {
                 let place = places[item.positions.start + index as usize];
@@ -151,6 +152,10 @@ impl Proposer<'_> {
                     &mut buffers.scratch,
                     &mut known,
                 );
+                if let Some(reason) = self.too_little(site, &contact, floors) {
+                    outcome.rejections.push((reason, 1));
+                    continue;
+                }
                 let mut grip = Grip {
                     id: item.id + u64::from(index) * self.stride(),
                     part_from_grip: frame(site, place, angle),
@@ -339,8 +344,44 @@ impl Proposer<'_> {
         let bounds = rectangle(site.extent);
         let most = ring_area(&clip_ring_convex(&pad.centred(), &bounds)).min(site.overlap);
         // Round faces touch little of a pad by their nature.
-        let pad_share = if site.relief.is_some() { 0.0 } else { self.options.min_pad_share };
+        let pad_share = if site.is_round() { 0.0 } else { self.options.min_pad_share };
         [self.options.min_contact * most, pad_share * pad.area()].map(|floor| floor * (1.0 - 1e-9))
+    }
+
+    /// Why planes and what is pressed beside them are no contact, which is known once it is solved: too
+    /// little of them, or nothing where the pads rest on a land of another pair.
+    fn too_little(
+        &self,
+        site: &Site,
+        contact: &Contact,
+        floors: [[f64; 2]; 2],
+    ) -> Option<Rejection> {
+        if site.relief.is_none() || site.is_round() {
+            return None;
+        }
+        let areas = [&contact.face_i, &contact.face_ii].map(|face| patch_area(face));
+        let below = |floor: usize| (0..2).any(|k| areas[k] <= 0.0 || areas[k] < floors[k][floor]);
+        match (below(0), below(1)) {
+            (true, _) => Some(Rejection::ContactTooSmall),
+            (false, true) => Some(Rejection::PadShareTooSmall),
+            (false, false) => None,
+        }
+    }
+
+    /// Areas that are pressed on either side of a place on planes and what lies beside them [m^2].
+    pub(super) fn pressed_beside(
+        &self,
+        site: &Site,
+        pads: &Pads,
+        place: DVec2,
+        angle: f64,
+    ) -> Option<[f64; 2]> {
+        let relief = site.relief.as_ref().filter(|relief| !relief.is_round())?;
+        let rings = [0, 1].map(|side: usize| pads.turned[side].ring());
+        let surfaces = relief.touched(rings, place, angle, Jaws::Straight);
+        let contact = relief.plain(&surfaces);
+        let contact = contact.unwrap_or_else(|| relief.outlines(&surfaces, Jaws::Straight));
+        Some([&contact.face_i, &contact.face_ii].map(|face| patch_area(face)))
     }
 
     /// The part in the grip axes of a site at an angle.
@@ -441,6 +482,9 @@ impl Proposer<'_> {
             contact: Arc::new(relief.outlines(&surfaces, jaws)),
             surfaces: Some(Arc::new(surfaces)),
         };
+        if let Some(contact) = relief.plain(&surfaces) {
+            return self.shared(contact, known);
+        }
         let mut pieces = surfaces.face_i.iter().chain(&surfaces.face_ii);
         // About one point every place has a contact of its own.
         if pieces.any(|piece| matches!(piece.gap, Gap::Sphere { .. } | Gap::Barrel { .. })) {

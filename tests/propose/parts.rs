@@ -205,8 +205,15 @@ fn assert_same_grips(coarse: &Part, fine: &Part) {
     let mut held = 0;
     for (a, b) in a.iter().zip(&b) {
         assert_eq!(a.worst.status, b.worst.status, "{}", a.grip.id);
-        let near = |a: f64, b: f64| (a - b).abs() <= 1e-6 * a.abs();
-        assert!(near(a.alpha, b.alpha) && near(a.twist_margin, b.twist_margin), "{a:?}\n{b:?}");
+        // Corners of small facets are rounded to single precision: their slopes differ by 3e-5.
+        let within = if a.grip.surfaces.is_some() { 1e-4 } else { 1e-6 };
+        let near = |a: f64, b: f64| (a - b).abs() <= within * a.abs();
+        let [one, other] = [a, b].map(|grip| [grip.alpha, grip.twist_margin]);
+        assert!(
+            near(one[0], other[0]) && near(one[1], other[1]),
+            "{}: {one:?} {other:?}",
+            a.grip.id
+        );
         if let (Some(mu), Some(other)) = (a.worst.mu_s, b.worst.mu_s) {
             held += 1;
             assert!(

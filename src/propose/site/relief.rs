@@ -3,6 +3,7 @@
 
 use glam::{DAffine2, DVec2, DVec3};
 
+use super::beside::{is_level, is_own};
 use super::places::Edge;
 use super::shapes::to_site;
 use crate::contact::surface::{Shape, Spot, mapped, pressed};
@@ -20,13 +21,17 @@ const POINT_STEP: f64 = 45.0 * std::f64::consts::PI / 180.0;
 pub(in crate::propose) struct Relief {
     /// Pieces on side I and II in the site's `(x, y)`; gaps are those behind the site's planes.
     pieces: [Vec<(Piece, Shape)>; 2],
-    /// What is pressed on either side by pads as far as they press one piece over its middle: the
-    /// measure of a contact before it is solved.
+    /// What is pressed on either side by pads as far as they press one piece over its middle, of planes
+    /// the level surface that is pressed where it is needed for a contact: the measure of a contact before
+    /// it is solved.
     pub(in crate::propose) pressed: [Patch; 2],
     layer: Layer,
     force: f64,
     /// Compressions at the planes of these pads \[m\], near which those of others are looked for.
     deltas: [f64; 2],
+    /// Where the pads rest on planes square to the closing direction, and press what lies beside these
+    /// too: how rough the planes are \[m\].
+    flush: Option<f64>,
 }
 
 impl Relief {
@@ -39,7 +44,8 @@ impl Relief {
         place: DVec2,
     ) -> Option<Self> {
         let (pieces, deltas) = (shaped(pieces), [0.0; 2]);
-        let relief = Self { pieces, pressed: Default::default(), layer, force, deltas };
+        let pressed = Default::default();
+        let relief = Self { pieces, pressed, layer, force, deltas, flush: None };
         let rings = pads.each_ref().map(|pad| moved_ring(pad, place));
         let under = relief.under(
             [&rings[0], &rings[1]],
@@ -58,13 +64,23 @@ impl Relief {
         deltas: [f64; 2],
     ) -> Self {
         let pressed = Default::default();
-        Self { pieces: shaped(pieces), pressed, layer, force, deltas }.with_deltas(deltas)
+        let pieces = shaped(pieces);
+        Self { pieces, pressed, layer, force, deltas, flush: None }.with_deltas(deltas)
     }
 
-    fn with_deltas(self, deltas: [f64; 2]) -> Self {
+    /// Planes and what lies beside them, not pressed yet.
+    pub(super) fn beside(pieces: [Vec<Piece>; 2], layer: Layer, force: f64, flush: f64) -> Self {
+        let (pieces, pressed) = (shaped(pieces), Default::default());
+        Self { pieces, pressed, layer, force, deltas: [0.0; 2], flush: Some(flush) }
+    }
+
+    /// With the pressure of pads whose layers are compressed by `deltas` at the pads' planes.
+    pub(super) fn with_deltas(self, deltas: [f64; 2]) -> Self {
+        let counts = |piece: &Piece| self.is_round() || is_level(piece);
         let pressed = [0, 1].map(|side: usize| {
-            let pieces = self.pieces[side].iter();
-            pieces.flat_map(|(piece, _)| pressed(piece, deltas[side])).collect()
+            let pieces = self.pieces[side].iter().map(|(piece, _)| piece);
+            let pieces = pieces.filter(|piece| counts(piece));
+            pieces.flat_map(|piece| pressed(piece, deltas[side])).collect()
         });
         Self { pressed, deltas, ..self }
     }
@@ -139,6 +155,25 @@ impl Relief {
             pieces.iter().flat_map(|piece| pressed(piece, delta)).collect()
         };
         Contact { face_i: outline(&surfaces.face_i, one), face_ii: outline(&surfaces.face_ii, two) }
+    }
+
+    /// Whether crests or leaning surface is gripped, not planes square to the closing direction.
+    pub(in crate::propose) fn is_round(&self) -> bool {
+        self.flush.is_none()
+    }
+
+    /// The contact of pads that rest on planes, where it is known without the layers: nothing where the
+    /// planes are not touched on both sides, or all of what is touched is theirs.
+    pub(in crate::propose) fn plain(&self, surfaces: &Surfaces) -> Option<Contact> {
+        let flush = self.flush?;
+        let sides = [&surfaces.face_i, &surfaces.face_ii];
+        let is_own = |piece: &Piece| is_own(piece, flush);
+        if sides.iter().any(|side| !side.iter().any(is_own)) {
+            return Some(Contact::default());
+        }
+        let [face_i, face_ii] =
+            sides.map(|side| -> Patch { side.iter().map(Piece::polygon).collect() });
+        sides.iter().all(|side| side.iter().all(is_own)).then_some(Contact { face_i, face_ii })
     }
 
     /// Directions of the crests, in the site's `(x, y)`.

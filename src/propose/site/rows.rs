@@ -23,7 +23,7 @@ use crate::propose::options::{ProposeOptions, Rejection};
 use crate::propose::stroke::Stroke;
 
 /// Share of a layer by which it is compressed at most to take a lean: beyond it is no bed of springs.
-const LAYER_SHARE: f64 = 1.0 / 3.0;
+pub(super) const LAYER_SHARE: f64 = 1.0 / 3.0;
 /// Reaches of a pad that differ by less are one \[m\].
 const SAME_REACH: f64 = 1e-9;
 /// Rows nearer to each other than this are one \[m\].
@@ -48,7 +48,7 @@ struct Posture {
 
 /// Sine of the angle between two planes below which their push towards the thick end is left out: it
 /// asks for half of it as friction, less than 0.0005.
-const LEANS: f64 = 1e-3;
+pub(super) const LEANS: f64 = 1e-3;
 
 impl Finder<'_> {
     /// The sites on surfaces that lean.
