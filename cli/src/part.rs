@@ -115,7 +115,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
         let rows = if args.faces { usize::MAX } else { ROWS };
         write!(terminal::output(), "{}", to_text(&part, &pairs, density, rows))?;
     }
-    Ok(if pairs.is_empty() { ExitCode::from(1) } else { ExitCode::SUCCESS })
+    // Round faces are gripped without a pair of planes.
+    let nothing = pairs.is_empty() && part.curved.is_empty();
+    Ok(if nothing { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
 
 fn to_text(part: &Part, pairs: &[FacePair], density: Option<f64>, rows: usize) -> String {

@@ -365,3 +365,69 @@ fn comparing_loads_on_lenses_gives_the_worst_one_that_solving_all_of_them_gives(
     let [solved, all] = sums;
     assert!(2 * solved < all, "{solved} of {all}");
 }
+
+/// An oval of 50 x 30 mm drawn up to 60 mm, its foot and shoulder rounded by 5 mm, and this many rings of
+/// corners between the ends of the straight wall.
+fn drawn(rings: u32) -> Mesh {
+    let (radius, steps) = (0.005, 8);
+    let arc = |k: u32| DVec2::from_angle(0.5 * PI * f64::from(k) / f64::from(steps)) * radius;
+    let foot = (0..=steps).map(|k| DVec2::new(radius - arc(steps - k).x, radius - arc(k).x));
+    let foot = foot.map(|at| DVec2::new(at.x, at.y));
+    // Inset of the outline, and height.
+    let mut rows: Vec<DVec2> = foot.map(|at| DVec2::new(at.y, at.x)).collect();
+    rows.sort_by(|a, b| a.y.total_cmp(&b.y));
+    let top: Vec<DVec2> = rows.iter().rev().map(|at| DVec2::new(at.x, 0.060 - at.y)).collect();
+    let wall = (1..=rings).map(|k| f64::from(k) / f64::from(rings + 1));
+    rows.extend(wall.map(|share| DVec2::new(0.0, radius + share * (0.060 - 2.0 * radius))));
+    rows.extend(top);
+    let count = rows.len() as u32;
+    lathe(48, count, [DVec3::ZERO, DVec3::Z * 0.060], |turn, row| {
+        let at = rows[row as usize];
+        let e = DVec2::from_angle(turn);
+        (e * DVec2::new(0.025 - at.x, 0.015 - at.x)).extend(at.y)
+    })
+}
+
+/// Long facets are straight where they go on in short ones: no paraboloid bulges between their ends.
+#[test]
+fn a_drawn_oval_is_gripped_at_its_width_with_many_rings_and_with_none() {
+    let mut counts = Vec::new();
+    for rings in [0, 3, 9] {
+        let part = part(&drawn(rings));
+        let (grips, _) = grips(&part, &options().with_curved(Some(true)));
+        let across: Vec<&Grip> = grips.iter().filter(|grip| closing(grip).y.abs() > 0.9).collect();
+        for grip in &across {
+            assert!((grip.width - 0.030).abs() < 1e-4, "{rings}: {}", grip.width);
+        }
+        assert!(across.len() > 50, "{rings}: {}", across.len());
+        counts.push(across.len());
+    }
+    let [least, most] = [counts.iter().min().unwrap(), counts.iter().max().unwrap()];
+    assert!(4 * least > 3 * most, "{counts:?}");
+}
+
+/// The bend about the axis of a surface of revolution is known, whatever its profile: a squeeze across it is
+/// neutral.
+#[test]
+fn a_barrel_is_as_round_about_its_axis_as_it_is_wide() {
+    for around in [24, 96] {
+        // Radius 10 mm at its middle, its meridian of 60 mm.
+        let (rows, half) = (13, 0.020);
+        let ends = [DVec3::NEG_Z * half, DVec3::Z * half];
+        let barrel = lathe(around, rows, ends, |turn, row| {
+            let z = half * (2.0 * row / f64::from(rows - 1) - 1.0);
+            let radius = 0.010 - 0.060 + (0.060_f64.powi(2) - z * z).sqrt();
+            (DVec2::from_angle(turn) * radius).extend(z)
+        });
+        let part = part(&barrel);
+        let (grips, _) = grips(&part, &options().with_curved(Some(true)));
+        let across: Vec<&Grip> = grips.iter().filter(|grip| closing(grip).z.abs() < 0.1).collect();
+        assert!(across.len() > 20, "{around}: {}", across.len());
+        for grip in across {
+            assert!((grip.width - 0.020).abs() < 2e-6, "{around}: {}", grip.width);
+            let [radius, meridian] = radii(grip).unwrap();
+            assert!((radius - 0.010).abs() < 1e-6, "{around}: {radius}");
+            assert!((meridian / 0.060 - 1.0).abs() < 0.03, "{around}: {meridian}");
+        }
+    }
+}

@@ -51,6 +51,9 @@ impl Asked {
 
 /// Lever of a stiffness over the distance of the faces below which it is none.
 pub(super) const NO_LEVER: f64 = 1e-6;
+/// Lever of the normal force by which a face falls short of the other's axis, over the distance of the pads,
+/// from which on it is told: rounding of a file and fits to its corners make less.
+const ROLLS: f64 = 1e-3;
 /// Difference in what two pieces feel of a tilt that is rounding.
 const FELT: f64 = 1e-9;
 
@@ -69,7 +72,7 @@ impl<'a> Case<'a, '_> {
                 true
             }
             Kind::Nearly(stiffness) => {
-                if stiffness < -none {
+                if stiffness < -ROLLS * force * self.distance.abs() {
                     notes.push(Note::Unstable { stiffness });
                 }
                 stiffness <= none

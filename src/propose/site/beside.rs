@@ -19,6 +19,9 @@ use crate::model::{Gap, Patch, Piece, Ring, Surfaces};
 const SHARE: f64 = 0.1;
 /// Share of the least contact that the planes have of one mostly on what lies beside them.
 const SLIVER: f64 = 0.25;
+/// Pieces beside the planes of a contact beyond which they are left out: grips would be slow, and large in
+/// files.
+const MOST_PIECES: usize = 12;
 /// Places at which it is looked for, at most.
 const PLACES: usize = 40;
 
@@ -63,6 +66,10 @@ impl Finder<'_> {
                 }
                 let area = areas[0].min(areas[1]);
                 most = most.max(area);
+                // So many are facets of no known face.
+                if others().count() > MOST_PIECES {
+                    return None;
+                }
                 if others().next().is_some() {
                     met.push((area, under));
                 }

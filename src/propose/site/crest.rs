@@ -5,12 +5,12 @@ use glam::{DMat2, DMat3, DVec2, DVec3};
 use rustc_hash::FxHashSet;
 
 use super::net::{Facing, Net};
-use super::survey::FACING;
+use super::survey::{FACING, LEVEL};
 use crate::geometry::Paraboloid;
 use crate::geometry::polygon::{Bounds2, outer};
 use crate::gripper::Layer;
 use crate::model::Gap;
-use crate::part::{CurvedFace, Mesh};
+use crate::part::{CurvedFace, Mesh, Shape};
 
 /// What the pads bring.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +36,13 @@ const STRAIGHT: f64 = 0.1;
 const LEANS: f64 = 0.5;
 /// The part of a radius within which the parabola stands for the circle.
 const PARABOLA: f64 = 0.9;
+/// Share of an edge that one has which shows it to be straight, and the cosine of the angle between
+/// them; and places on such an edge.
+const SHORTER: f64 = 4.0;
+const GOES_ON: f64 = 0.8;
+const WITHIN: [f64; 3] = [0.25, 0.5, 0.75];
+/// Determinant of the equations for a profile, over what it is for rings far apart, of a single ring.
+const SINGULAR: f64 = 1e-12;
 /// A crest may lie this far outside of a triangle, as a share of it.
 const RIM: f64 = 1e-3;
 
@@ -58,6 +65,15 @@ pub(super) struct FreeCrest {
     /// Compression of the layer there, about \[m\].
     pub(super) delta: f64,
     pub(super) smooth: Option<Smooth>,
+}
+
+/// Where a pad touches a face first.
+struct Top {
+    at: DVec2,
+    height: f64,
+    /// Least and greatest bend, zero where it is straight, and the direction of the least.
+    bends: [f64; 2],
+    first: DVec2,
 }
 
 /// What of a face a paraboloid stands for.
@@ -91,6 +107,11 @@ pub(super) fn compression(radii: [f64; 2], pad: Pad) -> f64 {
         if load(middle) < pad.force { low = middle } else { high = middle }
     }
     0.5 * (low + high)
+}
+
+/// How much a corner counts at a gap: what is pressed most counts most.
+fn weight(gap: f64, delta: f64) -> f64 {
+    (1.0 + (2.0 * gap / delta).powi(2)).powi(-2)
 }
 
 /// Finds crests in the axes of one closing direction.
@@ -127,25 +148,21 @@ impl Crests<'_> {
             _ => [own, f64::INFINITY],
         };
         let delta = compression(rough, self.pad);
-        let (form, above) = self.form(corner, &place, start, delta)?;
-        let length = self.pad.reach;
-        let ([low, high], first) = form.principal();
-        let fall = 0.5 * length * length;
-        if low * fall < -STRAIGHT * delta * FITTED {
-            return None;
-        }
-        let bends = [low, high].map(|bend| if bend * fall < STRAIGHT * delta { 0.0 } else { bend });
-        let mut step = DVec2::ZERO;
-        for (bend, along) in bends.into_iter().zip([first, first.perp()]) {
-            let slope = along.dot(form.slope);
-            if bend > 0.0 {
-                step -= along * (slope / bend);
-            } else if slope.abs() * length > LEANS * delta {
-                return None;
+        let points = self.around(corner, &place, start, delta);
+        let highest = points.iter().map(|point| -point.z).fold(f64::NEG_INFINITY, f64::max);
+        let above = start.z + highest;
+        let turned = match face.shape {
+            Shape::Revolution { axis, .. } => {
+                let line = [place(axis.origin), place(axis.direction)];
+                self.turned(line, &points, start, delta)
             }
-        }
-        let at = start.truncate() + step;
-        let height = start.z - form.at(step);
+            _ => None,
+        };
+        let top = match turned {
+            Some(top) => top?,
+            None => self.fitted(&points, start, delta)?,
+        };
+        let Top { at, height, bends, first } = top;
         let gap = match bends {
             [low, high] if low > 0.0 => Gap::Barrel {
                 radius: high.recip(),
@@ -193,14 +210,91 @@ impl Crests<'_> {
         Some(crest)
     }
 
-    /// The paraboloid of the gap about a place behind a plane there, and how high the face comes.
-    fn form(
+    /// The top of the paraboloid through corners behind a plane through `start`.
+    fn fitted(&self, points: &[DVec3], start: DVec3, delta: f64) -> Option<Top> {
+        let weighted = points.iter().map(|&point| (point, weight(point.z, delta)));
+        let form = Paraboloid::fit(weighted)?;
+        let ([low, high], first) = form.principal();
+        let mut step = DVec2::ZERO;
+        let mut bends = [0.0; 2];
+        for (k, (bend, along)) in [low, high].into_iter().zip([first, first.perp()]).enumerate() {
+            let (bend, by) = self.foremost(bend, along.dot(form.slope), delta)?;
+            step -= along * by;
+            bends[k] = bend;
+        }
+        let (at, height) = (start.truncate() + step, start.z - form.at(step));
+        Some(Top { at, height, bends, first })
+    }
+
+    /// The same on a surface about an axis (a point of it and its direction), whose bend about that is known:
+    /// corners tell its profile, wherever they lie on the round. `None` where the axis leaves the pads' plane,
+    /// or they lie on one ring.
+    #[allow(clippy::option_option, reason = "told apart by the caller at once")]
+    fn turned(
+        &self,
+        [origin, direction]: [DVec3; 2],
+        points: &[DVec3],
+        start: DVec3,
+        delta: f64,
+    ) -> Option<Option<Top>> {
+        if direction.z.abs() > LEVEL {
+            return None;
+        }
+        let along = direction.truncate().normalize();
+        let profile = |point: DVec3| {
+            let from = point - origin;
+            let across = along.perp_dot(from.truncate());
+            DVec2::new(along.dot(from.truncate()), across.hypot(from.z))
+        };
+        let here = profile(start);
+        // Least squares for the radius as a parabola.
+        let (mut normal, mut right) = (DMat3::ZERO, DVec3::ZERO);
+        for point in points {
+            let at = profile(start + DVec3::new(point.x, point.y, -point.z)) - here;
+            let weight = weight(-at.y, delta);
+            let row = DVec3::new(1.0, at.x / self.pad.reach, (at.x / self.pad.reach).powi(2));
+            normal += DMat3::from_cols(row * row.x, row * row.y, row * row.z) * weight;
+            right += row * (at.y * weight);
+        }
+        if normal.determinant() <= SINGULAR * normal.x_axis.x.powi(3) {
+            return None;
+        }
+        let [rise, slope, bend] = (normal.inverse() * right).to_array();
+        let (slope, bend) = (slope / self.pad.reach, 2.0 * bend / self.pad.reach.powi(2));
+        Some(self.foremost(-bend, -slope, delta).map(|(meridian, by)| {
+            let step = -by;
+            let radius = here.y + rise + slope * step - 0.5 * meridian * step * step;
+            let at = origin.truncate() + along * (here.x + step);
+            let (bends, first) = match meridian <= radius.recip() {
+                true => ([meridian, radius.recip()], along),
+                false => ([radius.recip(), meridian], along.perp()),
+            };
+            Top { at, height: origin.z + radius, bends, first }
+        }))
+    }
+
+    /// Along one line: the bend of a gap, none where the crest is straight there, and how far back from here
+    /// it is least; `None` where it has no such place.
+    fn foremost(&self, bend: f64, slope: f64, delta: f64) -> Option<(f64, f64)> {
+        let length = self.pad.reach;
+        let fall = 0.5 * length * length;
+        if bend * fall < -STRAIGHT * delta * FITTED {
+            return None;
+        }
+        if bend * fall >= STRAIGHT * delta {
+            return Some((bend, slope / bend));
+        }
+        (slope.abs() * length <= LEANS * delta).then_some((0.0, 0.0))
+    }
+
+    /// Corners about one, from a place there, their third coordinate the depth behind a plane through it.
+    fn around(
         &self,
         corner: u32,
         place: &impl Fn(DVec3) -> DVec3,
         start: DVec3,
         delta: f64,
-    ) -> Option<(Paraboloid, f64)> {
+    ) -> Vec<DVec3> {
         let behind = |corner: u32| {
             let point = place(self.net.points[corner as usize]) - start;
             DVec3::new(point.x, point.y, -point.z)
@@ -220,6 +314,11 @@ impl Crests<'_> {
                 }
                 points.push(point);
                 for &other in self.net.beside(next) {
+                    if self.is_straight(next, other) {
+                        let end = behind(other);
+                        let inner = WITHIN.iter().map(|share| point.lerp(end, *share));
+                        points.extend(inner.filter(|at| at.z <= window));
+                    }
                     if seen.insert(other) {
                         queue.push(other);
                     }
@@ -234,12 +333,23 @@ impl Crests<'_> {
         points.sort_by(|a, b| {
             a.z.total_cmp(&b.z).then(a.x.total_cmp(&b.x)).then(a.y.total_cmp(&b.y))
         });
-        // What is pressed most counts most.
-        let weight = |gap: f64| (1.0 + (2.0 * gap / delta).powi(2)).powi(-2);
-        let weighted = points.iter().map(|&point| (point, weight(point.z)));
-        let form = Paraboloid::fit(weighted)?;
-        let highest = points.iter().map(|point| -point.z).fold(f64::NEG_INFINITY, f64::max);
-        Some((form, start.z + highest))
+        points
+    }
+
+    /// Whether the face has an edge of the mesh for a line: it goes on in a much shorter one, as long
+    /// facets of a wall do in those of a round at its end. Edges of one length are chords of a curve.
+    fn is_straight(&self, from: u32, to: u32) -> bool {
+        let points = &self.net.points;
+        let edge = points[to as usize] - points[from as usize];
+        let length = edge.length();
+        [(from, -1.0), (to, 1.0)].into_iter().any(|(end, sense)| {
+            let beside = self.net.beside(end).iter();
+            let mut on = beside.map(|&next| points[next as usize] - points[end as usize]);
+            on.any(|next| {
+                let further = next.length();
+                SHORTER * further < length && sense * next.dot(edge) > GOES_ON * further * length
+            })
+        })
     }
 
     /// What of the face a gap stands for; `None` where the crest is none of its places.
