@@ -31,7 +31,7 @@ pub(super) use round::{MOST_CANDIDATES, Round};
 pub(super) use rows::steepest;
 use shapes::{project, same_shape, stretches, to_site};
 use special::{Landmarks, Posture};
-use survey::Survey;
+use survey::Surveys;
 
 use super::environment::Environment;
 use super::options::ProposeOptions;
@@ -171,7 +171,8 @@ pub(super) fn sites(
     let mut leaning = Vec::new();
     let mut surveys = Surveys::default();
     for (kind, pairs) in &groups {
-        let rows = if options.curved == Some(false) { None } else { finder.lean(pairs) };
+        let rows =
+            if options.curved == Some(false) { None } else { finder.lean(pairs, &mut surveys) };
         match rows {
             Some(rows) => leaning.extend(rows),
             None => sites.extend(finder.sites(*kind, pairs, &mut surveys)?),
@@ -218,25 +219,6 @@ struct Base<'a> {
     heights: [f64; 2],
     /// See [`Site::rise`].
     rise: f64,
-}
-
-/// Looks along the closing directions of planes.
-#[derive(Default)]
-struct Surveys<'a> {
-    loose: Option<Vec<u32>>,
-    known: rustc_hash::FxHashMap<usize, Survey<'a>>,
-}
-
-impl<'a> Surveys<'a> {
-    /// The one along a direction; `None` where only planes are to be gripped.
-    fn of(&mut self, finder: &Finder<'a>, direction: usize) -> Option<&Survey<'a>> {
-        if finder.options.curved == Some(false) {
-            return None;
-        }
-        let loose = self.loose.get_or_insert_with(|| finder.loose());
-        let axes = axes(finder.directions[direction]);
-        Some(self.known.entry(direction).or_insert_with(|| Survey::new(finder.part, loose, axes)))
-    }
 }
 
 /// Main direction of a stretch, unless it is known, and the middle of its bounds along it.
@@ -450,33 +432,6 @@ impl<'a> Finder<'a> {
             })
             .collect()
     }
-
-    /// The faces that pads at a site may touch: those of its pairs, and others in the same planes
-    /// within reach of a pad.
-    fn touched(&self, site: &Site, reach: f64) -> [Vec<u32>; 2] {
-        let region = site.bounds.grown(reach);
-        let near = |&id: &u32| {
-            let face = &self.part.faces[id as usize];
-            let place = |&point: &DVec2| {
-                let point = face.part_from_face.point(point.extend(0.0));
-                site.part_from_site.point_inverse(point).truncate()
-            };
-            let outline: Vec<DVec2> =
-                face.polygons.iter().flat_map(|polygon| &polygon.outer).map(place).collect();
-            self.chosen.is_none_or(|chosen| chosen[id as usize])
-                && Bounds2::of(&outline).meets(region)
-        };
-        [0, 1].map(|side: usize| {
-            let mut faces = site.faces[side].clone();
-            let plane = self.planes.of[faces[0] as usize];
-            let others = self.planes.faces.get(&plane).map_or(&[][..], Vec::as_slice);
-            let others: Vec<u32> =
-                others.iter().filter(|id| !faces.contains(id)).copied().filter(near).collect();
-            faces.extend(others);
-            faces.sort_unstable();
-            faces
-        })
-    }
 }
 
 impl Site {
@@ -488,6 +443,11 @@ impl Site {
     /// Whether it lies on round or leaning surface.
     pub(super) fn is_round(&self) -> bool {
         self.relief.as_ref().is_some_and(Relief::is_round)
+    }
+
+    /// What its pads touch where it lies on planes beside which they press other surface.
+    pub(super) fn beside(&self) -> Option<&Relief> {
+        self.relief.as_ref().filter(|relief| !relief.is_round())
     }
 
     /// Number of candidates of the grid.

@@ -356,9 +356,7 @@ impl Proposer<'_> {
         contact: &Contact,
         floors: [[f64; 2]; 2],
     ) -> Option<Rejection> {
-        if site.relief.is_none() || site.is_round() {
-            return None;
-        }
+        site.beside()?;
         let areas = [&contact.face_i, &contact.face_ii].map(|face| patch_area(face));
         let below = |floor: usize| (0..2).any(|k| areas[k] <= 0.0 || areas[k] < floors[k][floor]);
         match (below(0), below(1)) {
@@ -376,7 +374,7 @@ impl Proposer<'_> {
         place: DVec2,
         angle: f64,
     ) -> Option<[f64; 2]> {
-        let relief = site.relief.as_ref().filter(|relief| !relief.is_round())?;
+        let relief = site.beside()?;
         let rings = [0, 1].map(|side: usize| pads.turned[side].ring());
         let surfaces = relief.touched(rings, place, angle, Jaws::Straight);
         let contact = relief.plain(&surfaces);

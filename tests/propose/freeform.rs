@@ -371,11 +371,8 @@ fn comparing_loads_on_lenses_gives_the_worst_one_that_solving_all_of_them_gives(
 fn drawn(rings: u32) -> Mesh {
     let (radius, steps) = (0.005, 8);
     let arc = |k: u32| DVec2::from_angle(0.5 * PI * f64::from(k) / f64::from(steps)) * radius;
-    let foot = (0..=steps).map(|k| DVec2::new(radius - arc(steps - k).x, radius - arc(k).x));
-    let foot = foot.map(|at| DVec2::new(at.x, at.y));
     // Inset of the outline, and height.
-    let mut rows: Vec<DVec2> = foot.map(|at| DVec2::new(at.y, at.x)).collect();
-    rows.sort_by(|a, b| a.y.total_cmp(&b.y));
+    let mut rows: Vec<DVec2> = (0..=steps).rev().map(|k| DVec2::splat(radius) - arc(k)).collect();
     let top: Vec<DVec2> = rows.iter().rev().map(|at| DVec2::new(at.x, 0.060 - at.y)).collect();
     let wall = (1..=rings).map(|k| f64::from(k) / f64::from(rings + 1));
     rows.extend(wall.map(|share| DVec2::new(0.0, radius + share * (0.060 - 2.0 * radius))));

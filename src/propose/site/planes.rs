@@ -3,6 +3,8 @@
 use glam::{DMat3, DVec2, DVec3};
 use rustc_hash::FxHashMap;
 
+use super::{Finder, Site};
+use crate::geometry::polygon::Bounds2;
 use crate::model::Polygon;
 use crate::part::{Part, PlanarFace};
 
@@ -44,6 +46,35 @@ impl Planes {
             members.entry(of[face.id as usize]).or_default().push(face.id);
         }
         Self { of, faces: members }
+    }
+}
+
+impl Finder<'_> {
+    /// The faces that pads at a site may touch: those of its pairs, and others in the same planes
+    /// within reach of a pad.
+    pub(super) fn touched(&self, site: &Site, reach: f64) -> [Vec<u32>; 2] {
+        let region = site.bounds.grown(reach);
+        let near = |&id: &u32| {
+            let face = &self.part.faces[id as usize];
+            let place = |&point: &DVec2| {
+                let point = face.part_from_face.point(point.extend(0.0));
+                site.part_from_site.point_inverse(point).truncate()
+            };
+            let outline: Vec<DVec2> =
+                face.polygons.iter().flat_map(|polygon| &polygon.outer).map(place).collect();
+            self.chosen.is_none_or(|chosen| chosen[id as usize])
+                && Bounds2::of(&outline).meets(region)
+        };
+        [0, 1].map(|side: usize| {
+            let mut faces = site.faces[side].clone();
+            let plane = self.planes.of[faces[0] as usize];
+            let others = self.planes.faces.get(&plane).map_or(&[][..], Vec::as_slice);
+            let others: Vec<u32> =
+                others.iter().filter(|id| !faces.contains(id)).copied().filter(near).collect();
+            faces.extend(others);
+            faces.sort_unstable();
+            faces
+        })
     }
 }
 

@@ -9,7 +9,7 @@ use glam::DVec2;
 use super::relief::Relief;
 use super::round::{Outcomes, Round};
 use super::shapes::{common, to_site};
-use super::survey::Survey;
+use super::survey::{Survey, Surveys};
 use super::tapers::{STEEPEST, Surface, Taper, WIDEST};
 use super::{Finder, SAME_PLANE, Site, axes};
 use crate::error::Result;
@@ -50,7 +50,7 @@ struct Posture {
 /// asks for half of it as friction, less than 0.0005.
 pub(super) const LEANS: f64 = 1e-3;
 
-impl Finder<'_> {
+impl<'a> Finder<'a> {
     /// The sites on surfaces that lean.
     pub(super) fn leaning(&mut self, round: &mut Round) -> Result<Vec<Site>> {
         let (mut tapers, too_small) = self.drafted();
@@ -94,7 +94,11 @@ impl Finder<'_> {
 
     /// The rows of places of pairs that count as parallel, where they lean so much that the push
     /// towards the thick end is felt; `None` where they do not, are small, or no row comes of them.
-    pub(super) fn lean(&mut self, pairs: &[&FacePair]) -> Option<Vec<Site>> {
+    pub(super) fn lean(
+        &mut self,
+        pairs: &[&FacePair],
+        surveys: &mut Surveys<'a>,
+    ) -> Option<Vec<Site>> {
         let face = |id: u32| &self.part.faces[id as usize];
         let both = |pair: &&FacePair| [face(pair.face_i), face(pair.face_ii)];
         let pairs: Vec<[&PlanarFace; 2]> = pairs.iter().map(both).collect();
@@ -106,9 +110,9 @@ impl Finder<'_> {
         if area < self.smallest() {
             return None;
         }
-        let survey = Survey::new(self.part, &self.loose(), axes(self.directions[taper.direction]));
+        let survey = surveys.of(self, taper.direction)?;
         let mut sites = Vec::new();
-        self.rows(&taper, &survey, &mut sites);
+        self.rows(&taper, survey, &mut sites);
         (!sites.is_empty()).then_some(sites)
     }
 

@@ -8,6 +8,7 @@ use glam::{DMat3, DVec2, DVec3};
 use rustc_hash::FxHashMap;
 
 use super::shapes::{outlines, project};
+use super::{Finder, axes};
 use crate::contact::surface::cut;
 use crate::geometry::polygon::{Bounds2, straightened};
 use crate::geometry::{
@@ -189,6 +190,25 @@ impl<'a> Survey<'a> {
         let mut pieces = Vec::new();
         look.outline(triangles, f64::INFINITY, window, gap, &mut pieces);
         pieces
+    }
+}
+
+/// Looks along some closing directions, each made once.
+#[derive(Default)]
+pub(super) struct Surveys<'a> {
+    loose: Option<Vec<u32>>,
+    known: FxHashMap<usize, Survey<'a>>,
+}
+
+impl<'a> Surveys<'a> {
+    /// The one along a direction; `None` where only planes are to be gripped.
+    pub(super) fn of(&mut self, finder: &Finder<'a>, direction: usize) -> Option<&Survey<'a>> {
+        if finder.options.curved == Some(false) {
+            return None;
+        }
+        let loose = self.loose.get_or_insert_with(|| finder.loose());
+        let axes = axes(finder.directions[direction]);
+        Some(self.known.entry(direction).or_insert_with(|| Survey::new(finder.part, loose, axes)))
     }
 }
 
