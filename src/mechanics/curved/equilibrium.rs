@@ -17,9 +17,9 @@ use crate::model::Wrench;
 pub(super) struct Problem<'a> {
     /// Whether a part of the faces turns with the body when it tilts, and another one rolls.
     pub(super) rolls: bool,
-    /// Whether it counts that what turns is pushed along the pads then, and that what rolls carries its
-    /// pressure along.
-    pub(super) moves: bool,
+    /// Share by which it counts that what turns is pushed along the pads then, and that what rolls carries
+    /// its pressure along: all or none, but on the way to a solution.
+    pub(super) moves: f64,
     pub(super) faces: [&'a Face; 2],
     pub(super) distance: f64,
     pub(super) normal: [f64; 2],
@@ -61,6 +61,8 @@ const SOLVED: f64 = 1e-9;
 const ENOUGH: f64 = 1e-13;
 /// Newton steps at most.
 const STEPS: u32 = 40;
+/// First step of a branch on which what the tilt moves grows.
+const FIRST: f64 = 0.25;
 /// Points of the scan over the tilt: along a line, and rays by rings in the plane.
 const LINE: usize = 48;
 const RAYS: usize = 16;
@@ -114,7 +116,7 @@ impl<'a> Problem<'a> {
     /// The force along the pads with the moment about the closing axis, and the moment in the pad plane,
     /// that the tilt brings by what it moves, if that counts.
     pub(super) fn moved(&self, moved: &Moved) -> (Vector3<f64>, DVec2) {
-        if !self.moves {
+        if self.moves == 0.0 {
             return (Vector3::zeros(), DVec2::ZERO);
         }
         let [rest, rolled] = [3, 5].map(|i| DVec2::new(moved[i], moved[i + 1]));
@@ -126,7 +128,7 @@ impl<'a> Problem<'a> {
                 moment -= e.dot(moment) * *e;
             }
         }
-        (moved.xyz(), moment)
+        (self.moves * moved.xyz(), self.moves * moment)
     }
 
     /// The same of both faces.
@@ -266,17 +268,20 @@ impl<'a> Problem<'a> {
         if state.error() <= ENOUGH { Some(state) } else { self.newton(state, 1.0) }
     }
 
-    /// The state on the branch from `d = 0`: friction's lever grows from nothing.
+    /// The state on the branch from `d = 0`: friction's lever grows from nothing, and with it what the tilt
+    /// moves.
     pub(super) fn branch(&self) -> Option<State<'a>> {
         let still = vec![0.0; self.held.len()];
-        let start = self.at(&still, 0.0, None)?;
-        let mut state = self.newton(start, 0.0)?;
-        let (mut done, mut step) = (0.0, 1.0);
+        let grown = |share: f64| Problem { moves: share * self.moves, ..self.clone() };
+        let none = grown(0.0);
+        let mut state = none.newton(none.at(&still, 0.0, None)?, 0.0)?;
+        let (mut done, mut step) = (0.0, if self.moves > 0.0 { FIRST } else { 1.0 });
         while done < 1.0 {
             let next: f64 = f64::min(done + step, 1.0);
-            let moved = self
+            let problem = grown(next);
+            let moved = problem
                 .at(&state.angles, next, Some(&state))
-                .and_then(|start| self.newton(start, next));
+                .and_then(|start| problem.newton(start, next));
             match moved {
                 Some(found) => (state, done) = (found, next),
                 None if step > 0.02 => step *= 0.25,

@@ -268,7 +268,7 @@ impl<'p, 'a> Joint<'p, 'a> {
         }
         by[5] = self.effect(&(self.give * trials[0].by[0]), &none);
         by[6] = self.effect(&none, &(self.give * trials[1].by[0]));
-        if self.problem.moves {
+        if self.problem.moves > 0.0 {
             let add = |to: (&mut Vector5<f64>, &mut DVec2), moved: Moved| {
                 let (slide, moment) = self.problem.moved(&moved);
                 *to.0 += self.along(slide, moment);

@@ -7,7 +7,7 @@ use super::equilibrium::{Problem, State};
 use super::face::{Face, Pressed};
 use super::slip::{self, Slipping, Space};
 use super::space::{Kind, Rotation};
-use super::{Answer, FaceAnswer, Note, Pads, SoftLimit};
+use super::{Answer, FaceAnswer, LARGE_TILT, Note, Pads, SoftLimit};
 use crate::mechanics::{COUPLING_SEARCH, refused};
 use crate::model::{Face as Side, Score, Slip, Status, Wrench};
 
@@ -121,11 +121,12 @@ impl<'a> Case<'a, '_> {
     /// What comes of the tilt if what it moves counts, or does not, other than in the problem: told where
     /// that changes much.
     fn told(&self, problem: &Problem<'a>, state: &Option<State<'a>>) -> Option<Note> {
-        let other = Problem { moves: !problem.moves, ..problem.clone() };
+        let counts = problem.moves > 0.0;
+        let other = Problem { moves: 1.0 - problem.moves, ..problem.clone() };
         let there = find(&other, self.pressed, false).1;
         let mu = |state: &Option<State<'_>>| Some(state.as_ref()?.slip?.mu);
         let (mine, theirs) = (mu(state), mu(&there));
-        let share = TOLD[usize::from(problem.moves)];
+        let share = TOLD[usize::from(counts)];
         if match (mine, theirs) {
             (Some(a), Some(b)) => (a - b).abs() <= share * a.max(b),
             (None, None) => true,
@@ -133,11 +134,11 @@ impl<'a> Case<'a, '_> {
         } {
             return None;
         }
-        let tilted = if problem.moves { state } else { &there };
+        let tilted = if counts { state } else { &there };
         let force = tilted
             .as_ref()
             .map_or([0.0; 2], |state| (state.faces[0].moved + state.faces[1].moved).xy().into());
-        Some(if problem.moves {
+        Some(if counts {
             Note::TiltPushesMuch { force, without: theirs }
         } else {
             Note::TiltPushes { force, mu_s: theirs }
@@ -178,7 +179,7 @@ impl<'a> Case<'a, '_> {
         });
         Problem {
             rolls,
-            moves: rolls && self.asked.moves,
+            moves: f64::from(u8::from(rolls && self.asked.moves)),
             faces: [&self.faces[0], &self.faces[1]],
             distance: self.distance,
             normal: self.normal,
@@ -278,6 +279,12 @@ impl<'a> Case<'a, '_> {
     }
 }
 
+/// Whether the part tilts so far that what it moves may hold it in another limit state than that on the
+/// branch from `d = 0`.
+pub(super) fn tilts_far(problem: &Problem<'_>, angles: &[f64]) -> bool {
+    problem.moves > 0.0 && problem.tilt(angles).length() > LARGE_TILT
+}
+
 /// Whether friction's lever is so long that there may be further limit states.
 pub(super) fn strong(problem: &Problem<'_>, mu: f64) -> bool {
     let width = problem.widths.iter().copied().fold(f64::INFINITY, f64::min);
@@ -291,7 +298,8 @@ fn find<'a>(
     search: bool,
 ) -> (Status, Option<State<'a>>) {
     let strong = |state: &State<'_>| strong(problem, state.slip.map_or(0.0, |slip| slip.mu));
-    let direct = problem.direct(pressed).filter(|state| !strong(state));
+    let direct = problem.direct(pressed);
+    let direct = direct.filter(|state| !strong(state) && !tilts_far(problem, &state.angles));
     match direct.or_else(|| problem.branch()) {
         Some(state) if problem.held.is_empty() || !search || !strong(&state) => {
             (Status::Ok, Some(state))

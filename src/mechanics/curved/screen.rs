@@ -10,7 +10,7 @@ use super::equilibrium::Problem;
 use super::face::Pressed;
 use super::floor::Floors;
 use super::joint::{Found, Joint, Mode, Near, Place, Reached};
-use super::limit::{Asked, Case, NO_LEVER, strong};
+use super::limit::{Asked, Case, NO_LEVER, strong, tilts_far};
 use super::space::{self, Kind, Rotation};
 use super::{Pads, slip};
 use crate::model::Wrench;
@@ -260,7 +260,9 @@ impl Screen<'_> {
     /// As [`Self::reach`], if that does not depend on what the load decides by itself.
     fn reach_settled(&self, value: f64) -> Option<(Compared, Place, f64)> {
         let (compared, place, most) = self.reach(value)?;
-        let open = strong(&self.problem, most / WEAK) || self.may_settle(&place);
+        let open = strong(&self.problem, most / WEAK)
+            || tilts_far(&self.problem, &place.angles)
+            || self.may_settle(&place);
         (!open).then_some((compared, place, most))
     }
 

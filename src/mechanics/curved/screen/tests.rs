@@ -3,7 +3,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::contact::surface::{Piece, Surfaces};
-use crate::model::{Gap, Wrench};
+use crate::model::{Gap, Status, Wrench};
 
 /// A ball by its facets, of which each touches it in its middle.
 fn facets(radius: f64, [x, y]: [f64; 2], off: f64) -> Vec<Piece> {
@@ -138,4 +138,31 @@ fn loads_on_what_rolls_are_compared() {
     }
     println!("{compared} compared, {moved} moved, {below} below");
     assert!(compared > 300 && moved > 50 && below > 200);
+}
+
+/// A load that tilts a plane far over a ball has several limit states: the one that it comes to as it grows
+/// counts, compared or solved, until there is none next to it.
+#[test]
+fn a_load_that_grows_stays_on_its_branch() {
+    let (surfaces, distance) = surfaces(6, [0.004, 0.0085], -0.002);
+    let pads = Pads::new(&surfaces).unwrap();
+    let load = |share: f64| Wrench {
+        force: share * DVec3::new(-5.9, -32.4, -33.0),
+        moment: share * DVec3::new(-0.26, 0.183, -0.154),
+    };
+    let mut known = pads.screen(distance, 200.0, &[load(1.0)]).unwrap();
+    let mut before: Option<f64> = None;
+    let mut tilt = 0.0;
+    for i in 8..=38 {
+        let wrench = load(f64::from(i) / 40.0);
+        let answer = pads.solve_pushed(distance, 200.0, &wrench);
+        let mu = answer.score.mu_s.unwrap();
+        assert!(before.is_none_or(|before| mu > before && mu < 1.06 * before), "{before:?} {mu}");
+        if let Compared::At(found) = known.compare(&wrench, 1e-3) {
+            assert!((found / mu - 1.0).abs() < 1e-9, "{found} {mu}");
+        }
+        (before, tilt) = (Some(mu), DVec2::from(answer.tilt.unwrap()).length());
+    }
+    assert!(tilt > 0.4, "{tilt}");
+    assert_eq!(pads.score(distance, 200.0, &load(1.0)).status, Status::TwistedOut);
 }
