@@ -97,6 +97,11 @@ fn recognised(
     if is_rough {
         regions = regions::grow(part, &given, rough);
         facets = Facets::new(part, &given, &regions);
+    } else if let Some(parted) =
+        regions::without_crumbs(part, &given, &regions, &facets.is_facet, floor)
+    {
+        regions = parted;
+        facets = Facets::new(part, &given, &regions);
     }
     if let Some(tolerance) = fit {
         let known = if faceted {

@@ -19,6 +19,9 @@ use super::topology::NONE;
 /// Angle between a wide triangle and its face: 0.2 degrees.
 const ANGLE: f64 = 0.2 * std::f64::consts::PI / 180.0;
 
+/// Share of a facet's area in one flat piece from which on the rest of it are crumbs of others.
+const MOSTLY: f64 = 0.4;
+
 /// Growth of a region's area after which its plane is fitted again: two, less rounding.
 const REFIT: f64 = 2.0 - 1e-6;
 
@@ -184,7 +187,61 @@ pub(super) fn twice_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
 pub(super) fn grow(part: &Repaired, given: &GivenFaces, flatness: Flatness) -> Regions {
     let patches = Patches::new(part, given, flatness);
     let seeds = patches.seeds(part);
-    grow_from(part, given, flatness, &patches, seeds.iter().map(|&seed| patches.triangles(seed)))
+    let starts = seeds.iter().map(|&seed| patches.triangles(seed));
+    grow_from(part, given, flatness, &patches, |triangle| given.of(triangle), starts)
+}
+
+/// Parts the facets that have taken in a little of what lies beside them, such as strips of a cylinder
+/// the first row of the ball that it ends in: nearly all of one is more exactly flat, within `distance`
+/// \[m\], than the whole. `None` where there is no such facet.
+pub(super) fn without_crumbs(
+    part: &Repaired,
+    given: &GivenFaces,
+    regions: &Regions,
+    is_facet: &[bool],
+    distance: f64,
+) -> Option<Regions> {
+    let mesh = &part.mesh;
+    let is_off = |index: usize| {
+        let plane = &regions.all[index].plane;
+        let corners = regions.triangles(index).iter().flat_map(|&t| mesh.corners(t));
+        is_facet[index] && corners.into_iter().any(|corner| plane.distance(corner) > distance)
+    };
+    let off: Vec<bool> = (0..regions.all.len()).map(is_off).collect();
+    if !off.contains(&true) {
+        return None;
+    }
+    let flatness = Flatness { distance, uncertainty: part.noise };
+    let patches = Patches::new(part, given, flatness);
+    let mut is_any = false;
+    let mut starts: Vec<&[u32]> = Vec::with_capacity(regions.all.len());
+    for (index, region) in regions.all.iter().enumerate() {
+        let triangles = regions.triangles(index);
+        if given.face(triangles[0]).is_some_and(|face| face.is_plane()) {
+            continue;
+        }
+        let whole = starts.len();
+        if off[index] {
+            let mut inside: Vec<u32> = triangles.iter().map(|&t| patches.of(t)).collect();
+            inside.sort_unstable();
+            inside.dedup();
+            let area = |patch: &u32| {
+                let twice = |&t: &u32| twice_normal(mesh.corners(t)).length();
+                0.5 * patches.triangles(*patch).iter().map(twice).sum::<f64>()
+            };
+            let mut pieces: Vec<(f64, u32)> = inside.iter().map(|p| (area(p), *p)).collect();
+            pieces.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            if pieces[0].0 > MOSTLY * region.area {
+                is_any = true;
+                starts.extend(pieces.iter().map(|piece| patches.triangles(piece.1)));
+            }
+        }
+        if starts.len() == whole {
+            starts.push(triangles);
+        }
+    }
+    let of = |triangle: u32| regions.of[triangle as usize];
+    is_any.then(|| grow_from(part, given, flatness, &patches, of, starts.into_iter()))
 }
 
 /// Grows regions once more, from the largest to the smallest: with its plane known, a large one takes
@@ -199,15 +256,16 @@ pub(super) fn grow_again(
     order.sort_by(|&a, &b| first.all[b].area.total_cmp(&first.all[a].area).then(a.cmp(&b)));
     let patches = Patches::new(part, given, flatness);
     let starts = order.into_iter().map(|index| first.triangles(index));
-    grow_from(part, given, flatness, &patches, starts)
+    grow_from(part, given, flatness, &patches, |triangle| given.of(triangle), starts)
 }
 
-/// Grows regions from groups of triangles, as far as those belong to no region yet.
+/// Grows regions from groups of triangles, as far as those belong to no region yet and `own` is the same.
 fn grow_from<'a>(
     part: &Repaired,
     given: &GivenFaces,
     flatness: Flatness,
     patches: &Patches,
+    own: impl Fn(u32) -> u32,
     starts: impl Iterator<Item = &'a [u32]>,
 ) -> Regions {
     let mesh = &part.mesh;
@@ -235,7 +293,7 @@ fn grow_from<'a>(
         let begin = order.len();
         order.extend(start.iter().copied().filter(|&t| region_of[t as usize] == NONE));
         let Some(&seed) = order.get(begin) else { continue };
-        let own = given.of(seed);
+        let within = own(seed);
         let corners = mesh.corners(seed);
         let mut sums = Sums::new(corners[0]);
         if std::ptr::eq(start, patches.triangles(patches.of(seed))) {
@@ -270,7 +328,7 @@ fn grow_from<'a>(
                             continue;
                         }
                         let other = twin / 3;
-                        if given.of(other) != own {
+                        if own(other) != within {
                             continue;
                         }
                         let patch = patches.of(other);
