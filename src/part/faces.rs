@@ -19,6 +19,9 @@ use crate::model::Frame;
 /// Distance of a corner from its face's plane, as a share of the part's diagonal: 1 um on 100 mm;
 /// the second value is for meshes that prove rougher.
 const DISTANCE: [f64; 2] = [1e-5, 3e-5];
+/// The same in steps to which the file rounds coordinates, where it proves rougher for them: corners lie
+/// up to 0.87 of one off.
+const ROUNDED: f64 = 1.2;
 /// Uncertainty of a corner as a share of the diagonal, besides that of 32-bit floats; likewise.
 const JITTER: [f64; 2] = [1e-7, 1e-5];
 /// Uncertainty of a vertex of a curved surface as a share of the diagonal: rounding in the file.
@@ -91,10 +94,23 @@ fn recognised(
     let mut given = GivenFaces::new(part);
     let mut regions = regions::grow(part, &given, fine);
     let mut facets = Facets::new(part, &given, &regions);
-    let is_rough = facets.are_rough(part, &regions, rough.distance);
-    let floor =
-        if is_rough { rough.distance } else { (FLOOR * part.diagonal).max(4.0 * part.noise) };
+    let mut is_rough = facets.are_rough(part, &regions, rough.distance);
+    let mut taken = fine;
+    let step = curves::rounding(part, &regions, &facets.borders, &given);
+    if is_rough && step > 0.0 && ROUNDED * step < rough.distance {
+        // The file says how rough it is.
+        taken = Flatness {
+            distance: fine.distance.max(ROUNDED * step),
+            uncertainty: fine.uncertainty.max(step),
+        };
+        regions = regions::grow(part, &given, taken);
+        facets = Facets::new(part, &given, &regions);
+        is_rough = facets.are_rough(part, &regions, rough.distance);
+    }
+    let exact = (FLOOR * part.diagonal).max(4.0 * part.noise);
+    let floor = if is_rough { rough.distance } else { exact }.max(step);
     if is_rough {
+        taken = rough;
         regions = regions::grow(part, &given, rough);
         facets = Facets::new(part, &given, &regions);
     } else if let Some(parted) =
@@ -113,14 +129,14 @@ fn recognised(
         fitted::fit(part, &mut given, found, Tolerance { distance: tolerance, faceted });
         return fitted_faces(part, &given, fine);
     }
-    if is_rough {
+    let taken = taken.distance;
+    if taken > fine.distance {
         part.health.warnings.push(format!(
             "flat faces are rough: corners up to {:.2} um off a plane were taken for flat (a clean mesh of this size needs {:.2})",
-            rough.distance * 1e6,
+            taken * 1e6,
             fine.distance * 1e6
         ));
     }
-    let taken = if is_rough { rough } else { fine }.distance;
     let mut is_smooth = vec![false; part.mesh.triangles.len()];
     if faceted {
         facets.is_facet.fill(false);

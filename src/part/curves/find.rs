@@ -66,7 +66,7 @@ pub(in crate::part) struct Curves {
     pub flats: Vec<u32>,
 }
 
-/// All curved faces of the part. `floor`: uncertainty of its vertices \[m\].
+/// All curved faces of the part. `floor`: uncertainty of its vertices \[m\], by [`rounding`] at least.
 pub(in crate::part) fn curved_faces(
     part: &Repaired,
     regions: &Regions,
@@ -75,24 +75,12 @@ pub(in crate::part) fn curved_faces(
     floor: f64,
 ) -> Curves {
     let mut is_curved = vec![false; regions.all.len()];
-    let is_bent = |facet: u32| {
-        let bends = borders.of(facet as usize).iter().filter(|border| {
-            let [a, b] =
-                [facet, border.other].map(|index| regions.all[index as usize].plane.normal);
-            (0.67..1.0 - 1.5e-7).contains(&a.dot(b))
-        });
-        bends.count() >= 2
-    };
-    let is_open =
-        |facet: &u32| given.is_empty() || given.of(regions.triangles(*facet as usize)[0]) == NONE;
-    let seeds: Vec<u32> =
-        (0..regions.all.len() as u32).filter(is_open).filter(|&facet| is_bent(facet)).collect();
+    let seeds = bent(regions, borders, given);
     let mut described = given_faces(part, given);
     if seeds.is_empty() {
         return Curves { faces: described, is_curved, flats: Vec::new() };
     }
-    let mut net = Net::new(part, regions, borders, given, floor);
-    net.floor = floor.max(quantum(&net, &seeds));
+    let net = Net::new(part, regions, borders, given, floor);
     let mut growth = Growth::new(&net);
     let mut faces: Vec<Face> = Vec::new();
     growth.exact(&seeds, &mut faces);
@@ -137,10 +125,34 @@ pub(super) fn sort(faces: &mut [CurvedFace], diagonal: f64) {
     faces.sort_by_cached_key(|face| (std::cmp::Reverse(key(face)), place(face)));
 }
 
+/// Regions that bend against two neighbours or more, of faces that the file does not state.
+fn bent(regions: &Regions, borders: &Borders, given: &GivenFaces) -> Vec<u32> {
+    let is_bent = |facet: &u32| {
+        let bends = borders.of(*facet as usize).iter().filter(|border| {
+            let [a, b] =
+                [*facet, border.other].map(|index| regions.all[index as usize].plane.normal);
+            (0.67..1.0 - 1.5e-7).contains(&a.dot(b))
+        });
+        bends.count() >= 2
+    };
+    let is_open =
+        |facet: &u32| given.is_empty() || given.of(regions.triangles(*facet as usize)[0]) == NONE;
+    (0..regions.all.len() as u32).filter(is_open).filter(is_bent).collect()
+}
+
 /// The step to which the file rounds coordinates of curved surfaces \[m\], decimal or binary, where
 /// it is seen in all of them; 0 otherwise.
-fn quantum(net: &Net<'_>, seeds: &[u32]) -> f64 {
-    let part = net.part;
+pub(in crate::part) fn rounding(
+    part: &Repaired,
+    regions: &Regions,
+    borders: &Borders,
+    given: &GivenFaces,
+) -> f64 {
+    let seeds = bent(regions, borders, given);
+    if seeds.is_empty() {
+        return 0.0;
+    }
+    let net = Net::new(part, regions, borders, given, 0.0);
     let stride = seeds.len().div_ceil(SAMPLE);
     // A program that cuts facets up may not round what it adds.
     let coordinates: Vec<f64> = seeds

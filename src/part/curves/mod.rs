@@ -22,7 +22,7 @@ mod seed;
 mod trim;
 
 pub(super) use describe::arcs;
-pub(super) use find::{Curves, curved_faces, given_faces};
+pub(super) use find::{Curves, curved_faces, given_faces, rounding};
 pub(super) use fit::{Kind, Profile, Surface};
 pub(super) use free::free_faces;
 pub(super) use seed::{cone_by_circles, cylinder_along, outer, smallest_direction, sphere_through};
