@@ -19,13 +19,13 @@ use crate::model::Frame;
 /// Distance of a corner from its face's plane, as a share of the part's diagonal: 1 um on 100 mm;
 /// the second value is for meshes that prove rougher.
 const DISTANCE: [f64; 2] = [1e-5, 3e-5];
-/// The same in steps to which the file rounds coordinates, where it proves rougher for them: corners lie
-/// up to 0.87 of one off.
-const ROUNDED: f64 = 1.2;
 /// Uncertainty of a corner as a share of the diagonal, besides that of 32-bit floats; likewise.
 const JITTER: [f64; 2] = [1e-7, 1e-5];
 /// Uncertainty of a vertex of a curved surface as a share of the diagonal: rounding in the file.
 const FLOOR: f64 = 5e-7;
+/// The same on a rough mesh in steps to which the file rounds coordinates: corners lie up to 0.87 of one
+/// off.
+const ROUNDED: f64 = 1.4;
 /// Width (twice area over half perimeter) below which a face is no place for a pad, as a share of
 /// the diagonal.
 const NARROWEST: f64 = 5e-4;
@@ -94,27 +94,20 @@ fn recognised(
     let mut given = GivenFaces::new(part);
     let mut regions = regions::grow(part, &given, fine);
     let mut facets = Facets::new(part, &given, &regions);
-    let mut is_rough = facets.are_rough(part, &regions, rough.distance);
-    let mut taken = fine;
+    let is_rough = facets.are_rough(part, &regions, rough.distance);
     let step = curves::rounding(part, &regions, &facets.borders, &given);
-    if is_rough && step > 0.0 && ROUNDED * step < rough.distance {
-        // The file says how rough it is.
-        taken = Flatness {
-            distance: fine.distance.max(ROUNDED * step),
-            uncertainty: fine.uncertainty.max(step),
-        };
-        regions = regions::grow(part, &given, taken);
-        facets = Facets::new(part, &given, &regions);
-        is_rough = facets.are_rough(part, &regions, rough.distance);
-    }
-    let exact = (FLOOR * part.diagonal).max(4.0 * part.noise);
-    let floor = if is_rough { rough.distance } else { exact }.max(step);
+    let exact = (FLOOR * part.diagonal).max(4.0 * part.noise).max(step);
+    let floors = match is_rough {
+        // Where the file rounds coordinates it says how rough it is.
+        true if step > 0.0 => [rough.distance, rough.distance.min(ROUNDED * step)],
+        true => [rough.distance; 2],
+        false => [exact; 2],
+    };
     if is_rough {
-        taken = rough;
         regions = regions::grow(part, &given, rough);
         facets = Facets::new(part, &given, &regions);
     } else if let Some(parted) =
-        regions::without_crumbs(part, &given, &regions, &facets.is_facet, floor)
+        regions::without_crumbs(part, &given, &regions, &facets.is_facet, exact)
     {
         regions = parted;
         facets = Facets::new(part, &given, &regions);
@@ -123,20 +116,20 @@ fn recognised(
         let known = if faceted {
             Vec::new()
         } else {
-            curves::curved_faces(part, &regions, &facets.borders, &given, floor).faces
+            curves::curved_faces(part, &regions, &facets.borders, &given, floors).faces
         };
         let found = known.into_iter().filter(|face| face.source == FaceSource::Mesh).collect();
         fitted::fit(part, &mut given, found, Tolerance { distance: tolerance, faceted });
         return fitted_faces(part, &given, fine);
     }
-    let taken = taken.distance;
-    if taken > fine.distance {
+    if is_rough {
         part.health.warnings.push(format!(
             "flat faces are rough: corners up to {:.2} um off a plane were taken for flat (a clean mesh of this size needs {:.2})",
-            taken * 1e6,
+            rough.distance * 1e6,
             fine.distance * 1e6
         ));
     }
+    let taken = if is_rough { rough } else { fine }.distance;
     let mut is_smooth = vec![false; part.mesh.triangles.len()];
     if faceted {
         facets.is_facet.fill(false);
@@ -145,7 +138,7 @@ fn recognised(
         return (flats(part, &given, &regions, &facets, taken), Vec::new());
     }
     let Curves { faces: curved, is_curved, flats } =
-        curves::curved_faces(part, &regions, &facets.borders, &given, floor);
+        curves::curved_faces(part, &regions, &facets.borders, &given, floors);
     for (is_facet, is_curved) in facets.is_facet.iter_mut().zip(is_curved) {
         *is_facet |= is_curved;
     }

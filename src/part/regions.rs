@@ -19,8 +19,10 @@ use super::topology::NONE;
 /// Angle between a wide triangle and its face: 0.2 degrees.
 const ANGLE: f64 = 0.2 * std::f64::consts::PI / 180.0;
 
-/// Share of a facet's area in one flat piece from which on the rest of it are crumbs of others.
+/// Share of a facet's area in one flat piece from which on the rest of it are crumbs of others, and its
+/// length over its width.
 const MOSTLY: f64 = 0.4;
+const LONG: f64 = 6.0;
 
 /// Growth of a region's area after which its plane is fitted again: two, less rounding.
 const REFIT: f64 = 2.0 - 1e-6;
@@ -231,7 +233,9 @@ pub(super) fn without_crumbs(
             };
             let mut pieces: Vec<(f64, u32)> = inside.iter().map(|p| (area(p), *p)).collect();
             pieces.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-            if pieces[0].0 > MOSTLY * region.area {
+            let long = patches.triangles(pieces[0].1).iter().map(|&t| longest(mesh.corners(t)));
+            let length = long.fold(0.0, f64::max);
+            if pieces[0].0 > MOSTLY * region.area && length * length > LONG * pieces[0].0 {
                 is_any = true;
                 starts.extend(pieces.iter().map(|piece| patches.triangles(piece.1)));
             }
@@ -435,6 +439,11 @@ pub(super) fn is_flat(part: &Repaired, triangles: &[u32], sums: &Sums, flatness:
     plane.is_some_and(|plane| lie_in(&part.mesh, triangles, &plane, flatness))
 }
 
+/// Length of the longest edge.
+fn longest([a, b, c]: [DVec3; 3]) -> f64 {
+    (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared()).sqrt()
+}
+
 fn lie_in(mesh: &Mesh, triangles: &[u32], plane: &Plane, flatness: Flatness) -> bool {
     triangles.iter().all(|&triangle| lies_in(mesh.corners(triangle), plane, flatness))
 }
@@ -446,9 +455,7 @@ fn lies_in(corners: [DVec3; 3], plane: &Plane, flatness: Flatness) -> bool {
         return false;
     }
     let cross = twice_normal(corners);
-    let [a, b, c] = corners;
-    let longest =
-        (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared()).sqrt();
+    let longest = longest(corners);
     let twice_area = cross.length();
     // Altitude over the longest edge: corners off by u tilt the triangle by up to 2 u / altitude.
     let allowed =

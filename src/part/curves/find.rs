@@ -66,13 +66,14 @@ pub(in crate::part) struct Curves {
     pub flats: Vec<u32>,
 }
 
-/// All curved faces of the part. `floor`: uncertainty of its vertices \[m\], by [`rounding`] at least.
+/// All curved faces of the part. `floors`: uncertainty of its vertices \[m\], by [`rounding`] at least, and
+/// what may be enough for smaller curves.
 pub(in crate::part) fn curved_faces(
     part: &Repaired,
     regions: &Regions,
     borders: &Borders,
     given: &GivenFaces,
-    floor: f64,
+    floors: [f64; 2],
 ) -> Curves {
     let mut is_curved = vec![false; regions.all.len()];
     let seeds = bent(regions, borders, given);
@@ -80,10 +81,16 @@ pub(in crate::part) fn curved_faces(
     if seeds.is_empty() {
         return Curves { faces: described, is_curved, flats: Vec::new() };
     }
-    let net = Net::new(part, regions, borders, given, floor);
+    let net = Net::new(part, regions, borders, given, floors[0]);
+    let finer = (floors[1] < floors[0]).then(|| net.with_floor(floors[1]));
     let mut growth = Growth::new(&net);
     let mut faces: Vec<Face> = Vec::new();
     growth.exact(&seeds, &mut faces);
+    if let Some(finer) = &finer {
+        growth.net = finer;
+        growth.exact(&seeds, &mut faces);
+        growth.net = &net;
+    }
     growth.join_rows(&mut faces);
     growth.noisy(&seeds, &mut faces);
     growth.join_same(&mut faces);

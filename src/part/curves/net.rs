@@ -21,6 +21,7 @@ const FEW_CORNERS: usize = 8;
 
 /// Regions, their borders, and the vertices where three of them meet: only those surely lie on a
 /// curved surface, as facets may have been subdivided.
+#[derive(Clone)]
 pub(super) struct Net<'a> {
     pub part: &'a Repaired,
     pub regions: &'a Regions,
@@ -62,6 +63,11 @@ impl<'a> Net<'a> {
             }
         }
         Self { part, regions, borders, given, is_corner, floor }
+    }
+
+    /// The same with another uncertainty of a vertex \[m\].
+    pub(super) fn with_floor(&self, floor: f64) -> Self {
+        Self { floor, ..self.clone() }
     }
 
     pub(super) fn normal(&self, facet: u32) -> DVec3 {
