@@ -23,8 +23,9 @@ const DISTANCE: [f64; 2] = [1e-5, 3e-5];
 const JITTER: [f64; 2] = [1e-7, 1e-5];
 /// Uncertainty of a vertex of a curved surface as a share of the diagonal: rounding in the file.
 const FLOOR: f64 = 5e-7;
-/// The same on a rough mesh in steps to which the file rounds coordinates: corners lie up to 0.87 of one
-/// off.
+/// Distance from a plane, in steps of the coordinates' rounding, that keeps planes from falling apart, and the
+/// uncertainty of a corner where they do: it is moved by up to 0.87 of a step.
+const SAFE: f64 = 2.0;
 const ROUNDED: f64 = 1.4;
 /// Width (twice area over half perimeter) below which a face is no place for a pad, as a share of
 /// the diagonal.
@@ -94,8 +95,9 @@ fn recognised(
     let mut given = GivenFaces::new(part);
     let mut regions = regions::grow(part, &given, fine);
     let mut facets = Facets::new(part, &given, &regions);
-    let is_rough = facets.are_rough(part, &regions, rough.distance);
     let step = curves::rounding(part, &regions, &facets.borders, &given);
+    let is_rounded = SAFE * step > fine.distance;
+    let is_rough = facets.are_rough(part, &regions, rough.distance, is_rounded);
     let exact = (FLOOR * part.diagonal).max(4.0 * part.noise).max(step);
     let floors = match is_rough {
         // Where the file rounds coordinates it says how rough it is.

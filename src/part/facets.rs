@@ -130,8 +130,15 @@ impl Facets {
     /// Whether flat faces have crumbled because the mesh is rougher than the growth allowed for:
     /// next to them lie fragments that a distance `within` \[m\] would take in, and these stick out
     /// on both sides. The first strips of a finely tessellated fillet lie on one side, and so do
-    /// not count.
-    pub(super) fn are_rough(&self, part: &Repaired, regions: &Regions, within: f64) -> bool {
+    /// not count. Where `is_rounded` the file's own rounding is known to be as coarse: then halves of planes
+    /// that all bend the same way count as well.
+    pub(super) fn are_rough(
+        &self,
+        part: &Repaired,
+        regions: &Regions,
+        within: f64,
+        is_rounded: bool,
+    ) -> bool {
         let (mut flat, mut above, mut below) = (0.0, 0.0, 0.0);
         for (index, region) in regions.all.iter().enumerate() {
             if !self.is_facet[index] {
@@ -165,7 +172,8 @@ impl Facets {
             }
         }
         let [convex, concave] = self.folds(part, regions, within);
-        if convex + concave > FOLDED * flat && convex.min(concave) > FOLDED / 10.0 * flat {
+        let both_ways = convex.min(concave) > FOLDED / 10.0 * flat;
+        if convex + concave > FOLDED * flat && (is_rounded || both_ways) {
             return true;
         }
         // Measured: clean tessellations stay below 3.0e-3 in all or have nothing on one side;

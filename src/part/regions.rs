@@ -21,7 +21,7 @@ const ANGLE: f64 = 0.2 * std::f64::consts::PI / 180.0;
 
 /// Share of a facet's area in one flat piece from which on the rest of it are crumbs of others, and its
 /// length over its width.
-const MOSTLY: f64 = 0.4;
+const MOSTLY: f64 = 0.8;
 const LONG: f64 = 6.0;
 
 /// Growth of a region's area after which its plane is fitted again: two, less rounding.
@@ -204,48 +204,52 @@ pub(super) fn without_crumbs(
     distance: f64,
 ) -> Option<Regions> {
     let mesh = &part.mesh;
+    let twice = |triangle: u32| twice_normal(mesh.corners(triangle)).length();
+    let is_long = |index: usize| {
+        let triangles = regions.triangles(index).iter();
+        let largest = triangles.max_by(|a, b| twice(**a).total_cmp(&twice(**b)));
+        largest.is_some_and(|&t| longest(mesh.corners(t)).powi(2) > LONG * twice(t))
+    };
     let is_off = |index: usize| {
         let plane = &regions.all[index].plane;
         let corners = regions.triangles(index).iter().flat_map(|&t| mesh.corners(t));
-        is_facet[index] && corners.into_iter().any(|corner| plane.distance(corner) > distance)
+        corners.into_iter().any(|corner| plane.distance(corner) > distance)
     };
-    let off: Vec<bool> = (0..regions.all.len()).map(is_off).collect();
-    if !off.contains(&true) {
+    let tried: Vec<bool> =
+        (0..regions.all.len()).map(|i| is_facet[i] && is_long(i) && is_off(i)).collect();
+    if !tried.contains(&true) {
         return None;
     }
     let flatness = Flatness { distance, uncertainty: part.noise };
     let patches = Patches::new(part, given, flatness);
-    let mut is_any = false;
-    let mut starts: Vec<&[u32]> = Vec::with_capacity(regions.all.len());
-    for (index, region) in regions.all.iter().enumerate() {
-        let triangles = regions.triangles(index);
-        if given.face(triangles[0]).is_some_and(|face| face.is_plane()) {
-            continue;
-        }
-        let whole = starts.len();
-        if off[index] {
-            let mut inside: Vec<u32> = triangles.iter().map(|&t| patches.of(t)).collect();
-            inside.sort_unstable();
-            inside.dedup();
-            let area = |patch: &u32| {
-                let twice = |&t: &u32| twice_normal(mesh.corners(t)).length();
-                0.5 * patches.triangles(*patch).iter().map(twice).sum::<f64>()
-            };
-            let mut pieces: Vec<(f64, u32)> = inside.iter().map(|p| (area(p), *p)).collect();
-            pieces.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-            let long = patches.triangles(pieces[0].1).iter().map(|&t| longest(mesh.corners(t)));
-            let length = long.fold(0.0, f64::max);
-            if pieces[0].0 > MOSTLY * region.area && length * length > LONG * pieces[0].0 {
-                is_any = true;
-                starts.extend(pieces.iter().map(|piece| patches.triangles(piece.1)));
+    let parted = |is_parted: &[bool]| {
+        let mut starts: Vec<&[u32]> = Vec::with_capacity(regions.all.len());
+        for (index, is_parted) in is_parted.iter().enumerate() {
+            let triangles = regions.triangles(index);
+            if *is_parted {
+                let mut order = triangles.to_vec();
+                order.sort_by(|a, b| twice(*b).total_cmp(&twice(*a)).then(a.cmp(b)));
+                starts.extend(order.iter().map(|&t| patches.triangles(patches.of(t))));
+            } else if !given.face(triangles[0]).is_some_and(|face| face.is_plane()) {
+                starts.push(triangles);
             }
         }
-        if starts.len() == whole {
-            starts.push(triangles);
-        }
+        let of = |triangle: u32| regions.of[triangle as usize];
+        grow_from(part, given, flatness, &patches, of, starts.into_iter())
+    };
+    let all = parted(&tried);
+    let mut largest = vec![0.0_f64; regions.all.len()];
+    for (index, piece) in all.all.iter().enumerate() {
+        let whole = &mut largest[regions.of[all.triangles(index)[0] as usize] as usize];
+        *whole = whole.max(piece.area);
     }
-    let of = |triangle: u32| regions.of[triangle as usize];
-    is_any.then(|| grow_from(part, given, flatness, &patches, of, starts.into_iter()))
+    let is_mostly = |index: usize| largest[index] > MOSTLY * regions.all[index].area;
+    let kept: Vec<bool> = tried.iter().enumerate().map(|(i, t)| *t && is_mostly(i)).collect();
+    match kept.contains(&true) {
+        true if kept == tried => Some(all),
+        true => Some(parted(&kept)),
+        false => None,
+    }
 }
 
 /// Grows regions once more, from the largest to the smallest: with its plane known, a large one takes

@@ -448,6 +448,62 @@ fn rounded_boxes_have_their_planes_and_fillets() {
     }
 }
 
+/// Beside the top of the bend a strip of a leg is nearly level with the bend's first row: the legs are whole
+/// cylinders all the same.
+#[test]
+fn bent_tubes_have_their_legs() {
+    let (bend, leg, quarter) = (30.0, 30.0, 30.0 * FRAC_PI_2);
+    for (n, steps) in [(100, 100), (200, 50), (200, 200)] {
+        let what = format!("{n} x {steps}");
+        let rows = (0..=steps).map(|k| leg + quarter * f64::from(k) / f64::from(steps));
+        let places = std::iter::once(0.0).chain(rows).chain([2.0 * leg + quarter]);
+        let profile: Vec<DVec2> = places.map(|s| DVec2::new(s, 10.0)).collect();
+        let mut tube = Solid::lathe(&profile, n, |_| 0.0);
+        for vertex in &mut tube.vertices {
+            let past = vertex.z - leg;
+            let angle = (past / bend).clamp(0.0, FRAC_PI_2);
+            let (sin, cos) = angle.sin_cos();
+            let straight = past - bend * angle;
+            let x = (bend + vertex.x) * cos - straight * sin;
+            *vertex = DVec3::new(x, vertex.y, (bend + vertex.x) * sin + straight * cos);
+        }
+        let part = tube.part(31, 0.0);
+        let kinds: Vec<&str> = part.curved.iter().map(|face| face.shape.name()).collect();
+        assert_eq!(kinds, ["torus", "cylinder", "cylinder"], "{what}");
+        assert_eq!(part.faces.len(), 2, "{what}");
+        for face in &part.curved[1..] {
+            let Shape::Cylinder { radius, turn, .. } = face.shape else { panic!("{what}") };
+            assert!((radius - 10e-3).abs() < 1e-7 && turn == TAU, "{what}: {radius} {turn}");
+            // Of the prism, and a few facets of the bend that are level with its strips.
+            let side = f64::from(n) * 20.0 * (PI / f64::from(n)).sin() * leg;
+            assert!((face.area * 1e6 / side - 1.0).abs() < 0.01, "{what}: {}", face.area * 1e6);
+        }
+    }
+}
+
+/// Rounding makes the flats of the plate rough, which says less of its corners than the step itself.
+#[test]
+fn corners_of_a_plate_are_found_in_coordinates_of_a_micrometre() {
+    let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
+    let outline: Vec<DVec2> = corners
+        .iter()
+        .enumerate()
+        .flat_map(|(k, &(x, y))| {
+            let from = FRAC_PI_2 * k as f64;
+            arc(DVec2::new(28.0 * x, 18.0 * y), 2.0, from, from + FRAC_PI_2, 12)
+        })
+        .collect();
+    for seed in [5, 23, 41] {
+        let part = Solid::extrude(&outline, 3.0).rounded(seed, 1e-3);
+        assert_eq!((part.faces.len(), part.curved.len()), (6, 4), "{seed}");
+        for face in &part.curved {
+            let Shape::Cylinder { radius, turn, .. } = face.shape else { panic!("{seed}") };
+            assert!((radius - 2e-3).abs() < 5e-6, "{seed}: {radius}");
+            assert!((turn - FRAC_PI_2).abs() < 1e-2, "{seed}: {turn}");
+        }
+    }
+}
+
 /// Curved faces of each kind in the exact part, and those that have to be found: the others are
 /// narrower than 26 degrees (tips and roots of the gear, corners of the feature block) or pieces of
 /// an irregular mesh (chamfers of the nut).

@@ -124,6 +124,15 @@ impl Solid {
         }
     }
 
+    /// Moved by a pose, coordinates rounded to `step` [mm].
+    pub(crate) fn rounded(mut self, seed: u64, step: f64) -> Part {
+        let (turn, shift) = pose(seed);
+        for vertex in &mut self.vertices {
+            *vertex = ((turn * *vertex + shift) / step).round() * step * 1e-3;
+        }
+        Part::from_triangles("solid", &self.vertices, &self.triangles).unwrap()
+    }
+
     /// Moved by a pose, each coordinate by up to `noise` [mm], and rounded to 32-bit floats as in an
     /// STL file.
     pub(crate) fn part(mut self, seed: u64, noise: f64) -> Part {
