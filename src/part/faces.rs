@@ -99,12 +99,11 @@ fn recognised(
     let is_rounded = SAFE * step > fine.distance;
     let is_rough = facets.are_rough(part, &regions, rough.distance, is_rounded);
     let exact = (FLOOR * part.diagonal).max(4.0 * part.noise).max(step);
-    let floors = match is_rough {
-        // Where the file rounds coordinates it says how rough it is.
-        true if step > 0.0 => [rough.distance, rough.distance.min(ROUNDED * step)],
-        true => [rough.distance; 2],
-        false => [exact; 2],
-    };
+    let mut floors = [if is_rough { rough.distance } else { exact }; 2];
+    if is_rough && step > 0.0 {
+        // The file says how rough it is where it rounds coordinates.
+        floors[1] = floors[0].min(ROUNDED * step);
+    }
     if is_rough {
         regions = regions::grow(part, &given, rough);
         facets = Facets::new(part, &given, &regions);

@@ -424,19 +424,21 @@ fn strips_cut_off_beside_a_flat_belong_to_the_round_face() {
     assert_eq!(part.faces.len(), 5);
 }
 
+/// A rectangle about the origin with arcs of `radius` about the corners of one of these half sides.
+fn rounded_rectangle(half: DVec2, radius: f64, steps: u32) -> Vec<DVec2> {
+    let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
+    let arcs = corners.iter().enumerate().flat_map(|(k, &(x, y))| {
+        let from = FRAC_PI_2 * k as f64;
+        arc(half * DVec2::new(x, y), radius, from, from + FRAC_PI_2, steps)
+    });
+    arcs.collect()
+}
+
 #[test]
 fn rounded_boxes_have_their_planes_and_fillets() {
     // Vertical edges rounded: four cylinders between six planes.
     for steps in [3, 4, 8, 16] {
-        let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
-        let outline: Vec<DVec2> = corners
-            .iter()
-            .enumerate()
-            .flat_map(|(k, &(x, y))| {
-                let from = FRAC_PI_2 * k as f64;
-                arc(DVec2::new(15.0 * x, 9.0 * y), 4.0, from, from + FRAC_PI_2, steps)
-            })
-            .collect();
+        let outline = rounded_rectangle(DVec2::new(15.0, 9.0), 4.0, steps);
         let part = Solid::extrude(&outline, 20.0).part(23, 0.0);
         assert_eq!((part.curved.len(), part.curved[0].shape.name()), (4, "cylinder"), "{steps}");
         let own = 6 + if steps == 3 { part.faces.len() - 6 } else { 0 };
@@ -484,17 +486,9 @@ fn bent_tubes_have_their_legs() {
 /// Rounding makes the flats of the plate rough, which says less of its corners than the step itself.
 #[test]
 fn corners_of_a_plate_are_found_in_coordinates_of_a_micrometre() {
-    let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
-    let outline: Vec<DVec2> = corners
-        .iter()
-        .enumerate()
-        .flat_map(|(k, &(x, y))| {
-            let from = FRAC_PI_2 * k as f64;
-            arc(DVec2::new(28.0 * x, 18.0 * y), 2.0, from, from + FRAC_PI_2, 12)
-        })
-        .collect();
+    let outline = rounded_rectangle(DVec2::new(28.0, 18.0), 2.0, 12);
     for seed in [5, 23, 41] {
-        let part = Solid::extrude(&outline, 3.0).rounded(seed, 1e-3);
+        let part = Solid::extrude(&outline, 3.0).rounded(seed, 0.0, 1e-3).unmoved();
         assert_eq!((part.faces.len(), part.curved.len()), (6, 4), "{seed}");
         for face in &part.curved {
             let Shape::Cylinder { radius, turn, .. } = face.shape else { panic!("{seed}") };

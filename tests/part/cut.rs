@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use glam::{DVec2, DVec3};
 use gripfast::part::{Part, Shape};
 
-use crate::solids::{Random, Solid, arc, pose};
+use crate::solids::{Solid, arc};
 use crate::support::reference;
 
 /// Kind, sizes that matter, area and middle of each face.
@@ -32,22 +32,6 @@ fn cuts(solid: &Solid) -> [(&'static str, Solid); 4] {
         ("in four", solid.subdivided()),
         ("in 16", solid.subdivided().subdivided()),
     ]
-}
-
-fn part(solid: &Solid) -> Part {
-    let vertices: Vec<DVec3> = solid.vertices.iter().map(|vertex| *vertex * 1e-3).collect();
-    Part::from_triangles("solid", &vertices, &solid.triangles).unwrap()
-}
-
-/// In a pose along no axis, with coordinates moved by up to `noise` and rounded to `step` [mm].
-fn posed(mut solid: Solid, noise: f64, step: f64) -> Solid {
-    let (turn, shift) = pose(3);
-    let mut random = Random(11);
-    for vertex in &mut solid.vertices {
-        let moved = noise * DVec3::new(random.next(), random.next(), random.next());
-        *vertex = ((turn * *vertex + shift + moved) / step).round() * step;
-    }
-    solid
 }
 
 /// The faces of a part but those of free form, which are told by all vertices.
@@ -97,9 +81,9 @@ fn assert_same_of(what: &str, whole: &Part, (first, mut left): (Faces, Faces), t
 }
 
 fn check(name: &str, solid: &Solid, tolerance: f64) -> Part {
-    let whole = part(solid);
+    let whole = solid.unmoved();
     for (how, cut) in cuts(solid) {
-        assert_same(&format!("{name} cut {how}"), &whole, &part(&cut), tolerance);
+        assert_same(&format!("{name} cut {how}"), &whole, &cut.unmoved(), tolerance);
     }
     whole
 }
@@ -163,7 +147,7 @@ fn cylinders_of_any_size_are_found_however_strips_are_cut() {
         let count =
             |name: &str| whole.curved.iter().filter(|face| face.shape.name() == name).count();
         assert_eq!([count("cylinder"), count("cone"), count("sphere")], [5, 1, 1], "{around}");
-        let posed = posed(shaft(around), 0.0, 1e-6);
+        let posed = shaft(around).rounded(3, 0.0, 1e-6);
         check(&format!("posed shaft of {around}"), &posed, 1e-6);
         let whole = check(&format!("disc of {around}"), &disc(around), 1e-7);
         assert!(whole.curved.iter().any(|face| face.shape.name() == "torus"), "{around}");
@@ -194,14 +178,14 @@ fn rounded_and_noisy_round_faces_are_found_however_facets_are_cut() {
         for strips in [48, 80, 120] {
             let third = 2.0 * PI / 3.0;
             let solid = Solid::extrude(&arc(DVec2::ZERO, 20.0, -third, third, strips), 130.0);
-            let solid = posed(solid, noise, step);
-            let whole = part(&solid);
+            let solid = solid.rounded(3, noise, step);
+            let whole = solid.unmoved();
             let first: Faces = round(&whole);
             let kinds: Vec<&str> = first.iter().map(|face| face.0).collect();
             assert_eq!(kinds, ["cylinder"], "{name} {strips}");
             for (how, cut) in cuts(&solid) {
                 let what = format!("{name} {strips} cut {how}");
-                assert_same_of(&what, &whole, (first.clone(), round(&part(&cut))), 1e-4);
+                assert_same_of(&what, &whole, (first.clone(), round(&cut.unmoved())), 1e-4);
             }
         }
     }
@@ -214,16 +198,16 @@ fn short_arcs_of_rounded_coordinates_are_found_however_strips_are_cut() {
         let mut outline = arc(DVec2::ZERO, 20.0, -PI / 12.0, PI / 12.0, strips);
         outline.extend([DVec2::new(10.0, 14.0), DVec2::new(-15.0, 14.0)]);
         outline.extend([DVec2::new(-15.0, -14.0), DVec2::new(10.0, -14.0)]);
-        let solid = posed(Solid::extrude(&outline, 130.0), 0.0, 1e-3);
+        let solid = Solid::extrude(&outline, 130.0).rounded(3, 0.0, 1e-3);
         let round = |part: &Part| -> Faces {
             told(part).into_iter().filter(|face| face.0 != "plane").collect()
         };
-        let whole = part(&solid);
+        let whole = solid.unmoved();
         let first = round(&whole);
         assert!(first.len() == 1 && first[0].0 == "cylinder", "{strips}: {first:?}");
         for (how, cut) in cuts(&solid) {
             let what = format!("{strips} strips cut {how}");
-            assert_same_of(&what, &whole, (first.clone(), round(&part(&cut))), 1e-4);
+            assert_same_of(&what, &whole, (first.clone(), round(&cut.unmoved())), 1e-4);
         }
     }
 }

@@ -124,13 +124,21 @@ impl Solid {
         }
     }
 
-    /// Moved by a pose, coordinates rounded to `step` [mm].
-    pub(crate) fn rounded(mut self, seed: u64, step: f64) -> Part {
+    /// In a pose along no axis, with coordinates moved by up to `noise` and rounded to `step` [mm].
+    pub(crate) fn rounded(mut self, seed: u64, noise: f64, step: f64) -> Self {
         let (turn, shift) = pose(seed);
+        let mut random = Random(11);
         for vertex in &mut self.vertices {
-            *vertex = ((turn * *vertex + shift) / step).round() * step * 1e-3;
+            let moved = noise * DVec3::new(random.next(), random.next(), random.next());
+            *vertex = ((turn * *vertex + shift + moved) / step).round() * step;
         }
-        Part::from_triangles("solid", &self.vertices, &self.triangles).unwrap()
+        self
+    }
+
+    /// As it stands.
+    pub(crate) fn unmoved(&self) -> Part {
+        let vertices: Vec<DVec3> = self.vertices.iter().map(|vertex| *vertex * 1e-3).collect();
+        Part::from_triangles("solid", &vertices, &self.triangles).unwrap()
     }
 
     /// Moved by a pose, each coordinate by up to `noise` [mm], and rounded to 32-bit floats as in an

@@ -179,7 +179,7 @@ impl<'a> Case<'a, '_> {
         });
         Problem {
             rolls,
-            moves: f64::from(u8::from(rolls && self.asked.moves)),
+            moves: if rolls && self.asked.moves { 1.0 } else { 0.0 },
             faces: [&self.faces[0], &self.faces[1]],
             distance: self.distance,
             normal: self.normal,
