@@ -35,11 +35,11 @@ use survey::Surveys;
 
 use super::environment::Environment;
 use super::options::ProposeOptions;
-use super::patch::PatchIndex;
+use super::patch::{PatchIndex, Scratch, Touch, TurnedPad};
 use crate::clash::{Motion, Sweep, sweeps};
 use crate::error::{Error, Result};
 use crate::geometry::polygon::{self, Bounds2, rings};
-use crate::geometry::{contains, even_odd, overlay};
+use crate::geometry::{contains, even_odd, overlay, ring_area};
 use crate::gripper::{Gripper, Jaws};
 use crate::model::{Frame, Patch, Polygon, Ring};
 use crate::part::{FacePair, PairKind, Part};
@@ -50,6 +50,10 @@ const SAME_DIRECTION: f64 = 1e-6;
 /// Faces within this distance of one plane, as a share of the part's diagonal, lie in one plane:
 /// twice the tolerance of the planes themselves.
 const SAME_PLANE: f64 = 2e-5;
+/// Share of its bounds that an overlap fills from which on a pad middle over middle covers the most of it.
+const FULL: f64 = 0.5;
+/// Places at which what a pad covers of one that fills less is looked at, over all angles.
+const COVERED: usize = 120;
 /// At most this many positions on one site; more is a slip of the unit.
 const MOST_POSITIONS: f64 = 2e7;
 
@@ -88,8 +92,9 @@ pub(super) struct Site {
     pub(super) rise: f64,
     /// Roughness of a plane \[m\].
     pub(super) flush: f64,
-    /// Area in which the two planes' faces overlap [m^2].
-    pub(super) overlap: f64,
+    /// Largest part of the two sides' overlap that a pad may cover: all of it, or what one covers as far as
+    /// the places tell [m^2].
+    pub(super) most: f64,
     /// Faces that pads may touch: the gripped ones and others in the same planes.
     pub(super) touched: [Vec<u32>; 2],
     /// Size of the overlap along the site's `x` and `y` \[m\].
@@ -221,6 +226,29 @@ struct Base<'a> {
     rise: f64,
 }
 
+/// The largest part of an area that one of the pads covers at some places [m^2].
+fn covered(area: &Patch, pads: &[Ring; 2], places: &[DVec2], angles: &[f64]) -> f64 {
+    let reach = pads.iter().flatten().map(|point| point.length()).fold(0.0, f64::max);
+    let region = Bounds2::of(places).grown(reach);
+    let index = PatchIndex::new(area.clone(), region, reach / 4.0);
+    let mut scratch = Scratch::default();
+    let pads = if pads[0] == pads[1] { &pads[..1] } else { &pads[..] };
+    let step = (places.len() * angles.len() * pads.len()).div_ceil(COVERED).max(1);
+    let mut most = 0.0_f64;
+    for pad in
+        angles.iter().flat_map(|&angle| pads.iter().map(move |pad| TurnedPad::new(pad, angle)))
+    {
+        for &place in places.iter().step_by(step) {
+            most = most.max(match index.touch(&pad, place, &mut scratch) {
+                Touch::Empty => 0.0,
+                Touch::Whole => pad.area(),
+                Touch::Part(area) => area,
+            });
+        }
+    }
+    most
+}
+
 /// Main direction of a stretch, unless it is known, and the middle of its bounds along it.
 fn lie(overlap: &[Polygon], known: Option<f64>) -> (f64, DVec2) {
     let turn = known.unwrap_or_else(|| main_direction(overlap));
@@ -327,6 +355,19 @@ impl<'a> Finder<'a> {
             }
             _ => angles(&edges, options, one.min(two).min_element()),
         };
+        let is_round = relief.as_ref().is_some_and(Relief::is_round);
+        let overlap = polygon::patch_area(&local);
+        let is_full = overlap > FULL * grid.bounds.size().element_product();
+        let most = if is_full {
+            overlap
+        } else {
+            let pads = gripper.pads((heights[0] - heights[1]).abs());
+            let covered = covered(&local, &pads, &positions, &angles);
+            let pad = pads.iter().map(|pad| ring_area(pad)).fold(0.0, f64::max);
+            // A pad on planes covers enough of most shapes.
+            let is_enough = covered >= options.min_contact * pad.min(overlap);
+            if is_enough && !is_round { overlap } else { covered }
+        };
         let mut site = Site {
             kind,
             part_from_site: frame,
@@ -338,7 +379,7 @@ impl<'a> Finder<'a> {
             touched: sides.clone(),
             rise,
             flush: SAME_PLANE * size,
-            overlap: polygon::patch_area(&local),
+            most,
             extent: grid.bounds.size(),
             bounds: Bounds2::of(&positions),
             positions,

@@ -342,7 +342,7 @@ impl Proposer<'_> {
     pub(super) fn contact_floor(&self, site: &Site, pad: &TurnedPad) -> [f64; 2] {
         // No more of the pad than its overlap with the faces' bounds, middle over middle.
         let bounds = rectangle(site.extent);
-        let most = ring_area(&clip_ring_convex(&pad.centred(), &bounds)).min(site.overlap);
+        let most = ring_area(&clip_ring_convex(&pad.centred(), &bounds)).min(site.most);
         // Round faces touch little of a pad by their nature.
         let pad_share = if site.is_round() { 0.0 } else { self.options.min_pad_share };
         [self.options.min_contact * most, pad_share * pad.area()].map(|floor| floor * (1.0 - 1e-9))

@@ -367,10 +367,8 @@ fn a_cap_is_gripped_however_it_lies_and_whatever_the_step() {
     }
 }
 
-/// The far side of the hole faces the pad, too.
-#[test]
-fn a_ring_is_touched_at_its_outside_alone() {
-    let (major, minor) = (0.020_f64, 0.012_f64);
+/// A torus about `z`.
+fn ring(major: f64, minor: f64) -> Part {
     let mut vertices = Vec::new();
     let mut triangles = Vec::new();
     let (around, about) = (96_u32, 48_u32);
@@ -385,7 +383,14 @@ fn a_ring_is_touched_at_its_outside_alone() {
             triangles.extend([[a + k, b + k, b + next], [a + k, b + next, a + next]]);
         }
     }
-    let part = Part::from_triangles("ring", &vertices, &triangles).unwrap();
+    Part::from_triangles("ring", &vertices, &triangles).unwrap()
+}
+
+/// The far side of the hole faces the pad, too.
+#[test]
+fn a_ring_is_touched_at_its_outside_alone() {
+    let (major, minor) = (0.020_f64, 0.012_f64);
+    let part = ring(major, minor);
     let grips = proposals(&part, &ProposeOptions::default().with_spacing(Some(0.008)));
     let gripper = gripper::find("robotiq-2f85").unwrap();
     let wide: Vec<_> = grips.iter().filter(|grip| (grip.width - 0.064).abs() < 1e-3).collect();
@@ -398,6 +403,102 @@ fn a_ring_is_touched_at_its_outside_alone() {
         let expected = 2.0 * std::f64::consts::PI * radii.sqrt() * deep;
         let found = patch_area(&grip.contact.face_i);
         assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
+    }
+}
+
+/// The pressed area of a torus that lies flat under a pad, parabolas for its circles, by points of it.
+fn pressed_of_ring(major: f64, minor: f64, grip: &Grip) -> f64 {
+    const STEP: f64 = 1e-4;
+    let gripper = gripper::find("robotiq-2f85").unwrap();
+    let half = 0.5 * gripper.pad_sizes()[0];
+    let counts = (half / STEP).as_ivec2();
+    let mut gaps = Vec::new();
+    for (i, j) in (-counts.x..counts.x).flat_map(|i| (-counts.y..counts.y).map(move |j| (i, j))) {
+        let place = (DVec2::new(f64::from(i), f64::from(j)) + 0.5) * STEP;
+        let off = grip.part_from_grip.point(place.extend(0.0)).truncate().length() - major;
+        if off.abs() < minor {
+            gaps.push(off * off / (2.0 * minor));
+        }
+    }
+    gaps.sort_by(f64::total_cmp);
+    // The layer's compression grows over point after point until these carry the force.
+    let (mut sum, mut count) = (0.0, 0.0);
+    for gap in &gaps {
+        let carried = gripper.layer().stiffness * STEP * STEP * (count * gap - sum);
+        if carried > gripper.force[1] {
+            break;
+        }
+        (sum, count) = (sum + gap, count + 1.0);
+    }
+    count * STEP * STEP
+}
+
+/// Along its axis pads touch a circle.
+#[test]
+fn a_ring_is_gripped_across_its_tube() {
+    for (major, minor) in [(0.020_f64, 0.005_f64), (0.060, 0.006)] {
+        let part = ring(major, minor);
+        let grips = proposals(&part, &ProposeOptions::default().with_spacing(Some(0.008)));
+        let across = |grip: &&Grip| (grip.width - 2.0 * minor).abs() < 1e-6;
+        let mut turns = [0; 8];
+        let mut checked = 0;
+        for grip in grips.iter().filter(across) {
+            let at = grip.part_from_grip.origin;
+            assert!(at.z.abs() < 1e-9 && at.truncate().length() < major + 0.02, "{at}");
+            turns[((at.y.atan2(at.x) / std::f64::consts::FRAC_PI_4 + 8.0) as usize) % 8] += 1;
+            let wanted = pressed_of_ring(major, minor, grip);
+            for face in [&grip.contact.face_i, &grip.contact.face_ii] {
+                let found = patch_area(face);
+                assert!((found / wanted - 1.0).abs() < 0.01, "{at}: {found} {wanted}");
+            }
+            checked += 1;
+        }
+        assert!(checked > 100 && turns.iter().all(|&count| count > 10), "{turns:?}");
+    }
+}
+
+/// A round bar of 20 mm, bent by a quarter turn with a radius of 40 mm, its ends straight for 25 mm.
+fn elbow(around: u32) -> Part {
+    let (radius, bend, leg) = (0.010, 0.040, 0.025);
+    let quarter = std::f64::consts::FRAC_PI_2 * bend;
+    let rows = around / 4 + 3;
+    let bent = |at: DVec3| {
+        let past = at.z - leg;
+        let angle = (past / bend).clamp(0.0, std::f64::consts::FRAC_PI_2);
+        let (sine, cosine) = angle.sin_cos();
+        let straight = past - bend * angle;
+        let out = bend + at.x;
+        DVec3::new(out * cosine - straight * sine, at.y, out * sine + straight * cosine)
+    };
+    let length = 2.0 * leg + quarter;
+    let along = |row: f64| match row {
+        0.0 => 0.0,
+        row if row >= f64::from(rows - 1) => length,
+        row => leg + quarter * (row - 1.0) / f64::from(rows - 3),
+    };
+    let (vertices, triangles) =
+        lathe(around, rows, [DVec3::ZERO, DVec3::Z * length].map(bent), |turn, row| {
+            bent((radius * DVec2::from_angle(turn)).extend(along(row)))
+        });
+    Part::from_triangles("elbow", &vertices, &triangles).unwrap()
+}
+
+/// The crests of its legs and of the bend between them lie in no line.
+#[test]
+fn an_elbow_is_gripped_across_the_plane_of_its_bend() {
+    for around in [24, 96] {
+        let part = elbow(around);
+        let grips = proposals(&part, &ProposeOptions::default().with_spacing(Some(0.008)));
+        let (mut on_legs, mut on_bend) = (0, 0);
+        for grip in &grips {
+            let (at, closing) = (grip.part_from_grip.origin, grip.part_from_grip.rotation.z_axis);
+            if closing.cross(DVec3::Y).length() > 1e-6 {
+                continue;
+            }
+            assert!((grip.width - 0.020).abs() < 1e-6 && at.y.abs() < 1e-6, "{around}: {at}");
+            *(if at.x < 0.0 || at.z < 0.025 { &mut on_legs } else { &mut on_bend }) += 1;
+        }
+        assert!(on_legs > 100 && on_bend > 100, "{around}: {on_legs} {on_bend}");
     }
 }
 

@@ -132,18 +132,22 @@ fn kind(
     let limit = if faceted { FACETS } else { ON_AXIS };
     let mut free = true;
     for k in 0..2 {
-        let of_face = || points.iter().filter(move |point| point.face == k);
-        let n: f64 = of_face().map(|point| point.p).sum();
-        let mean = |f: &dyn Fn(&Point) -> f64| of_face().map(|q| q.p * f(q)).sum::<f64>() / n;
-        let (x, s) = (mean(&|q| across.dot(q.x)), mean(&|q| across.dot(q.slope)));
-        let width = mean(&|q| (across.dot(q.x) - x).powi(2)).sqrt();
-        let lever = mean(&|q| q.c.dot(motion).powi(2)).sqrt() / width;
+        // Sums over the pressure of place and slope across the axis, about the middle, and of the lever.
+        let middle = across.dot(faces[k].centre());
+        let mut sums = [0.0; 7];
+        for Point { c, p, x, slope, .. } in points.iter().filter(|point| point.face == k) {
+            let (x, s, lever) = (across.dot(*x) - middle, across.dot(*slope), c.dot(motion));
+            let terms = [1.0, x, s, x * x, s * s, x * s, lever * lever];
+            sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += p * term);
+        }
+        let [_, x, s, xx, ss, xs, levers] = sums.map(|sum| sum / sums[0]);
+        let width = (xx - x * x).max(0.0).sqrt();
+        let lever = levers.sqrt() / width;
         // The round surface that fits best: x = s R.
-        let slopes = mean(&|q| (across.dot(q.slope) - s).powi(2));
-        let both = mean(&|q| (across.dot(q.slope) - s) * (across.dot(q.x) - x));
+        let (slopes, both) = ((ss - s * s).max(0.0), xs - x * s);
         radii[k] = both / slopes;
         let off =
-            mean(&|q| (across.dot(q.x) - x - radii[k] * (across.dot(q.slope) - s)).powi(2)).sqrt();
+            (width * width - 2.0 * radii[k] * both + radii[k] * radii[k] * slopes).max(0.0).sqrt();
         round &= slopes * distance * distance > 1e-12 * width * width && off <= FACETS * width;
         free &= lever <= limit;
     }

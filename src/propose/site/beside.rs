@@ -19,9 +19,10 @@ use crate::model::{Gap, Patch, Piece, Ring, Surfaces};
 const SHARE: f64 = 0.1;
 /// Share of the least contact that the planes have of one mostly on what lies beside them.
 const SLIVER: f64 = 0.25;
-/// Pieces beside the planes of a contact beyond which they are left out: grips would be slow, and large in
-/// files.
-const MOST_PIECES: usize = 12;
+/// Pieces beside the planes of a contact, and plane ones of these, beyond which they are left out: grips
+/// would be slow, and large in files.
+const MOST_PIECES: usize = 24;
+const MOST_PLANES: usize = 12;
 /// Places at which it is looked for, at most.
 const PLACES: usize = 40;
 
@@ -66,8 +67,10 @@ impl Finder<'_> {
                 }
                 let area = areas[0].min(areas[1]);
                 most = most.max(area);
-                // So many are facets of no known face.
-                if others().count() > MOST_PIECES {
+                // So many planes are facets of no known face, and so much else all of a ring's rims.
+                let is_plane = |piece: &&Piece| matches!(piece.gap, Gap::Plane { .. });
+                if others().count() > MOST_PIECES || others().filter(is_plane).count() > MOST_PLANES
+                {
                     return None;
                 }
                 if others().next().is_some() {

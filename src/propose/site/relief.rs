@@ -16,6 +16,10 @@ use crate::propose::options::ProposeOptions;
 /// Step of the approach angle about a point contact, at least \[rad\].
 const POINT_STEP: f64 = 45.0 * std::f64::consts::PI / 180.0;
 
+/// Crests whose directions differ by less from along or across one are approached as that (sine of the
+/// angle).
+const IN_LINE: f64 = 0.05;
+
 /// What the pads of a site touch.
 #[derive(Debug, Clone)]
 pub(in crate::propose) struct Relief {
@@ -191,20 +195,23 @@ impl Relief {
         self.crests().any(|axis| edge.normal.dot(axis).abs() < 0.5 * axis.length())
     }
 
-    /// Approach angles: along and across a crest; about a point all round; and towards the middle
-    /// of the cone asked for (its axis in the site's frame).
+    /// Approach angles: along and across a crest; about a point, and where crests run in several
+    /// directions, all round; and towards the middle of the cone asked for (its axis in the site's frame).
     pub(super) fn angles(&self, options: &ProposeOptions, cone: Option<DVec3>) -> Vec<f64> {
         let turn = std::f64::consts::TAU;
+        let all_round = (turn / options.angle_step.max(POINT_STEP)).round().max(1.0) as usize;
         let (first, count) = match self.crests().next() {
             Some(axis) => {
                 let first = axis.to_angle().rem_euclid(turn / 4.0);
+                let is_across = |other: DVec2| {
+                    let [one, other] = [axis, other].map(DVec2::normalize);
+                    one.dot(other).abs().min(one.perp_dot(other).abs()) < IN_LINE
+                };
+                let count = if self.crests().all(is_across) { 4 } else { all_round.max(4) };
                 // Rounding must not move it to the other end of the interval.
-                (if first > turn / 4.0 - 1e-6 { 0.0 } else { first }, 4)
+                (if first > turn / 4.0 - 1e-6 { 0.0 } else { first }, count)
             }
-            None => {
-                let step = options.angle_step.max(POINT_STEP);
-                (0.0, (turn / step).round().max(1.0) as usize)
-            }
+            None => (0.0, all_round),
         };
         let step = turn / count as f64;
         let mut angles: Vec<f64> = (0..count).map(|index| first + step * index as f64).collect();

@@ -12,7 +12,7 @@ use glam::{DVec2, DVec3};
 use super::relief::Relief;
 use super::shapes::{project, stretches};
 use super::skyline::Skyline;
-use super::survey::{LEVEL, Survey, is_free};
+use super::survey::{LEVEL, Survey, is_flat, is_free};
 use super::tapers::upright;
 use super::{Base, Finder, SAME_PLANE, Site, axes, lie};
 use crate::error::Result;
@@ -34,6 +34,9 @@ pub(super) const MOST_PLANES: usize = 24;
 const ICOSAHEDRON: f64 = 1.1071;
 /// Divisions of its edge at most.
 const MOST_DIVISIONS: usize = 8;
+/// Arcs of a whole turn of a crest that is a circle.
+const LEAST_ARCS: usize = 8;
+const MOST_ARCS: usize = 64;
 /// Places along a crest at which it is looked at from above.
 const PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 /// Share of the distance of two crests by which their radii may fall short of it: on one axis they
@@ -249,6 +252,13 @@ impl Finder<'_> {
         for axis in self.round_axes() {
             self.add_closings(axis, &mut found);
         }
+        for face in self.round_faces() {
+            if let Shape::Torus { axis, major, .. } = face.shape
+                && major > 0.0
+            {
+                add(axis.direction, &mut found);
+            }
+        }
         let is_sphere = |face: &CurvedFace| matches!(face.shape, Shape::Sphere { .. });
         if self.round_faces().any(is_sphere) {
             self.facing_spheres().into_iter().for_each(|direction| add(direction, &mut found));
@@ -385,6 +395,15 @@ impl Finder<'_> {
                 Shape::Torus { axis, major, minor } if level(axis.direction) => {
                     (axis.origin, major + minor, [axis.origin; 2])
                 }
+                &Shape::Torus { axis, major, minor } if is_flat(axis.direction, closing) => {
+                    let height = closing.dot(axis.origin) + minor;
+                    for ends in self.arcs(face, closing, (axis.origin, [major, minor])) {
+                        let bounds = Bounds2::of(&ends.map(place));
+                        let ends = ends.map(|end| upright_axes * (end + minor * closing));
+                        crests.push(Crest { face: face.id, height, radius: minor, bounds, ends });
+                    }
+                    continue;
+                }
                 _ => continue,
             };
             if self.has_crest(face, closing, middle, radius) {
@@ -395,6 +414,47 @@ impl Finder<'_> {
             }
         }
         crests
+    }
+
+    /// The crest of a torus that lies flat, in arcs so short that their chords are crests too: the ends
+    /// of those that the face reaches, at the height of its `centre`.
+    fn arcs(
+        &self,
+        face: &CurvedFace,
+        closing: DVec3,
+        (centre, [major, minor]): (DVec3, [f64; 2]),
+    ) -> Vec<[DVec3; 2]> {
+        if major <= 0.0 {
+            return Vec::new();
+        }
+        let count = (std::f64::consts::PI * (major / minor).sqrt()).ceil();
+        let count = (count as usize).clamp(LEAST_ARCS, MOST_ARCS);
+        let step = std::f64::consts::TAU / count as f64;
+        let (first, second) = closing.any_orthonormal_pair();
+        let mut is_there = vec![false; count];
+        for &triangle in &face.triangles {
+            let corners = self.part.mesh.corners(triangle).map(|corner| corner - centre);
+            if !corners.iter().any(|corner| corner.dot(closing) > 0.97 * minor) {
+                continue;
+            }
+            let angles = corners.map(|x| DVec2::new(x.dot(first), x.dot(second)).to_angle());
+            // From the first corner the short way round.
+            let turns = angles.map(|angle| {
+                let turn = (angle - angles[0]).rem_euclid(std::f64::consts::TAU);
+                if turn > std::f64::consts::PI { turn - std::f64::consts::TAU } else { turn }
+            });
+            let from = (angles[0] + turns[0].min(turns[1]).min(turns[2])) / step;
+            let to = (angles[0] + turns[0].max(turns[1]).max(turns[2])) / step;
+            for index in from.floor() as i64..=to.floor() as i64 {
+                is_there[index.rem_euclid(count as i64) as usize] = true;
+            }
+        }
+        let corner = |index: usize| {
+            let turn = DVec2::from_angle(step * index as f64);
+            centre + major * (turn.x * first + turn.y * second)
+        };
+        let there = (0..count).filter(|&index| is_there[index]);
+        there.map(|index| [corner(index), corner(index + 1)]).collect()
     }
 
     /// Whether the face, which may be a part of a full round, reaches its crest.
@@ -478,18 +538,20 @@ impl Finder<'_> {
         let sides = [top, bottom].map(|level| {
             let mut faces: Vec<u32> = level.iter().map(|crest| crest.face).collect();
             faces.sort_unstable();
+            faces.dedup();
             faces
         });
         let rise = SAME_PLANE * self.size;
-        let any = self.pressed_sites(
-            direction,
-            sides,
-            (heights, common.centre()),
-            pieces,
-            (rise, None),
-            sites,
-        )?;
-        Ok(any.then_some(None))
+        // The middle of crests that are not in line, as of the legs of a bent tube, lies on none of them.
+        let on_crests = top.iter().map(|crest| crest.bounds.centre());
+        for place in std::iter::once(common.centre()).chain(on_crests.filter(|_| top.len() > 1)) {
+            let (sides, pieces) = (sides.clone(), pieces.clone());
+            let at = (heights, place);
+            if self.pressed_sites(direction, sides, at, pieces, (rise, None), sites)? {
+                return Ok(Some(None));
+            }
+        }
+        Ok(None)
     }
 
     /// Adds the sites of pieces of surface under pads over `place` with their planes at `heights`;

@@ -362,7 +362,7 @@ impl<'a> Finder<'a> {
             touched: taper.sides.clone(),
             rise: SAME_PLANE * self.size + off,
             flush: SAME_PLANE * self.size,
-            overlap: polygon::patch_area(&local),
+            most: polygon::patch_area(&local),
             extent: bounds.size(),
             bounds: Bounds2::of(&positions),
             positions,

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::rc::Rc;
 
 use glam::{DMat3, DVec2, DVec3};
@@ -34,6 +35,14 @@ const PARABOLA: f64 = 0.9;
 const DEEPER: f64 = 1.5;
 /// Share of the reach that is added to boxes against rounding.
 const SLACK: f64 = 1e-3;
+/// Share of the half width of what a pad may touch of a torus that lies flat by which the straight
+/// crest of a sector may lie off the arc; the same of a rounded rim, which carries a part of what its plane
+/// does.
+const OFF_ARC: f64 = 0.02;
+const OFF_RIM: f64 = 0.1;
+/// Sectors of a whole turn of such a torus.
+const LEAST_SECTORS: usize = 16;
+const MOST_SECTORS: usize = 240;
 /// Corners of the window around what a pad may touch of a sphere.
 const WINDOW: usize = 32;
 /// The part's surface in the axes of one closing direction, for one look after the other.
@@ -188,7 +197,7 @@ impl<'a> Survey<'a> {
         let region = Bounds2::of(window);
         let look = Look { survey: self, height: 0.0, side, reach: 0.0, above: 0.0, region };
         let mut pieces = Vec::new();
-        look.outline(triangles, f64::INFINITY, window, gap, &mut pieces);
+        look.outline(triangles, f64::INFINITY, &[(window.to_vec(), gap)], &mut pieces);
         pieces
     }
 }
@@ -404,7 +413,7 @@ impl Look<'_> {
                     .map(|(x, y)| corner(x, y));
                 let radius = if face.outside { radius } else { -radius };
                 let gap = Gap::Cylinder { radius, axis: direction, at, height };
-                self.within(face, &window, gap, pieces);
+                self.within(face, vec![(window.to_vec(), gap)], pieces);
                 true
             }
             Shape::Cone { apex, axis, half_angle, along } => {
@@ -429,7 +438,7 @@ impl Look<'_> {
                         .map(|(x, y)| corner(x, y));
                     let (radius, slope) = (sense * radius, -sense * slope);
                     let gap = Gap::Cone { radius, slope, axis: direction, at, height };
-                    self.within(face, &window, gap, pieces);
+                    self.within(face, vec![(window.to_vec(), gap)], pieces);
                 }
                 true
             }
@@ -439,13 +448,31 @@ impl Look<'_> {
                 if height < self.reach {
                     let at = centre.truncate();
                     let window = ellipse(at, DVec2::X, [half(radius, height); 2]);
-                    self.within(face, &window, Gap::Sphere { radius, at, height }, pieces);
+                    let gap = Gap::Sphere { radius, at, height };
+                    self.within(face, vec![(window, gap)], pieces);
                 }
                 true
             }
             Shape::Torus { axis, major, minor } if face.outside => {
-                let Some(direction) = level(axis.direction) else { return false };
                 let centre = place(axis.origin);
+                if is_flat(place(axis.direction), DVec3::Z) && major > 0.0 {
+                    let height = height(centre, minor);
+                    if height < self.reach {
+                        let is_level = |piece: &Piece| {
+                            let Gap::Plane { height: there, slope } = piece.gap else {
+                                return false;
+                            };
+                            slope == DVec2::ZERO && (there - height).abs() < SLACK * self.reach
+                        };
+                        let off = if pieces.iter().any(is_level) { OFF_RIM } else { OFF_ARC };
+                        let off = off * (2.0 * minor * self.reach).sqrt();
+                        let (at, round) = (centre.truncate(), [major, half(minor, height), off]);
+                        let sectors = sectors(at, round, (minor, height), self.region);
+                        self.within(face, sectors, pieces);
+                    }
+                    return true;
+                }
+                let Some(direction) = level(axis.direction) else { return false };
                 let radius = major + minor;
                 let height = height(centre, radius);
                 if height < self.reach {
@@ -453,7 +480,7 @@ impl Look<'_> {
                     let window =
                         ellipse(at, direction, [half(minor, height), half(radius, height)]);
                     let gap = Gap::Barrel { radius, meridian: minor, axis: direction, at, height };
-                    self.within(face, &window, gap, pieces);
+                    self.within(face, vec![(window, gap)], pieces);
                 }
                 true
             }
@@ -461,22 +488,22 @@ impl Look<'_> {
         }
     }
 
-    /// The part of a curved face within a window.
-    fn within(&self, face: &CurvedFace, window: &[DVec2], gap: Gap, pieces: &mut Vec<Piece>) {
+    /// The parts of a curved face within windows, each with its gap.
+    fn within(&self, face: &CurvedFace, windows: Vec<(Ring, Gap)>, pieces: &mut Vec<Piece>) {
         // What lies behind, as the far wall of a hole, is under the pad too, and seen from there.
-        self.outline(&face.triangles, DEEPER * self.reach, window, gap, pieces);
+        self.outline(&face.triangles, DEEPER * self.reach, &windows, pieces);
     }
 
-    /// The part of some triangles within a window, up to a gap of `deepest` \[m\].
+    /// The parts of some triangles within windows, up to a gap of `deepest` \[m\].
     fn outline(
         &self,
         triangles: &[u32],
         deepest: f64,
-        window: &[DVec2],
-        gap: Gap,
+        windows: &[(Ring, Gap)],
         pieces: &mut Vec<Piece>,
     ) {
-        let within = Bounds2::of(window);
+        let within = windows.iter().map(|(window, _)| Bounds2::of(window));
+        let within = within.fold(Bounds2::EMPTY, Bounds2::union);
         if !within.meets(self.region) {
             return;
         }
@@ -499,10 +526,13 @@ impl Look<'_> {
                 seen.push(triangle);
             }
         }
-        for Polygon { outer, holes } in self.survey.area(seen).iter().cloned() {
-            for Polygon { outer, holes } in cut(&Piece { outer, holes, gap }, window) {
-                let holes = holes.iter().map(|hole| straightened(hole)).collect();
-                pieces.push(Piece { outer: straightened(&outer), holes, gap });
+        for Polygon { outer, holes } in self.survey.area(seen).iter() {
+            for &(ref window, gap) in windows {
+                let area = Piece { outer: outer.clone(), holes: holes.clone(), gap };
+                for Polygon { outer, holes } in cut(&area, window) {
+                    let holes = holes.iter().map(|hole| straightened(hole)).collect();
+                    pieces.push(Piece { outer: straightened(&outer), holes, gap });
+                }
             }
         }
     }
@@ -532,9 +562,42 @@ fn largest(piece: &Piece) -> f64 {
     }
 }
 
+/// Whether a torus lies flat under the pads: its axis along the closing direction.
+pub(super) fn is_flat(axis: DVec3, closing: DVec3) -> bool {
+    axis.cross(closing).length() < LEVEL
+}
+
+/// A torus about the closing direction within `across` of its crest, a circle of the radius `major`
+/// about `at`, in sectors: each a strip of a cylinder whose straight crest stands for the arc, up to `off`
+/// away from it \[m\]. Those that a region meets.
+fn sectors(
+    at: DVec2,
+    [major, across, off]: [f64; 3],
+    (radius, height): (f64, f64),
+    region: Bounds2,
+) -> Vec<(Ring, Gap)> {
+    let count = TAU / (12.0 * off / major).sqrt();
+    let count = (count.ceil() as usize).clamp(LEAST_SECTORS, MOST_SECTORS);
+    let half = 0.5 * TAU / count as f64;
+    // The straight crest lies as far off the arc at its middle as, on average, elsewhere.
+    let middle = major * half.sin() / half;
+    let sector = |index: usize| {
+        let [from, out, to] =
+            [-half, 0.0, half].map(|side| DVec2::from_angle(2.0 * half * index as f64 + side));
+        let (near, far) = ((major - across).max(0.0), (major + across) / half.cos());
+        let mut ring = vec![at + near * from, at + far * from, at + far * to];
+        if near > 0.0 {
+            ring.push(at + near * to);
+        }
+        (ring, Gap::Cylinder { radius, axis: out.perp(), at: at + middle * out, height })
+    };
+    let sectors = (0..count).map(sector);
+    sectors.filter(|(ring, _)| Bounds2::of(ring).meets(region)).collect()
+}
+
 /// A ring about an ellipse.
 pub(super) fn ellipse(at: DVec2, axis: DVec2, half: [f64; 2]) -> Ring {
-    let step = std::f64::consts::TAU / WINDOW as f64;
+    let step = TAU / WINDOW as f64;
     let corner = |index: usize| {
         let e = DVec2::from_angle(step * index as f64) / (0.5 * step).cos();
         at + half[0] * e.x * axis + half[1] * e.y * axis.perp()
