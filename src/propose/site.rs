@@ -19,11 +19,12 @@ mod skyline;
 mod special;
 mod survey;
 mod tapers;
+mod tori;
 
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-use places::{angles, main_direction, positions, straight_edges};
+use places::{angles, covered, main_direction, positions, straight_edges};
 use planes::{Planes, heights, rise};
 pub(super) use relief::Relief;
 use round::Budget;
@@ -35,7 +36,7 @@ use survey::Surveys;
 
 use super::environment::Environment;
 use super::options::ProposeOptions;
-use super::patch::{PatchIndex, Scratch, Touch, TurnedPad};
+use super::patch::PatchIndex;
 use crate::clash::{Motion, Sweep, sweeps};
 use crate::error::{Error, Result};
 use crate::geometry::polygon::{self, Bounds2, rings};
@@ -52,8 +53,6 @@ const SAME_DIRECTION: f64 = 1e-6;
 const SAME_PLANE: f64 = 2e-5;
 /// Share of its bounds that an overlap fills from which on a pad middle over middle covers the most of it.
 const FULL: f64 = 0.5;
-/// Places at which what a pad covers of one that fills less is looked at, over all angles.
-const COVERED: usize = 120;
 /// At most this many positions on one site; more is a slip of the unit.
 const MOST_POSITIONS: f64 = 2e7;
 
@@ -224,29 +223,6 @@ struct Base<'a> {
     heights: [f64; 2],
     /// See [`Site::rise`].
     rise: f64,
-}
-
-/// The largest part of an area that one of the pads covers at some places [m^2].
-fn covered(area: &Patch, pads: &[Ring; 2], places: &[DVec2], angles: &[f64]) -> f64 {
-    let reach = pads.iter().flatten().map(|point| point.length()).fold(0.0, f64::max);
-    let region = Bounds2::of(places).grown(reach);
-    let index = PatchIndex::new(area.clone(), region, reach / 4.0);
-    let mut scratch = Scratch::default();
-    let pads = if pads[0] == pads[1] { &pads[..1] } else { &pads[..] };
-    let step = (places.len() * angles.len() * pads.len()).div_ceil(COVERED).max(1);
-    let mut most = 0.0_f64;
-    for pad in
-        angles.iter().flat_map(|&angle| pads.iter().map(move |pad| TurnedPad::new(pad, angle)))
-    {
-        for &place in places.iter().step_by(step) {
-            most = most.max(match index.touch(&pad, place, &mut scratch) {
-                Touch::Empty => 0.0,
-                Touch::Whole => pad.area(),
-                Touch::Part(area) => area,
-            });
-        }
-    }
-    most
 }
 
 /// Main direction of a stretch, unless it is known, and the middle of its bounds along it.

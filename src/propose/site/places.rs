@@ -3,10 +3,10 @@
 use glam::DVec2;
 
 use super::super::options::ProposeOptions;
-use super::super::patch::PatchIndex;
+use super::super::patch::{PatchIndex, Scratch, Touch, TurnedPad};
 use crate::geometry::contains;
 use crate::geometry::polygon::{self, Bounds2, rings};
-use crate::model::Polygon;
+use crate::model::{Patch, Polygon, Ring};
 
 /// Corners of the overlap that turn by less are points of a tessellated curve, not places of their
 /// own.
@@ -21,6 +21,8 @@ const SHORT: f64 = 0.5;
 const MOST_CORNERS: usize = 200;
 /// At most this many edge directions of one site become approach angles (four each).
 const MOST_EDGE_DIRECTIONS: usize = 4;
+/// Places at which what a pad covers of an overlap is looked at, over all angles.
+const COVERED: usize = 120;
 
 /// Directions of edges modulo a right angle, in `(-45, 45]` degrees, with the length that runs along
 /// each, longest first.
@@ -255,6 +257,29 @@ fn nearest(patch: &[Polygon], point: DVec2) -> Vec<DVec2> {
     feet.sort_by_key(|foot| (foot / EQUALLY).round().to_array().map(|x| x as i64));
     feet.dedup_by(|a, b| a.distance(*b) < EQUALLY);
     feet
+}
+
+/// The largest part of an area that one of the pads covers at some places [m^2].
+pub(super) fn covered(area: &Patch, pads: &[Ring; 2], places: &[DVec2], angles: &[f64]) -> f64 {
+    let reach = pads.iter().flatten().map(|point| point.length()).fold(0.0, f64::max);
+    let region = Bounds2::of(places).grown(reach);
+    let index = PatchIndex::new(area.clone(), region, reach / 4.0);
+    let mut scratch = Scratch::default();
+    let pads = if pads[0] == pads[1] { &pads[..1] } else { &pads[..] };
+    let step = (places.len() * angles.len() * pads.len()).div_ceil(COVERED).max(1);
+    let mut most = 0.0_f64;
+    for pad in
+        angles.iter().flat_map(|&angle| pads.iter().map(move |pad| TurnedPad::new(pad, angle)))
+    {
+        for &place in places.iter().step_by(step) {
+            most = most.max(match index.touch(&pad, place, &mut scratch) {
+                Touch::Empty => 0.0,
+                Touch::Whole => pad.area(),
+                Touch::Part(area) => area,
+            });
+        }
+    }
+    most
 }
 
 #[cfg(test)]

@@ -12,8 +12,9 @@ use glam::{DVec2, DVec3};
 use super::relief::Relief;
 use super::shapes::{project, stretches};
 use super::skyline::Skyline;
-use super::survey::{LEVEL, Survey, is_flat, is_free};
+use super::survey::{LEVEL, Survey, is_free};
 use super::tapers::upright;
+use super::tori::is_flat;
 use super::{Base, Finder, SAME_PLANE, Site, axes, lie};
 use crate::error::Result;
 use crate::geometry::overlay;
@@ -34,9 +35,6 @@ pub(super) const MOST_PLANES: usize = 24;
 const ICOSAHEDRON: f64 = 1.1071;
 /// Divisions of its edge at most.
 const MOST_DIVISIONS: usize = 8;
-/// Arcs of a whole turn of a crest that is a circle.
-const LEAST_ARCS: usize = 8;
-const MOST_ARCS: usize = 64;
 /// Places along a crest at which it is looked at from above.
 const PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 /// Share of the distance of two crests by which their radii may fall short of it: on one axis they
@@ -414,47 +412,6 @@ impl Finder<'_> {
             }
         }
         crests
-    }
-
-    /// The crest of a torus that lies flat, in arcs so short that their chords are crests too: the ends
-    /// of those that the face reaches, at the height of its `centre`.
-    fn arcs(
-        &self,
-        face: &CurvedFace,
-        closing: DVec3,
-        (centre, [major, minor]): (DVec3, [f64; 2]),
-    ) -> Vec<[DVec3; 2]> {
-        if major <= 0.0 {
-            return Vec::new();
-        }
-        let count = (std::f64::consts::PI * (major / minor).sqrt()).ceil();
-        let count = (count as usize).clamp(LEAST_ARCS, MOST_ARCS);
-        let step = std::f64::consts::TAU / count as f64;
-        let (first, second) = closing.any_orthonormal_pair();
-        let mut is_there = vec![false; count];
-        for &triangle in &face.triangles {
-            let corners = self.part.mesh.corners(triangle).map(|corner| corner - centre);
-            if !corners.iter().any(|corner| corner.dot(closing) > 0.97 * minor) {
-                continue;
-            }
-            let angles = corners.map(|x| DVec2::new(x.dot(first), x.dot(second)).to_angle());
-            // From the first corner the short way round.
-            let turns = angles.map(|angle| {
-                let turn = (angle - angles[0]).rem_euclid(std::f64::consts::TAU);
-                if turn > std::f64::consts::PI { turn - std::f64::consts::TAU } else { turn }
-            });
-            let from = (angles[0] + turns[0].min(turns[1]).min(turns[2])) / step;
-            let to = (angles[0] + turns[0].max(turns[1]).max(turns[2])) / step;
-            for index in from.floor() as i64..=to.floor() as i64 {
-                is_there[index.rem_euclid(count as i64) as usize] = true;
-            }
-        }
-        let corner = |index: usize| {
-            let turn = DVec2::from_angle(step * index as f64);
-            centre + major * (turn.x * first + turn.y * second)
-        };
-        let there = (0..count).filter(|&index| is_there[index]);
-        there.map(|index| [corner(index), corner(index + 1)]).collect()
     }
 
     /// Whether the face, which may be a part of a full round, reaches its crest.

@@ -9,6 +9,7 @@ use glam::{DMat3, DVec2, DVec3};
 use rustc_hash::FxHashMap;
 
 use super::shapes::{outlines, project};
+use super::tori::{OFF_ARC, OFF_RIM, is_flat, sectors};
 use super::{Finder, axes};
 use crate::contact::surface::cut;
 use crate::geometry::polygon::{Bounds2, straightened};
@@ -35,14 +36,6 @@ const PARABOLA: f64 = 0.9;
 const DEEPER: f64 = 1.5;
 /// Share of the reach that is added to boxes against rounding.
 const SLACK: f64 = 1e-3;
-/// Share of the half width of what a pad may touch of a torus that lies flat by which the straight
-/// crest of a sector may lie off the arc; the same of a rounded rim, which carries a part of what its plane
-/// does.
-const OFF_ARC: f64 = 0.02;
-const OFF_RIM: f64 = 0.1;
-/// Sectors of a whole turn of such a torus.
-const LEAST_SECTORS: usize = 16;
-const MOST_SECTORS: usize = 240;
 /// Corners of the window around what a pad may touch of a sphere.
 const WINDOW: usize = 32;
 /// The part's surface in the axes of one closing direction, for one look after the other.
@@ -560,39 +553,6 @@ fn largest(piece: &Piece) -> f64 {
         | Gap::Barrel { height, .. }
         | Gap::Cone { height, .. } => height,
     }
-}
-
-/// Whether a torus lies flat under the pads: its axis along the closing direction.
-pub(super) fn is_flat(axis: DVec3, closing: DVec3) -> bool {
-    axis.cross(closing).length() < LEVEL
-}
-
-/// A torus about the closing direction within `across` of its crest, a circle of the radius `major`
-/// about `at`, in sectors: each a strip of a cylinder whose straight crest stands for the arc, up to `off`
-/// away from it \[m\]. Those that a region meets.
-fn sectors(
-    at: DVec2,
-    [major, across, off]: [f64; 3],
-    (radius, height): (f64, f64),
-    region: Bounds2,
-) -> Vec<(Ring, Gap)> {
-    let count = TAU / (12.0 * off / major).sqrt();
-    let count = (count.ceil() as usize).clamp(LEAST_SECTORS, MOST_SECTORS);
-    let half = 0.5 * TAU / count as f64;
-    // The straight crest lies as far off the arc at its middle as, on average, elsewhere.
-    let middle = major * half.sin() / half;
-    let sector = |index: usize| {
-        let [from, out, to] =
-            [-half, 0.0, half].map(|side| DVec2::from_angle(2.0 * half * index as f64 + side));
-        let (near, far) = ((major - across).max(0.0), (major + across) / half.cos());
-        let mut ring = vec![at + near * from, at + far * from, at + far * to];
-        if near > 0.0 {
-            ring.push(at + near * to);
-        }
-        (ring, Gap::Cylinder { radius, axis: out.perp(), at: at + middle * out, height })
-    };
-    let sectors = (0..count).map(sector);
-    sectors.filter(|(ring, _)| Bounds2::of(ring).meets(region)).collect()
 }
 
 /// A ring about an ellipse.
