@@ -393,7 +393,7 @@ impl Finder<'_> {
                 Shape::Torus { axis, major, minor } if level(axis.direction) => {
                     (axis.origin, major + minor, [axis.origin; 2])
                 }
-                &Shape::Torus { axis, major, minor } if is_flat(axis.direction, closing) => {
+                &Shape::Torus { axis, major, minor } if is_flat(axis.direction, major, closing) => {
                     let height = closing.dot(axis.origin) + minor;
                     for ends in self.arcs(face, closing, (axis.origin, [major, minor])) {
                         let bounds = Bounds2::of(&ends.map(place));

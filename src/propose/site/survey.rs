@@ -448,7 +448,7 @@ impl Look<'_> {
             }
             Shape::Torus { axis, major, minor } if face.outside => {
                 let centre = place(axis.origin);
-                if is_flat(place(axis.direction), DVec3::Z) && major > 0.0 {
+                if is_flat(place(axis.direction), major, DVec3::Z) {
                     let height = height(centre, minor);
                     if height < self.reach {
                         let is_level = |piece: &Piece| {

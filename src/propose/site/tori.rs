@@ -22,9 +22,10 @@ const MOST_SECTORS: usize = 240;
 const LEAST_ARCS: usize = 8;
 const MOST_ARCS: usize = 64;
 
-/// Whether a torus lies flat under the pads: its axis along the closing direction.
-pub(super) fn is_flat(axis: DVec3, closing: DVec3) -> bool {
-    axis.cross(closing).length() < LEVEL
+/// Whether a torus lies flat under the pads and has a circle for them to touch: its axis along the closing
+/// direction, its `major` radius more than none.
+pub(super) fn is_flat(axis: DVec3, major: f64, closing: DVec3) -> bool {
+    major > 0.0 && axis.cross(closing).length() < LEVEL
 }
 
 /// A torus about the closing direction within `across` of its crest, a circle of the radius `major`
@@ -64,9 +65,6 @@ impl Finder<'_> {
         closing: DVec3,
         (centre, [major, minor]): (DVec3, [f64; 2]),
     ) -> Vec<[DVec3; 2]> {
-        if major <= 0.0 {
-            return Vec::new();
-        }
         let count = (PI * (major / minor).sqrt()).ceil();
         let count = (count as usize).clamp(LEAST_ARCS, MOST_ARCS);
         let step = TAU / count as f64;
