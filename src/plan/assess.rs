@@ -432,7 +432,7 @@ impl Assessor<'_> {
         let options = Options { separation, refiner, ..Options::default() };
         let force = self.settings.force;
         let ready = Surfaced::new(grips.iter().map(|ranked| &ranked.grip), force);
-        grips.par_iter_mut().for_each(|ranked| {
+        grips.par_iter_mut().with_max_len(1).for_each(|ranked| {
             let (distance, wrench) = (ranked.grip.distance(), &ranked.worst.wrench);
             let (curved, plane) = match &ranked.grip.surfaces {
                 Some(_) => (ready.of(&ranked.grip).map(|ready| &ready.pads), None),

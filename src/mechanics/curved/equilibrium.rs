@@ -50,6 +50,11 @@ pub(super) struct State<'a> {
 }
 
 impl State<'_> {
+    /// What it needs; none where that was not asked for.
+    pub(super) fn friction(&self) -> f64 {
+        self.slip.map_or(0.0, |slip| slip.mu)
+    }
+
     pub(super) fn error(&self) -> f64 {
         self.residual.iter().map(|r| r * r).sum::<f64>().sqrt()
     }
@@ -67,8 +72,8 @@ const FIRST: f64 = 0.25;
 const LINE: usize = 48;
 const RAYS: usize = 16;
 const RINGS: usize = 7;
-/// Starts of Newton's method in the plane.
-const STARTS: usize = 10;
+/// Tilt \[rad\] beyond which nothing is looked for: the equations are those of small angles.
+const FARTHEST: f64 = 1.0;
 
 impl<'a> Problem<'a> {
     /// `(a1, a2)` for angles in their units: compression is `delta - h +- a . x`.
@@ -76,6 +81,12 @@ impl<'a> Problem<'a> {
         let turn: DVec2 =
             self.held.iter().zip(&self.units).zip(angles).map(|((e, u), x)| *u * *x * *e).sum();
         DVec2::new(-turn.y, turn.x)
+    }
+
+    /// The angles in their units for `(a1, a2)`: what turns about other axes is left out.
+    pub(super) fn angles(&self, tilt: DVec2) -> Vec<f64> {
+        let turn = DVec2::new(tilt.y, -tilt.x);
+        self.held.iter().zip(&self.units).map(|(e, u)| e.dot(turn) / u).collect()
     }
 
     /// The load along the space's motions: what comes from outside and what the pressure brings, whose
@@ -291,13 +302,17 @@ impl<'a> Problem<'a> {
         Some(state)
     }
 
-    /// Other states: Newton's method from the best places of a scan over all tilts; `known` is
+    /// Other states: Newton's method from the lowest places of a scan over all tilts; `known` is
     /// among the answers. The second value: whether anything could be evaluated at all.
     pub(super) fn scan(&self, known: Option<State<'a>>) -> (Vec<State<'a>>, bool) {
         let mut found: Vec<State<'a>> = known.into_iter().collect();
         let mut any = !found.is_empty();
         let stretch = |rho: f64| 3.0 * rho / (1.0 - rho);
+        let is_near = |angles: &[f64]| self.tilt(angles).length() <= FARTHEST;
         let mut take = |state: State<'a>| {
+            if !is_near(&state.angles) {
+                return;
+            }
             let same = |other: &State<'a>| {
                 let size = 1.0 + state.angles.iter().map(|x| x.abs()).fold(0.0, f64::max);
                 state.angles.iter().zip(&other.angles).all(|(a, b)| (a - b).abs() < 1e-5 * size)
@@ -311,6 +326,9 @@ impl<'a> Problem<'a> {
             for i in 0..=2 * LINE {
                 let rho = (i as f64 / LINE as f64 - 1.0) * 0.97;
                 let angle = stretch(rho.abs()).copysign(rho);
+                if !is_near(&[angle]) {
+                    continue;
+                }
                 let here = self.at(&[angle], 1.0, before.as_ref());
                 any |= here.is_some();
                 if let (Some(one), Some(two)) = (&before, &here)
@@ -323,21 +341,24 @@ impl<'a> Problem<'a> {
             }
         } else if self.held.len() == 2 {
             let middle = self.at(&[0.0; 2], 1.0, None);
-            let mut nodes: Vec<State<'a>> = middle.clone().into_iter().collect();
-            for ray in 0..RAYS {
-                let e = DVec2::from_angle(std::f64::consts::TAU * ray as f64 / RAYS as f64);
-                let mut before = middle.clone();
-                for ring in 1..=RINGS {
-                    let x = stretch(0.95 * ring as f64 / RINGS as f64) * e;
-                    let here = self.at(&[x.x, x.y], 1.0, before.as_ref());
-                    nodes.extend(here.clone());
-                    before = here;
-                }
-            }
-            any |= !nodes.is_empty();
-            nodes.sort_by(|a, b| a.error().total_cmp(&b.error()));
-            for node in nodes.into_iter().take(STARTS) {
-                if let Some(state) = self.newton(node, 1.0) {
+            let rays: Vec<Vec<Option<State<'a>>>> = (0..RAYS)
+                .map(|ray| {
+                    let e = DVec2::from_angle(std::f64::consts::TAU * ray as f64 / RAYS as f64);
+                    let mut nodes = vec![middle.clone()];
+                    for ring in 1..=RINGS {
+                        let x = stretch(0.95 * ring as f64 / RINGS as f64) * e;
+                        if !is_near(&[x.x, x.y]) {
+                            break;
+                        }
+                        nodes.push(self.at(&[x.x, x.y], 1.0, nodes[ring - 1].as_ref()));
+                    }
+                    nodes
+                })
+                .collect();
+            any |= rays.iter().flatten().any(Option::is_some);
+            // From other places Newton's method ends where it does from these.
+            for node in lowest(&rays) {
+                if let Some(state) = self.newton(node.clone(), 1.0) {
                     take(state);
                 }
             }
@@ -361,4 +382,31 @@ impl<'a> Problem<'a> {
         }
         None
     }
+}
+
+/// Of rays of nodes with a common first one, those whose error is no greater than their neighbours'.
+fn lowest<'s, 'a>(rays: &'s [Vec<Option<State<'a>>>]) -> Vec<&'s State<'a>> {
+    let error = |ray: usize, ring: usize| {
+        rays[ray % rays.len()].get(ring)?.as_ref().map(|state| state.error())
+    };
+    let mut lowest = Vec::new();
+    for (ray, nodes) in rays.iter().enumerate() {
+        for (ring, state) in nodes.iter().enumerate() {
+            let Some(state) = state else { continue };
+            let beside: Vec<Option<f64>> = match ring {
+                0 if ray > 0 => continue,
+                0 => (0..rays.len()).map(|other| error(other, 1)).collect(),
+                _ => vec![
+                    error(ray, ring - 1),
+                    error(ray, ring + 1),
+                    error(ray + 1, ring),
+                    error(ray + rays.len() - 1, ring),
+                ],
+            };
+            if beside.into_iter().flatten().all(|other| other >= state.error()) {
+                lowest.push(state);
+            }
+        }
+    }
+    lowest
 }

@@ -1,6 +1,7 @@
 //! How hard to squeeze what is not plane.
 
 use super::Pads;
+use super::limit::Limit;
 use crate::model::Wrench;
 
 /// Relative width at which the force counts as found.
@@ -51,16 +52,18 @@ pub fn force_needed(
         return (solved(start) <= 0.0).then_some(0.0);
     }
     let search = Search { size, most: MOST * size.max(start) };
-    if let Some(mut follow) = pads.follow(distance, start, wrench) {
-        // Where there is nothing to follow, what holds the part begins at some force, or friction
-        // has no share in it.
-        let leads = follow.mu(start).is_some() || solved(start) == f64::INFINITY;
-        if leads {
-            let end = search.run(start, CLOSER, &mut |force| over(follow.mu(force)));
-            if end.is_right(&solved) {
-                return end.found;
-            }
+    let mut near: Option<Limit<'_>> = None;
+    let mut next = |force: f64| {
+        let limit = pads.limit(distance, force, wrench, near.as_ref());
+        let mu = limit.as_ref().and_then(Limit::mu);
+        if mu.is_some() {
+            near = limit;
         }
+        over(mu)
+    };
+    let end = search.run(start, CLOSER, &mut next);
+    if end.is_right(&solved) {
+        return end.found;
     }
     search.run(start, FOUND, &mut |force| solved(force)).found
 }

@@ -29,6 +29,16 @@ pub(super) struct Case<'a, 'c> {
     pub(super) wrench: &'c Wrench,
     pub(super) rotations: [Rotation; 2],
     pub(super) asked: Asked,
+    /// Where to look for the limit state, and nowhere else.
+    pub(super) near: Option<&'c Limit<'a>>,
+}
+
+/// What a case came to.
+pub(super) struct Limit<'a> {
+    pub(super) problem: Problem<'a>,
+    status: Status,
+    pub(super) state: Option<State<'a>>,
+    notes: Vec<Note>,
 }
 
 /// What is to be found besides the first limit state.
@@ -58,8 +68,12 @@ const ROLLS: f64 = 1e-3;
 const FELT: f64 = 1e-9;
 
 impl<'a> Case<'a, '_> {
-    /// With the rotations free that are free in any case, and those that turn out to be.
     pub(super) fn solve(&self) -> Answer {
+        self.finish(self.limit())
+    }
+
+    /// With the rotations free that are free in any case, and those that turn out to be.
+    pub(super) fn limit(&self) -> Limit<'a> {
         let force = 0.5 * (self.normal[0] + self.normal[1]);
         let none = NO_LEVER * force * self.distance.abs();
         let mut notes = Vec::new();
@@ -81,7 +95,13 @@ impl<'a> Case<'a, '_> {
         });
         loop {
             let problem = self.problem(free);
-            let (status, state) = find(&problem, self.pressed, self.asked.others);
+            let (status, state) = match self.near {
+                Some(near) => match near.next(&problem, self.pressed) {
+                    Some(state) => (Status::Ok, Some(state)),
+                    None => (Status::TwistedOut, None),
+                },
+                None => find(&problem, self.pressed, self.asked.others),
+            };
             // A round part that turns by more than the layers give is free to turn.
             let mut settles = None;
             for i in 0..2 {
@@ -112,7 +132,7 @@ impl<'a> Case<'a, '_> {
                     if self.asked.notes && problem.rolls {
                         notes.extend(self.told(&problem, &state));
                     }
-                    return self.finish(&problem, status, state, notes);
+                    return Limit { problem, status, state, notes };
                 }
             }
         }
@@ -193,15 +213,10 @@ impl<'a> Case<'a, '_> {
         }
     }
 
-    fn finish(
-        &self,
-        problem: &Problem<'_>,
-        status: Status,
-        state: Option<State<'_>>,
-        mut notes: Vec<Note>,
-    ) -> Answer {
+    fn finish(&self, limit: Limit<'_>) -> Answer {
+        let Limit { ref problem, status, ref state, mut notes } = limit;
         let dimensions = problem.space.dimensions() as u8;
-        let (Some(state), Some(slipping)) = (&state, state.as_ref().and_then(|s| s.slip)) else {
+        let (Some(state), Some(slipping)) = (state, state.as_ref().and_then(|s| s.slip)) else {
             let mut answer = no_answer(status);
             (answer.dimensions, answer.notes) = (dimensions, notes);
             return answer;
@@ -279,6 +294,24 @@ impl<'a> Case<'a, '_> {
     }
 }
 
+impl<'a> Limit<'a> {
+    /// The limit state of nearly the same problem that is next to this one; where other rotations are free,
+    /// that on the branch from `d = 0`.
+    fn next(&self, problem: &Problem<'a>, pressed: [&Pressed<'_>; 2]) -> Option<State<'a>> {
+        if self.problem.held.len() != problem.held.len() {
+            return first(problem, pressed);
+        }
+        let state = self.state.as_ref()?;
+        let angles = problem.angles(self.problem.tilt(&state.angles));
+        problem.newton(problem.at(&angles, 1.0, Some(state))?, 1.0)
+    }
+
+    /// `mu_s`; `None` where there is no limit state.
+    pub(super) fn mu(&self) -> Option<f64> {
+        Some(self.state.as_ref()?.slip?.mu)
+    }
+}
+
 /// Whether the part tilts so far that what it moves may hold it in another limit state than that on the
 /// branch from `d = 0`.
 pub(super) fn tilts_far(problem: &Problem<'_>, angles: &[f64]) -> bool {
@@ -291,16 +324,22 @@ pub(super) fn strong(problem: &Problem<'_>, mu: f64) -> bool {
     mu * problem.distance.abs() > COUPLING_SEARCH * width
 }
 
+/// The limit state on the branch from `d = 0`.
+fn first<'a>(problem: &Problem<'a>, pressed: [&Pressed<'_>; 2]) -> Option<State<'a>> {
+    let is_near = |state: &State<'_>| {
+        !strong(problem, state.friction()) && !tilts_far(problem, &state.angles)
+    };
+    problem.direct(pressed).filter(is_near).or_else(|| problem.branch())
+}
+
 /// The limit state of a problem, and its status.
 fn find<'a>(
     problem: &Problem<'a>,
     pressed: [&Pressed<'_>; 2],
     search: bool,
 ) -> (Status, Option<State<'a>>) {
-    let strong = |state: &State<'_>| strong(problem, state.slip.map_or(0.0, |slip| slip.mu));
-    let direct = problem.direct(pressed);
-    let direct = direct.filter(|state| !strong(state) && !tilts_far(problem, &state.angles));
-    match direct.or_else(|| problem.branch()) {
+    let strong = |state: &State<'_>| strong(problem, state.friction());
+    match first(problem, pressed) {
         Some(state) if problem.held.is_empty() || !search || !strong(&state) => {
             (Status::Ok, Some(state))
         }

@@ -30,7 +30,7 @@ use crate::model::{Score, Status, Wrench, check_area};
 
 use face::{Face, Pressed};
 pub use inverse::force_needed;
-use limit::{Asked, Case, no_answer};
+use limit::{Asked, Case, Limit, no_answer};
 pub use note::{LARGE_TILT, Note, SoftLimit};
 pub use screen::{Compared, Screen};
 use space::{Kind, Rotation};
@@ -203,23 +203,50 @@ impl Pads {
     }
 
     fn answer(&self, distance: f64, force: f64, wrench: &Wrench, asked: Asked) -> Answer {
+        let solved = |case: Case<'_, '_>| {
+            let mut answer = case.solve();
+            if asked.notes {
+                answer.notes.extend(case.softness(self, &answer));
+            }
+            answer
+        };
+        self.with_case(distance, force, wrench, asked, solved).unwrap_or_else(no_answer)
+    }
+
+    /// The limit state next to that under another force, without one the first of all; `None` where there
+    /// is none.
+    fn limit<'a>(
+        &'a self,
+        distance: f64,
+        force: f64,
+        wrench: &Wrench,
+        near: Option<&Limit<'a>>,
+    ) -> Option<Limit<'a>> {
+        let found = |case: Case<'a, '_>| Case { near, ..case }.limit();
+        self.with_case(distance, force, wrench, Asked::FIRST, found).ok()
+    }
+
+    /// Gives `solve` a load with both faces pressed, or the status where there is nothing to solve.
+    fn with_case<'a, T>(
+        &'a self,
+        distance: f64,
+        force: f64,
+        wrench: &Wrench,
+        asked: Asked,
+        solve: impl FnOnce(Case<'a, '_>) -> T,
+    ) -> std::result::Result<T, Status> {
         if self.faces.iter().any(|face| face.fields.is_empty()) {
-            return no_answer(Status::NoContact);
+            return Err(Status::NoContact);
         }
         let normal = [force + 0.5 * wrench.force.z, force - 0.5 * wrench.force.z];
         if normal.iter().any(|n| *n <= 0.0) {
-            return no_answer(Status::NoNormalForce);
+            return Err(Status::NoNormalForce);
         }
         let pressed = [0, 1].map(|k| self.faces[k].carry(normal[k], DVec2::ZERO, None));
-        let [Some(one), Some(two)] = &pressed else { return no_answer(Status::NotConverged) };
+        let [Some(one), Some(two)] = &pressed else { return Err(Status::NotConverged) };
         let rotations = space::rotations([one, two], distance);
-        let faces = &self.faces;
-        let case = Case { faces, pressed: [one, two], distance, normal, wrench, rotations, asked };
-        let mut answer = case.solve();
-        if asked.notes {
-            answer.notes.extend(case.softness(self, &answer));
-        }
-        answer
+        let (faces, pressed, near) = (&self.faces, [one, two], None);
+        Ok(solve(Case { faces, pressed, distance, normal, wrench, rotations, asked, near }))
     }
 
     /// Both faces squeezed with `force` \[N\] without a load; `None` without contact.

@@ -155,6 +155,7 @@ impl Pads {
             wrench,
             rotations,
             asked: Asked::SCORE,
+            near: None,
         };
         let problem = case.problem(is_free);
         let pull = f64::max(-low, high);
@@ -162,61 +163,6 @@ impl Pads {
             if wrenches.len() >= MANY { Floors::new(&problem, faces, force, pull) } else { None };
         let (near, known) = (Near::new(faces), Vec::new());
         Some(Screen { problem, force, near, rolling, floors, known, pressed })
-    }
-}
-
-/// The `mu_s` of one load at changing forces: each begins at the states of the last two.
-pub(super) struct Follow<'a> {
-    screen: Screen<'a>,
-    wrench: Wrench,
-    /// Logarithm of the force, and the state.
-    last: Option<(f64, Place)>,
-    before: Option<(f64, Place)>,
-}
-
-/// Growth of a round face's compression with the force.
-const GROWTH: f64 = 2.0 / 3.0;
-
-impl Pads {
-    /// As [`Pads::screen`], for one load.
-    pub(super) fn follow(&self, distance: f64, force: f64, wrench: &Wrench) -> Option<Follow<'_>> {
-        let screen = self.screen(distance, force, std::slice::from_ref(wrench))?;
-        if !screen.rolling.is_empty() {
-            return None;
-        }
-        Some(Follow { screen, wrench: *wrench, last: None, before: None })
-    }
-}
-
-impl Follow<'_> {
-    /// `None` where the way leads to no limit state, or to one without friction.
-    pub(super) fn mu(&mut self, force: f64) -> Option<f64> {
-        let screen = &mut self.screen;
-        let normal = [force + 0.5 * self.wrench.force.z, force - 0.5 * self.wrench.force.z];
-        if normal.iter().any(|n| *n <= 0.0) {
-            return None;
-        }
-        screen.force = force;
-        (screen.problem.normal, screen.problem.wrench) = (normal, self.wrench);
-        screen.known.clear();
-        let log = force.ln();
-        if let Some((at, last)) = &self.last {
-            let mut place = *last;
-            let grow = |by: f64| last.delta.map(|delta| delta * (by * (log - at)).exp());
-            place.delta = grow(GROWTH);
-            if let Some((from, before)) = self.before.as_ref().filter(|(from, _)| from != at) {
-                let step = (log - at) / (at - from);
-                for k in 0..2 {
-                    place.delta[k] += step * (last.delta[k] - before.delta[k]);
-                    place.delta[k] -= grow(GROWTH)[k] - last.delta[k];
-                    place.angles[k] += step * (last.angles[k] - before.angles[k]);
-                }
-            }
-            screen.keep(place);
-        }
-        let Some((Compared::At(mu), place, _)) = screen.reach(0.0) else { return None };
-        self.before = self.last.replace((log, place));
-        (mu > 0.0).then_some(mu)
     }
 }
 
