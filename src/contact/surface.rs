@@ -282,12 +282,7 @@ impl Spot {
             |piece: &&Piece| matches!(piece.gap, Gap::Sphere { .. } | Gap::Barrel { .. });
         let round = pieces.iter().find(is_round)?;
         let spot = whole_spot(round, stiffness, force)?;
-        let is_clear = |piece: &Piece| match piece.gap {
-            Gap::Plane { height, slope } => {
-                piece.outer.iter().all(|x| height + slope.dot(*x) >= spot.delta)
-            }
-            _ => std::ptr::eq(piece, round),
-        };
+        let is_clear = |piece: &Piece| std::ptr::eq(piece, round) || is_behind(piece, spot.delta);
         pieces.iter().all(is_clear).then_some(spot)
     }
 
@@ -296,6 +291,14 @@ impl Spot {
         let mut outer = ellipse(self.at, self.axis, self.half).to_vec();
         begin(&mut outer);
         Polygon { outer, holes: Vec::new() }
+    }
+}
+
+/// Whether a piece is a plane that a layer compressed by `delta` does not reach.
+pub(crate) fn is_behind(piece: &Piece, delta: f64) -> bool {
+    match piece.gap {
+        Gap::Plane { height, slope } => piece.outer.iter().all(|x| height + slope.dot(*x) >= delta),
+        _ => false,
     }
 }
 

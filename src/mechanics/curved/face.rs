@@ -4,7 +4,8 @@ use glam::DVec2;
 use nalgebra::{Matrix3, SVector, Vector3, Vector6};
 
 use crate::contact::quadric::{Dissipation, Region};
-use crate::contact::surface::{Field, Piece};
+use crate::contact::surface::{Field, Piece, is_behind};
+use crate::model::Gap;
 
 /// A face made ready.
 #[derive(Debug, Clone)]
@@ -80,14 +81,18 @@ const NEAR: f64 = 1e-7;
 const EXACT: f64 = 2e-16;
 
 impl Face {
-    pub(super) fn new(pieces: &[Piece], stiffness: f64, sign: f64) -> Self {
+    pub(super) fn new<'p>(
+        pieces: impl Iterator<Item = &'p Piece> + Clone,
+        stiffness: f64,
+        sign: f64,
+    ) -> Self {
         let fields = pieces
-            .iter()
+            .clone()
             .filter(|piece| piece.outer.len() >= 3)
             .map(Field::new)
             .filter(|field| field.area() > 0.0)
             .collect();
-        let corners = pieces.iter().flat_map(|piece| &piece.outer);
+        let corners = pieces.flat_map(|piece| &piece.outer);
         let reach = corners.map(|corner| corner.length()).fold(0.0, f64::max);
         Self { fields, stiffness, sign, reach }
     }
@@ -197,12 +202,6 @@ impl Face {
     /// The compression of [`Self::carry`] without tilt.
     pub(super) fn squeeze(&self, load: f64) -> Option<f64> {
         self.carrying(load, DVec2::ZERO, None, EXACT)
-    }
-
-    /// The compression at the pad's plane that carries `load` without tilt, looked for from `start` on
-    /// \[m\].
-    pub(super) fn compression(&self, load: f64, start: f64) -> Option<f64> {
-        self.carrying(load, DVec2::ZERO, Some(start), ROUNDING)
     }
 
     /// The compression that carries `load` at a tilt, but for a share of `within` of it, or for
@@ -327,6 +326,23 @@ impl<'a> Trial<'a> {
         let k = self.face.stiffness;
         (sum.times(k), by.map(|row| k * row))
     }
+}
+
+/// The compression at the plane of a pad on `pieces` that carries `load` without tilt, looked for from
+/// `start` on \[m\].
+pub(super) fn compression(pieces: &[Piece], stiffness: f64, load: f64, start: f64) -> Option<f64> {
+    let is_plane = |piece: &Piece| matches!(piece.gap, Gap::Plane { .. });
+    let round = || pieces.iter().filter(|piece| !is_plane(piece));
+    let found = |face: Face| face.carrying(load, DVec2::ZERO, Some(start), ROUNDING);
+    // Without the planes beside round pieces the compression is greater, if anything: mostly they are out
+    // of reach.
+    if round().next().is_some()
+        && let Some(delta) = found(Face::new(round(), stiffness, 1.0))
+        && pieces.iter().filter(|piece| is_plane(piece)).all(|plane| is_behind(plane, delta))
+    {
+        return Some(delta);
+    }
+    found(Face::new(pieces.iter(), stiffness, 1.0))
 }
 
 /// A twist of the pad plane in a surface's own axes.

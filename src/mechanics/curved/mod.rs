@@ -131,8 +131,8 @@ impl Pads {
         };
         Self {
             faces: [
-                Face::new(pieces[0], surfaces.stiffness[0], 1.0),
-                Face::new(pieces[1], surfaces.stiffness[1], -1.0),
+                Face::new(pieces[0].iter(), surfaces.stiffness[0], 1.0),
+                Face::new(pieces[1].iter(), surfaces.stiffness[1], -1.0),
             ],
             radii: pieces.map(radius),
             layer: surfaces.layer,
@@ -278,11 +278,18 @@ impl Pads {
         self.faces[0].compressed(deltas[0]).max(self.faces[1].compressed(deltas[1]))
     }
 
-    /// Compressions at the pads' planes \[m\] under a squeeze with `force` \[N\], looked for from `near`
-    /// on; `None` without contact.
-    pub(crate) fn compressions(&self, force: f64, near: [f64; 2]) -> Option<[f64; 2]> {
-        let [one, two] = &self.faces;
-        Some([one.compression(force, near[0])?, two.compression(force, near[1])?])
+    /// Compressions at the planes of pads on sound surfaces \[m\] under a squeeze with `force` \[N\], looked
+    /// for from `near` on; `None` without contact.
+    pub(crate) fn compressions(
+        surfaces: &Surfaces,
+        force: f64,
+        near: [f64; 2],
+    ) -> Option<[f64; 2]> {
+        let of = |side: usize| {
+            let pieces = [&surfaces.face_i, &surfaces.face_ii][side];
+            face::compression(pieces, surfaces.stiffness[side], force, near[side])
+        };
+        Some([of(0)?, of(1)?])
     }
 
     /// Axes in the pad plane about which the part can turn without any change of the pressure, at a

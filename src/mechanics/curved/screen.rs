@@ -33,9 +33,9 @@ pub struct Screen<'a> {
     pressed: [Pressed<'a>; 2],
     force: f64,
     near: Near,
-    /// Of the rotations held by the faces' roundness alone: which of the problem's held ones it is, its
-    /// stiffness over the force, and its change with the pull.
-    rolling: Vec<(usize, f64, f64)>,
+    /// Of the rotations held by the faces' roundness alone: which of the problem's held ones it is, and its
+    /// stiffness by the pull.
+    rolling: Vec<(usize, Stiffness)>,
     /// Of many loads.
     floors: Option<Floors>,
     /// States found so far.
@@ -57,6 +57,69 @@ fn nearest<'a>(known: &'a [Known], here: &[f64; 3]) -> Option<&'a Known> {
     known.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))
 }
 
+/// The stiffness of a rotation that the faces' roundness alone holds, by the pull: a polynomial through some
+/// values, as Newton has it.
+struct Stiffness {
+    pulls: Vec<f64>,
+    differences: Vec<f64>,
+}
+
+/// Two rotations' stiffnesses under a pull \[N\].
+type Look = (f64, [Option<f64>; 2]);
+
+impl Stiffness {
+    /// That of rotation `i` from looks at no pull and the extreme ones, and others where these are not on a
+    /// line; `None` where it is another curve.
+    fn by_pull(
+        i: usize,
+        looks: &[Look],
+        look: &dyn Fn(f64) -> Option<Look>,
+        force: f64,
+    ) -> Option<Self> {
+        let point = |(pull, stiffness): Look| Some((pull, stiffness[i]?));
+        let mut points: Vec<(f64, f64)> =
+            looks.iter().copied().map(point).collect::<Option<_>>()?;
+        let ends: Vec<f64> = points[1..].iter().map(|point| point.0).collect();
+        let here = points[0].1;
+        let fits = |curve: &Self, (pull, there): (f64, f64)| {
+            (curve.at(pull) - there).abs() <= FITS * here.abs() * pull.abs() / force
+        };
+        let (last, rest) = points.split_last()?;
+        let line = Self::through(rest);
+        if rest.is_empty() || rest.len() == 2 && fits(&line, *last) {
+            return Some(Self::through(&points));
+        }
+        for share in SHARES {
+            let more: Vec<(f64, f64)> =
+                ends.iter().map(|end| point(look(share * end)?)).collect::<Option<_>>()?;
+            let curve = Self::through(&points);
+            if more.iter().all(|point| fits(&curve, *point)) {
+                return Some(curve);
+            }
+            points.extend(more);
+        }
+        None
+    }
+
+    fn through(points: &[(f64, f64)]) -> Self {
+        let (pulls, mut differences): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
+        for order in 1..pulls.len() {
+            for k in (order..pulls.len()).rev() {
+                let rise = differences[k] - differences[k - 1];
+                differences[k] = rise / (pulls[k] - pulls[k - order]);
+            }
+        }
+        Self { pulls, differences }
+    }
+
+    fn at(&self, pull: f64) -> f64 {
+        let terms = self.pulls.iter().zip(&self.differences).rev();
+        terms.fold(0.0, |sum, (at, difference)| sum * (pull - at) + difference)
+    }
+}
+
+/// Shares of the extreme pulls at which a stiffness is looked at.
+const SHARES: [f64; 3] = [0.5, 0.75, 0.25];
 /// Loads from which on floors are worth their pressing.
 const MANY: usize = 16;
 /// States kept.
@@ -65,8 +128,9 @@ const MOST: usize = 64;
 const WEAK: f64 = 0.8;
 /// Sine of the angle between two axes that are one.
 const SAME_AXIS: f64 = 1e-6;
-/// Share of a stiffness by which it may differ from a line in the pull.
-const LINEAR: f64 = 1e-7;
+/// Share of a stiffness, times that of the pull in the force, by which a curve through some of its values
+/// may differ from another one.
+const FITS: f64 = 1e-7;
 /// Share of the layers' give, squeezed without a load, from which on a part may settle.
 const SETTLES: f64 = 0.4;
 /// Share of a bound that covers rounding.
@@ -106,10 +170,14 @@ impl Pads {
         let on_axis = rotations.iter().any(|rotation| rotation.kind == Kind::Free);
         let nearly = rotations.iter().any(|rotation| matches!(rotation.kind, Kind::Nearly(_)));
         let always = on_axis && !nearly && self.plainly_round();
-        let mut stiffness = [Vec::new(), Vec::new()];
-        let mut others_looked_at = 0;
-        for pull in [low, high].into_iter().filter(|pull| !always && pull.abs() > 1e-9 * force) {
-            others_looked_at += 1;
+        // The stiffnesses of what the roundness alone holds.
+        let stiffness = |rotations: &[Rotation; 2]| {
+            [0, 1].map(|i| match rotations[i].kind {
+                Kind::Nearly(stiffness) if !is_free[i] => Some(stiffness),
+                _ => None,
+            })
+        };
+        let look = |pull: f64| {
             let [one, two] = squeeze(pull)?;
             let others = space::rotations([&one, &two], distance);
             let other_free = free(others);
@@ -118,31 +186,18 @@ impl Pads {
                 let any_axis = is_free[0] == is_free[1] && (is_free[0] || !nearly);
                 is_free[i] == other_free[i] && (any_axis || apart < SAME_AXIS)
             });
-            if !same {
-                return None;
-            }
-            for (i, along) in stiffness.iter_mut().enumerate() {
-                match others[i].kind {
-                    Kind::Nearly(there) if !is_free[i] => along.push((pull, there)),
-                    _ => {}
-                }
-            }
+            same.then(|| (pull, stiffness(&others)))
+        };
+        let mut looks = vec![(0.0, stiffness(&rotations))];
+        for pull in [low, high].into_iter().filter(|pull| !always && pull.abs() > 1e-9 * force) {
+            looks.push(look(pull)?);
         }
         let mut rolling = Vec::new();
         for (place, i) in (0..2).filter(|&i| !is_free[i]).enumerate() {
-            if let Kind::Nearly(here) = rotations[i].kind {
-                let changes = stiffness[i].iter().map(|(pull, there)| (there - here) / pull);
-                let slope = changes.clone().next().unwrap_or(0.0);
-                let known = stiffness[i].len() == others_looked_at;
-                // The same lever of each face under all forces.
-                if !known || changes.into_iter().any(|x| (x - slope).abs() > LINEAR * here / force)
-                {
-                    return None;
-                }
-                rolling.push((place, here / force, slope));
-            } else if !stiffness[i].is_empty() {
-                return None;
+            if looks.iter().all(|(_, stiffness)| stiffness[i].is_none()) {
+                continue;
             }
+            rolling.push((place, Stiffness::by_pull(i, &looks, &look, force)?));
         }
         let faces = [&pressed[0], &pressed[1]];
         let normal = [force; 2];
@@ -186,8 +241,8 @@ impl Screen<'_> {
             return Compared::Open;
         }
         (self.problem.normal, self.problem.wrench) = (normal, *wrench);
-        for &(held, stiffness, by_pull) in &self.rolling {
-            self.problem.rolling[held] = stiffness * self.force + by_pull * wrench.force.z;
+        for (held, stiffness) in &self.rolling {
+            self.problem.rolling[*held] = stiffness.at(wrench.force.z);
         }
         if let Some(floors) = &self.floors {
             if !strong(&self.problem, value / WEAK) && floors.below(&self.problem, value).is_some()
@@ -223,8 +278,8 @@ impl Screen<'_> {
     fn may_settle(&self, place: &Place) -> bool {
         let give = self.pressed.iter().map(|face| 0.5 * face.compression()).sum::<f64>();
         let tilt = self.problem.tilt(&place.angles);
-        self.rolling.iter().any(|&(held, ..)| {
-            let angle = self.problem.held[held].dot(DVec2::new(tilt.y, -tilt.x)).abs();
+        self.rolling.iter().any(|(held, _)| {
+            let angle = self.problem.held[*held].dot(DVec2::new(tilt.y, -tilt.x)).abs();
             0.5 * self.problem.distance.abs() * angle > SETTLES * give
         })
     }

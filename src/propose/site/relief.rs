@@ -152,9 +152,9 @@ impl Relief {
         {
             return Contact { face_i: vec![one.outline()], face_ii: vec![two.outline()] };
         }
-        let pads = Pads::new(surfaces).ok();
-        let deltas = pads.and_then(|pads| pads.compressions(self.force, near));
-        let Some([one, two]) = deltas else { return Contact::default() };
+        let Some([one, two]) = Pads::compressions(surfaces, self.force, near) else {
+            return Contact::default();
+        };
         let outline = |pieces: &[Piece], delta: f64| -> Patch {
             pieces.iter().flat_map(|piece| pressed(piece, delta)).collect()
         };

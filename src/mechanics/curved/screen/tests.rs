@@ -91,6 +91,41 @@ fn loads(count: u32) -> Vec<Wrench> {
     (0..count).map(load).collect()
 }
 
+/// On a shaft with a round end, gripped where it ends, no axis is held by more than the roundness, and the
+/// stiffness about one is no line in the pull: loads are compared all the same.
+#[test]
+fn loads_on_a_round_end_are_compared() {
+    let radius = 0.008;
+    let strip = |[low, high]: [f64; 2], gap: Gap| {
+        let outer = [(low, -0.004), (high, -0.004), (high, 0.004), (low, 0.004)];
+        Piece { outer: outer.map(DVec2::from).to_vec(), holes: Vec::new(), gap }
+    };
+    let at = DVec2::new(0.003, 0.0);
+    let side = vec![
+        strip([-0.01, at.x], Gap::Cylinder { radius, axis: DVec2::X, at, height: 0.0 }),
+        strip([at.x, 0.008], Gap::Sphere { radius, at, height: 0.0 }),
+    ];
+    let (face_i, face_ii) = (side.clone(), side);
+    let (stiffness, distance, force) = ([5e9; 2], 2.0 * radius, 200.0);
+    let pads = Pads::new(&Surfaces { face_i, face_ii, stiffness, layer: None }).unwrap();
+    let wrenches = loads(100);
+    let mut screen = pads.screen(distance, force, &wrenches).unwrap();
+    assert_eq!(screen.rolling.len(), 1);
+    let (_, stiffness) = &screen.rolling[0];
+    let bend = stiffness.at(4.0) + stiffness.at(-4.0) - 2.0 * stiffness.at(0.0);
+    assert!(bend.abs() > 1e-6 * stiffness.at(0.0), "{bend:e}");
+    let mut compared = 0;
+    for wrench in &wrenches {
+        let mu = pads.score(distance, force, wrench).mu_s.unwrap();
+        if let Compared::At(found) = screen.compare(wrench, 0.0) {
+            assert!((found / mu - 1.0).abs() < 1e-9, "{found} {mu}");
+            compared += 1;
+        }
+        assert_ne!(screen.compare(wrench, 0.999 * mu), Compared::Below);
+    }
+    assert!(compared > 90, "{compared}");
+}
+
 /// Most loads far below the value never reach Newton's method.
 #[test]
 fn floors_take_most_loads() {
