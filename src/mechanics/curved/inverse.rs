@@ -8,8 +8,8 @@ use crate::model::Wrench;
 const FOUND: f64 = 1e-9;
 /// The same on the way, so that what is found is right to [`FOUND`].
 const CLOSER: f64 = 1e-11;
-/// The same where the load is held at no less for want of a limit state: each try there is a search over
-/// all tilts.
+/// The same where the load is held at no less for want of a limit state: tries there are in vain, and where
+/// nothing could be followed each is a search over all tilts.
 const HELD: f64 = 1e-7;
 /// Solves at most.
 const STEPS: i32 = 120;

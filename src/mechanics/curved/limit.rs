@@ -35,9 +35,9 @@ pub(super) struct Case<'a, 'c> {
 
 /// What a case came to.
 pub(super) struct Limit<'a> {
-    pub(super) problem: Problem<'a>,
+    problem: Problem<'a>,
     status: Status,
-    pub(super) state: Option<State<'a>>,
+    state: Option<State<'a>>,
     notes: Vec<Note>,
 }
 
