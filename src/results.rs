@@ -243,7 +243,8 @@ pub struct RankedGrip {
     /// Pad friction over `mu_s`; `None` when the gripper states no pad friction or `mu_s = 0`.
     pub safety: Option<f64>,
     /// Gripping force of one jaw at which `mu_s` of the worst load equals the pad friction over the
-    /// safety \[N\].
+    /// safety \[N\]. With less force than the plan's another load can be the worst, most of all where
+    /// a pad lifts: a plan with that force tells.
     pub force_needed: Option<f64>,
     /// Of a contact that is not plane: what each face carries under the worst load.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -75,7 +75,8 @@ fn legend(
             };
             texts.push(format!(
                 "safety: the pads' friction {friction} over mu_s; a grip holds where it is at least \
-                 {}. force N: gripping force per jaw with which it {usable}{}.{multiple}",
+                 {}. force N: gripping force per jaw with which it {usable} under that load{}; with \
+                 less force another load can be worse.{multiple}",
                 pads.safety,
                 range_note(set, shown, gripper)
             ));
