@@ -185,7 +185,7 @@ fn print(outcomes: &[Compared]) -> anyhow::Result<()> {
     let text = format!(
         "force N: gripping force per jaw with which it {usable}; + more than the gripper has, - less \
          than its least. pad: share of the pad that touches; left: share of that contact left under \
-         the worst load."
+         the worst load. mu_s and force N are that load's; with less force another load can be worse."
     );
     writeln!(out, "\n{}", wrapped(&text, width))?;
     Ok(())
