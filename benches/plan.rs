@@ -47,7 +47,7 @@ fn plan(gripper: &Gripper, loads: &LoadSet, seeds: &SeedSet) -> u64 {
             .with_pads(settings.pads)
             .with_top(Some(10_000)),
     );
-    assessor.finish(&mut ranking.grips);
+    assessor.finish(&mut ranking.grips).unwrap();
     ranking.ranked
 }
 

@@ -29,6 +29,7 @@ mod cause;
 pub mod checkpoint;
 mod collect;
 mod limits;
+mod needed;
 mod negatives;
 pub mod noise;
 mod output;
@@ -360,7 +361,7 @@ impl Plan {
         }
         let mut grips = self.kept(ranking.grips, size);
         observer.finishing(grips.len());
-        assessor.finish(&mut grips);
+        assessor.finish(&mut grips)?;
         let comparison = selection
             .compare
             .map(|weights| compare::compare(&mut grips, centre, self.settings.force, &weights));

@@ -242,9 +242,9 @@ pub struct RankedGrip {
     pub twist_margin: f64,
     /// Pad friction over `mu_s`; `None` when the gripper states no pad friction or `mu_s = 0`.
     pub safety: Option<f64>,
-    /// Gripping force of one jaw at which `mu_s` of the worst load equals the pad friction over the
-    /// safety \[N\]. With less force than the plan's another load can be the worst, most of all where
-    /// a pad lifts: a plan with that force tells.
+    /// Gripping force of one jaw at which the pad friction over the safety just holds every load \[N\].
+    /// With less force than the plan's the load that needs it is often another than the worst one, most
+    /// of all where a pad lifts. See [`crate::plan::Assessor::finish`].
     pub force_needed: Option<f64>,
     /// Of a contact that is not plane: what each face carries under the worst load.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -256,9 +256,8 @@ pub struct RankedGrip {
     /// were merged.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub merged: Vec<u64>,
-    /// Largest multiple of the worst load, all of it, that the pad friction holds together with
-    /// every smaller one; `None` without a pad friction, or without a load. Another load may end at
-    /// a smaller multiple: see [`crate::mechanics::inverse`].
+    /// Largest multiple of all loads that the pad friction holds together with every smaller one;
+    /// `None` without a pad friction, or without a load.
     #[serde(default)]
     pub load_multiple: Option<f64>,
     /// By the earlier method, when asked for.

@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::score::{Scored, TIE, usable};
+use super::score::{Exceeding, Scored, TIE, usable};
 use super::top::{Beaten, Best, race};
 use super::watch::Watch;
 use crate::mechanics::curved::{Compared, Pads, Screen};
@@ -31,6 +31,17 @@ pub struct CurvedProblem<'a> {
 /// depend on the number of threads.
 pub fn score_curved(problems: &[CurvedProblem<'_>], polish: Polish) -> Vec<Scored> {
     problems.par_iter().map(|problem| problem.polished(polish)).collect()
+}
+
+/// As [`super::Backend::exceeding`], all loads but the `known` ones looked at.
+pub(crate) fn exceeding_curved(
+    problems: &[CurvedProblem<'_>],
+    friction: f64,
+    known: &[&[usize]],
+) -> Vec<Exceeding> {
+    let exceeding =
+        |(problem, known): (&CurvedProblem<'_>, &&[usize])| problem.exceeding(friction, known);
+    problems.par_iter().zip(known).map(exceeding).collect()
 }
 
 /// As [`score_curved`], as far as `watch` does not stop it: `None` for the other grips. With `best`
@@ -130,14 +141,7 @@ impl CurvedProblem<'_> {
     }
 
     fn compared(&self, mut screen: Option<Screen<'_>>, beaten: Option<&Beaten<'_>>) -> Scored {
-        let lever = self.lever();
-        let estimate = |wrench: &Wrench| match &screen {
-            Some(screen) => screen.estimate(wrench),
-            None => self.roughly(wrench, lever),
-        };
-        let estimates: Vec<f64> = self.wrenches.iter().map(estimate).collect();
-        let mut order: Vec<usize> = (0..self.wrenches.len()).collect();
-        order.sort_by(|&a, &b| estimates[b].total_cmp(&estimates[a]).then(a.cmp(&b)));
+        let order = self.by_estimate(screen.as_ref());
         let (mut seen, mut largest) = (Seen::default(), 0.0);
         for (place, &load) in order.iter().enumerate() {
             match self.held(&mut screen, load, largest * (1.0 - 2.0 * TIE), &mut seen) {
@@ -170,6 +174,43 @@ impl CurvedProblem<'_> {
         };
         let worst = worst(solved.iter().copied()).map(whole);
         Scored { worst, all: Vec::new(), solved: solved.len(), compared, outranked: false }
+    }
+
+    fn exceeding(&self, friction: f64, known: &[usize]) -> Exceeding {
+        let Self { pads, distance, force, wrenches } = *self;
+        let mut screen = pads.and_then(|pads| pads.screen(distance, force, wrenches));
+        let mut found = Exceeding::default();
+        for load in self.by_estimate(screen.as_ref()) {
+            if known.contains(&load) {
+                continue;
+            }
+            let compared = match &mut screen {
+                Some(screen) => screen.compare(&self.wrenches[load], friction),
+                None => Compared::Open,
+            };
+            let held = match compared {
+                Compared::Below => true,
+                Compared::At(mu) => mu <= friction,
+                Compared::Open => false,
+            };
+            if !held {
+                found.loads.push(load);
+            }
+        }
+        found
+    }
+
+    /// Loads, the one first that seems to ask for most.
+    fn by_estimate(&self, screen: Option<&Screen<'_>>) -> Vec<usize> {
+        let lever = self.lever();
+        let estimate = |wrench: &Wrench| match screen {
+            Some(screen) => screen.estimate(wrench),
+            None => self.roughly(wrench, lever),
+        };
+        let estimates: Vec<f64> = self.wrenches.iter().map(estimate).collect();
+        let mut order: Vec<usize> = (0..self.wrenches.len()).collect();
+        order.sort_by(|&a, &b| estimates[b].total_cmp(&estimates[a]).then(a.cmp(&b)));
+        order
     }
 
     /// At least the `mu_s` of a load that is held, or no more than `value`.

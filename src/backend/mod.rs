@@ -46,10 +46,11 @@ pub use gpu::{
 
 pub use crate::request::{Choice, Polish};
 pub use choice::{Selection, select};
-pub(crate) use curved::score_curved_watched;
 pub use curved::{CurvedProblem, score_curved};
+pub(crate) use curved::{exceeding_curved, score_curved_watched};
 pub use job::Backend;
 pub use problem::{Batch, F32_TOLERANCE, LOAD_TOLERANCE, Pose, Problem, Seed, SeedStatus};
+pub(crate) use score::Exceeding;
 pub use score::{ScoreOptions, Scored};
 pub use seeds::{NEGATED, RING, SeedSet};
 pub use top::Best;

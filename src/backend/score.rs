@@ -89,15 +89,39 @@ impl Backend {
         })
     }
 
+    /// What is left of each grip's loads to be asked about: those that are not soon seen to be held by
+    /// `friction`, in some limit state. Loads that are `known` are not looked at.
+    ///
+    /// # Errors
+    /// As [`Backend::seed`].
+    pub(crate) fn exceeding(
+        &self,
+        batch: &Batch<'_>,
+        seeds: &SeedSet,
+        options: &ScoreOptions,
+        friction: f64,
+        known: &[&[usize]],
+    ) -> Result<Vec<Exceeding>> {
+        self.by_blocks((BLOCK, Wanted::Worst), batch, seeds, |block| {
+            let Block { range, contacts, survivors } = block;
+            let known = &known[range.clone()];
+            cases(&contacts, &batch.problems[range], &survivors, options)
+                .into_par_iter()
+                .zip(known)
+                .map(|(case, known)| case.exceeding(friction, known))
+                .collect()
+        })
+    }
+
     /// Seeds one block of the batch, of `most` loads or one problem, after another. While a block is
     /// seeded, the one before is solved.
-    pub(super) fn by_blocks(
+    pub(super) fn by_blocks<T: Send>(
         &self,
         (most, wanted): (usize, Wanted),
         batch: &Batch<'_>,
         seeds: &SeedSet,
-        mut solve: impl FnMut(Block) -> Vec<Scored> + Send,
-    ) -> Result<Vec<Scored>> {
+        mut solve: impl FnMut(Block) -> Vec<T> + Send,
+    ) -> Result<Vec<T>> {
         let mut solve = |block: Block| {
             let start = std::time::Instant::now();
             let scored = solve(block);
@@ -167,6 +191,15 @@ pub(super) fn cases<'a>(
         .collect()
 }
 
+/// Loads of a grip that are not soon seen to be held by a friction.
+#[derive(Debug, Default)]
+pub(crate) struct Exceeding {
+    /// Loads that are not, the nearest to twisting out first.
+    pub(crate) loads: Vec<usize>,
+    /// Whether others were not looked at.
+    pub(crate) others: bool,
+}
+
 /// One grip with the seeds of its loads that can be the worst. In what follows a load goes by its
 /// place among these; only the answer has its number among all.
 #[derive(Clone, Copy)]
@@ -225,12 +258,7 @@ impl Case<'_> {
         if beaten.is_some() && out(self.lower()) {
             return work.outranked();
         }
-        let has_bounds = |load: &usize| {
-            matches!(
-                self.seeds[*load].status,
-                SeedStatus::Bounded | SeedStatus::Coupled | SeedStatus::Estimated
-            )
-        };
+        let has_bounds = |load: &usize| self.has_bounds(*load);
         let (bounded, open): (Vec<usize>, Vec<usize>) = (0..self.seeds.len()).partition(has_bounds);
         let open = self.in_turn(open, beaten.is_some());
         work.at_least(bounded.iter().map(|&load| self.seeds[load].lower).fold(0.0, f64::max));
@@ -242,6 +270,26 @@ impl Case<'_> {
             Err(Ended::Refused) if beaten.is_some() => self.score(None),
             Err(Ended::Refused) => work.refused(),
         }
+    }
+
+    fn has_bounds(&self, load: usize) -> bool {
+        matches!(
+            self.seeds[load].status,
+            SeedStatus::Bounded | SeedStatus::Coupled | SeedStatus::Estimated
+        )
+    }
+
+    /// As [`Backend::exceeding`].
+    fn exceeding(&self, friction: f64, known: &[usize]) -> Exceeding {
+        let asked =
+            (0..self.seeds.len()).filter(|&load| !known.contains(&(self.loads[load] as usize)));
+        let (bounded, open): (Vec<usize>, Vec<usize>) =
+            asked.partition(|&load| self.has_bounds(load));
+        // Loads left out by a bound are below the greatest of these.
+        let lower = self.seeds.iter().map(|seed| seed.lower).fold(0.0, f64::max);
+        let found = Work::new(self).exceeding(friction, &self.in_turn(open, false), &bounded);
+        let loads = found.into_iter().map(|load| self.loads[load] as usize).collect();
+        Exceeding { loads, others: lower > friction }
     }
 
     /// Every load solved exactly.

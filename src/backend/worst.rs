@@ -7,7 +7,8 @@ use super::problem::{F32_TOLERANCE, SeedStatus};
 use super::score::{Case, Scored, TIE, usable};
 use crate::contact::{ABREAST, Field, PlaneWrench, Twist, widest};
 use crate::mechanics::{
-    Comparer, Comparison, Load, Neighbour, Pads, Question, Search, abreast, slip, solve_next,
+    Comparer, Comparison, Load, Neighbour, Pads, Question, Search, abreast, nearby, slip,
+    solve_next,
 };
 use crate::model::Score;
 use crate::request::Refiner;
@@ -20,6 +21,8 @@ pub(super) struct Work<'a> {
     neighbours: Neighbours,
     comparer: Option<Comparer<'a>>,
     open: Open,
+    /// Loads that are not seen to be held by the friction `open.floor`, where these are wanted.
+    wanted: Option<Vec<usize>>,
 }
 
 /// What is known of the largest `mu_s` before the loads that can have it are solved.
@@ -34,12 +37,6 @@ struct Open {
 }
 
 impl Open {
-    /// A load whose `mu_s` is at least the one and at most the other is to be solved, perhaps.
-    fn keep(&mut self, load: usize, [least, most]: [f64; 2]) {
-        self.floor = self.floor.max(least);
-        self.loads.push((load, most));
-    }
-
     /// A load whose `mu_s` is less than this is not the worst, and does not tie with it.
     fn value(&self) -> f64 {
         self.floor.max(self.largest) * (1.0 - 2.0 * TIE)
@@ -206,6 +203,7 @@ impl<'a> Work<'a> {
             neighbours: Neighbours::default(),
             comparer: case.pads.map(|pads| Comparer::new(pads, case.problem.force)),
             open: Open::default(),
+            wanted: None,
         }
     }
 }
@@ -226,7 +224,7 @@ impl Work<'_> {
         let estimate = |load: usize| self.case.seeds[load].estimate;
         let leader = loads.iter().copied().max_by(|&a, &b| estimate(a).total_cmp(&estimate(b)));
         let leader = leader.filter(|&load| {
-            let solved = self.compare(load, Question { value: 0.0, sharp: 0.0 });
+            let solved = self.compare(load, Question::of(0.0, 0.0));
             if let Compared::Solved(mu) = solved {
                 self.open.largest = mu;
                 return true;
@@ -307,7 +305,7 @@ impl Work<'_> {
     /// Compares the loads that wait with what is known of the worst one.
     fn look_at(&mut self, queue: &mut Queue, patient: bool) -> std::result::Result<(), Ended> {
         let Waiting { scaled, more } = &mut queue.waiting;
-        let question = Question { value: self.open.value(), sharp: SHARP };
+        let question = self.question();
         let mut found = [None; ABREAST];
         // One or two go faster one by one.
         if let (Some(comparer), [first, _, _, ..]) = (&mut self.comparer, &more[..]) {
@@ -323,7 +321,7 @@ impl Work<'_> {
             };
             self.compared += 1;
             if most >= question.value {
-                self.open.keep(load, [least, most]);
+                self.keep(load, [least, most]);
             }
             // The states of those before it may be like it.
             let now = || self.neighbours.nearest(&here).map_or(f32::INFINITY, |(apart, _)| apart);
@@ -364,17 +362,81 @@ impl Work<'_> {
         self.solved.push(found);
     }
 
+    /// Whether a load can be the worst; where only those that are not held are wanted any state that
+    /// holds it will do.
+    fn question(&self) -> Question {
+        let mut question = Question::of(self.open.value(), SHARP);
+        if self.wanted.is_some() {
+            question.coupling = f64::INFINITY;
+        }
+        question
+    }
+
     /// Compares a load with what is known of the worst one.
     fn look(&mut self, load: usize) -> std::result::Result<(), Ended> {
-        match self.compare(load, Question { value: self.open.value(), sharp: SHARP }) {
+        match self.compare(load, self.question()) {
             Compared::Below => {}
-            Compared::Between([least, most]) => {
-                self.open.keep(load, [least, most]);
-            }
-            Compared::Solved(mu) => self.open.largest = self.open.largest.max(mu),
-            Compared::Refused => return Err(Ended::Refused),
+            Compared::Between(bounds) => self.keep(load, bounds),
+            Compared::Solved(mu) => self.found(load, mu),
+            Compared::Refused => return self.refuse(load),
         }
         Ok(())
+    }
+
+    /// A load that is not held ends the search, but where all of those are wanted.
+    fn refuse(&mut self, load: usize) -> std::result::Result<(), Ended> {
+        if self.wanted.is_none() {
+            return Err(Ended::Refused);
+        }
+        self.want(load);
+        Ok(())
+    }
+
+    fn want(&mut self, load: usize) {
+        self.wanted.get_or_insert_default().push(load);
+    }
+
+    /// A load whose `mu_s` is at least the one and at most the other is to be solved, perhaps.
+    fn keep(&mut self, load: usize, [least, most]: [f64; 2]) {
+        if self.wanted.is_none() {
+            self.open.floor = self.open.floor.max(least);
+        } else if least > self.open.floor {
+            return self.want(load);
+        }
+        self.open.loads.push((load, most));
+    }
+
+    /// A load's `mu_s`.
+    fn found(&mut self, load: usize, mu: f64) {
+        if self.wanted.is_none() {
+            self.open.largest = self.open.largest.max(mu);
+        } else if mu > self.open.floor {
+            self.want(load);
+        }
+    }
+
+    /// Loads that are not soon seen to be held by `friction`: see [`super::Backend::exceeding`].
+    pub(super) fn exceeding(
+        mut self,
+        friction: f64,
+        open: &[usize],
+        bounded: &[usize],
+    ) -> Vec<usize> {
+        self.at_least(friction);
+        self.wanted = Some(Vec::new());
+        let value = friction * (1.0 - F32_TOLERANCE);
+        let mut looked = self.through(open, None, &|_| false, &mut Queue::default());
+        for &load in bounded {
+            let (case, seed) = (self.case, &self.case.seeds[load]);
+            let known = seed.status == SeedStatus::Bounded;
+            let slips = |pads| !known || slip_only(pads, case, load) > value;
+            if seed.upper > value && case.pads.is_none_or(slips) {
+                looked = looked.and_then(|()| self.look(load));
+            }
+        }
+        let looked = looked.and_then(|()| self.solve_open());
+        debug_assert!(looked.is_ok(), "nothing ends it");
+        self.wanted.unwrap_or_default()
     }
 
     /// Solves those of the loads left open that can be the worst.
@@ -387,10 +449,10 @@ impl Work<'_> {
                 break;
             }
             self.compared -= 1;
-            match self.compare(load, Question { value, sharp: 0.0 }) {
+            match self.compare(load, Question { sharp: 0.0, ..self.question() }) {
                 Compared::Below | Compared::Between(_) => {}
-                Compared::Solved(mu) => self.open.largest = self.open.largest.max(mu),
-                Compared::Refused => return Err(Ended::Refused),
+                Compared::Solved(mu) => self.found(load, mu),
+                Compared::Refused => self.refuse(load)?,
             }
         }
         Ok(())
@@ -524,6 +586,17 @@ impl Work<'_> {
             _ => {}
         }
         let mut start = near.map(Neighbour::start);
+        if self.wanted.is_some() {
+            let Some(mu) = nearby(pads, &scaled, &options, &mut start) else {
+                return Compared::Refused;
+            };
+            if unlike
+                && let Some(state) = start.and_then(|start| Neighbour::at(pads, &scaled, start))
+            {
+                self.neighbours.add(here, state);
+            }
+            return Compared::Solved(mu);
+        }
         let wrench = &case.wrench(load);
         let score = solve_next(pads, problem.distance, problem.force, wrench, &options, &mut start);
         if usable(&score).is_none() {

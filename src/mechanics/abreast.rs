@@ -12,7 +12,6 @@ use crate::contact::{ABREAST, Abreast, Cuts, Twist, cut_frictions, frictions, wi
 
 use definite::{Definite, dot};
 
-use super::branch::COUPLING_SEARCH;
 use super::compare::{CONTRACTION, Question, WITHIN};
 use super::equilibrium::{Integrals, Vector7};
 use super::pads::{Load, Pads};
@@ -20,7 +19,7 @@ use super::pressure::stiffness_rows;
 
 /// What is asked about loads of which only the seeds know something: bounds close enough to leave
 /// out most of them.
-const CLOSE: Question = Question { value: 0.0, sharp: 1e-3 };
+const CLOSE: Question = Question::of(0.0, 1e-3);
 /// Corrections after the first.
 const CORRECTIONS: usize = 2;
 /// The same beside a state of a load like it.
@@ -534,7 +533,7 @@ fn newton(
     pads: &Pads,
     loads: &Loads,
     begin: &Begin,
-    Question { value, sharp }: Question,
+    Question { value, sharp, coupling }: Question,
     (corrections, cut): (usize, bool),
     work: &mut Abreasts,
 ) {
@@ -566,7 +565,7 @@ fn newton(
             let contracts = falls & (after[i] <= CONTRACTION * before[i]);
             let least = (at.d[i] - WITHIN * after[i]) * loads.size[i] * (1.0 - ROUNDING);
             let most = (at.d[i] + WITHIN * after[i]) * loads.size[i] * (1.0 + ROUNDING);
-            let weak = most * 2.0 * loads.half_distance[i].abs() <= COUPLING_SEARCH;
+            let weak = most * 2.0 * loads.half_distance[i].abs() <= coupling;
             let good = known[i] & contracts & weak;
             if !done[i] {
                 work.low[i] = if good { least } else { f64::INFINITY };

@@ -84,8 +84,8 @@ const DEFLATED_STEP: f64 = 0.1;
 
 impl Solver<'_> {
     /// Newton's method on all seven equations from the pressure `q` without coupling and a rough
-    /// slip under it. Only for a coupling so weak that there is one solution: whichever way it was
-    /// reached, it is the one on the branch from `d = 0`.
+    /// slip under it. Where the coupling is so weak that there is one solution, it is the one on the
+    /// branch from `d = 0`, whichever way it was reached.
     fn direct(&mut self, q: [f64; 4], seed: Option<Twist>) -> Option<State> {
         let p = [face_pressure(&q, 0), face_pressure(&q, 1)];
         let parted = [0, 1].map(|k| separates(&self.pads.areas[k], p[k]));
@@ -107,23 +107,31 @@ impl Solver<'_> {
             self.evaluations += 1;
             slip::approach(&fields, w, seed)
         };
-        let state = self.newton(unknowns(v, q), 1.0, 12)?;
-        (!strong(&state, &self.load)).then_some(state)
+        self.newton(unknowns(v, q), 1.0, 12)
+    }
+
+    /// A limit state near `z`, that of another load, or else near the pressure without coupling: where the
+    /// coupling is strong it need not be the one on the branch from `d = 0`.
+    pub(super) fn nearby(&mut self, z: Option<&Vector7>, seed: Option<Twist>) -> Option<State> {
+        let near = z.and_then(|z| self.newton(*z, 1.0, 6));
+        near.or_else(|| {
+            let q = self.uncoupled()?;
+            self.direct(q, seed)
+        })
+    }
+
+    /// The pressure without coupling; `None` at the rim, where [`Solver::state_at`] knows the way.
+    fn uncoupled(&mut self) -> Option<[f64; 4]> {
+        let (normal, moment) = (self.load.normal, self.load.contact_moment());
+        pressure::solve(self.pads, normal, moment, None, &mut self.scratch[0])
     }
 
     /// The solution on the branch that starts at `d = 0` without coupling; `None` when that branch
     /// does not exist, or ends before the real `d`.
     pub(crate) fn branch(&mut self, seed: Option<Twist>) -> Option<State> {
         if self.refiner == Refiner::Newton {
-            // None at the rim, where [`Solver::state_at`] knows the way.
-            let q = pressure::solve(
-                self.pads,
-                self.load.normal,
-                self.load.contact_moment(),
-                None,
-                &mut self.scratch[0],
-            );
-            if let Some(state) = q.and_then(|q| self.direct(q, seed)) {
+            let state = self.uncoupled().and_then(|q| self.direct(q, seed));
+            if let Some(state) = state.filter(|state| !strong(state, &self.load)) {
                 return Some(state);
             }
         }
@@ -169,6 +177,7 @@ impl Solver<'_> {
     pub(crate) fn follow(&mut self, start: Vector7) -> Option<State> {
         let mut at = self.newton(start, 0.0, 25)?;
         let (mut reached, mut step) = (if self.load.half_distance == 0.0 { 1.0 } else { 0.0 }, 1.0);
+        let mut left_before: Option<(f64, f64)> = None;
         for _ in 0..FOLLOW_MOST {
             if reached == 1.0 {
                 return Some(at);
@@ -179,6 +188,14 @@ impl Solver<'_> {
             let slope = Self::slope_at(&here, reached);
             let tangent = -(slope.inverse() * friction);
             let room = pressure::reach(self.pads, self.load.normal, here.x);
+            if let Some((before, then)) = left_before
+                && room < FOLLOW_LEAVES
+                && reached + FOLLOW_FORETOLD * room * (reached - then) / (before - room).max(0.0)
+                    < 1.0
+            {
+                return None;
+            }
+            left_before = Some((room, reached));
             loop {
                 let next = f64::min(1.0, reached + step);
                 let moved = (next - reached) * tangent;
@@ -486,6 +503,10 @@ const FOLLOW_LEAST: f64 = 1e-9;
 const FOLLOW_MOST: usize = 1000;
 /// Share that a step leaves of the way to the region's rim, where no contact is left.
 const FOLLOW_SHARE: f64 = 0.25;
+/// Distance from the rim below which the map hardly changes up to it, so that a branch that comes up to
+/// the rim leaves the region where it is foretold to, and how much farther it may go than foretold.
+const FOLLOW_LEAVES: f64 = 1e-3;
+const FOLLOW_FORETOLD: f64 = 4.0;
 /// What [`Solver::follow`] leaves to Newton's method on all equations, as a share of the way to the
 /// rim.
 const FOLLOW_CLOSE: f64 = 1e-3;

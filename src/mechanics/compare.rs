@@ -150,6 +150,16 @@ pub(crate) struct Question {
     pub(crate) value: f64,
     /// If not, between which bounds it lies: this share apart. Zero: what it is.
     pub(crate) sharp: f64,
+    /// Strength of the coupling up to which a state that is found counts: beyond [`COUPLING_SEARCH`] it
+    /// need not be the one on the branch from `d = 0`, the limit state asked for.
+    pub(crate) coupling: f64,
+}
+
+impl Question {
+    /// About the state on the branch from `d = 0`.
+    pub(crate) const fn of(value: f64, sharp: f64) -> Self {
+        Self { value, sharp, coupling: COUPLING_SEARCH }
+    }
 }
 
 /// What [`Comparer::compare`] found out about a load.
@@ -254,7 +264,7 @@ impl<'a> Comparer<'a> {
         (solver.load, solver.evaluations) = (*load, 0);
         // A pad that lifts ends the grip: that is for the solution to say.
         let question = match options.separation {
-            Separation::Discard => Question { value: 0.0, sharp: 0.0 },
+            Separation::Discard => Question::of(0.0, 0.0),
             Separation::Solve => question,
         };
         let seed = options.seed.map(|twist| solver.pads.scaled_twist(twist));
@@ -303,7 +313,7 @@ impl Solver<'_> {
         mut z: Vector7,
         mut residual: Vector7,
         mut step: Vector7,
-        Question { value, sharp }: Question,
+        Question { value, sharp, coupling }: Question,
         reached: &mut Integrals,
     ) -> Option<(Option<State>, [f64; 2])> {
         let mut jacobian = Matrix7::zeros();
@@ -321,7 +331,7 @@ impl Solver<'_> {
             if after <= CONTRACTION * before {
                 let [least, most] =
                     [-WITHIN, WITHIN].map(|by| (next.mu_over_size + by * after) * self.load.size);
-                let weak = most * 2.0 * self.load.half_distance.abs() <= COUPLING_SEARCH;
+                let weak = most * 2.0 * self.load.half_distance.abs() <= coupling;
                 let sharp_enough = sharp > 0.0 && most - least <= sharp * most;
                 if weak && (most < value || sharp_enough) {
                     return Some((None, [least, most]));
@@ -335,7 +345,9 @@ impl Solver<'_> {
         }
         let found = self.newton(z + step, 1.0, 6)?;
         let mu = found.mu_over_size * self.load.size;
-        (!strong(&found, &self.load)).then_some((Some(found), [mu; 2]))
+        let strong = mu * 2.0 * self.load.half_distance.abs() > coupling
+            || mu >= value && strong(&found, &self.load);
+        (!strong).then_some((Some(found), [mu; 2]))
     }
 
     /// What a change of twist and pressure can change of the dissipation, at most: no point of the

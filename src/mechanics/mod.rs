@@ -23,5 +23,5 @@ pub use crate::request::{Refiner, Separation};
 pub use branch::COUPLING_SEARCH;
 pub(crate) use compare::{Comparer, Comparison, Neighbour, Question};
 pub use pads::{Load, Pads, squeeze_pressure};
-pub(crate) use solve::check;
 pub use solve::{Options, Search, Start, limit_states, refused, solve, solve_next, solve_pads};
+pub(crate) use solve::{check, nearby};

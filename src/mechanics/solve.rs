@@ -240,6 +240,28 @@ pub fn solve_next(
     }
 }
 
+/// `mu_s` in a limit state that is soon found, from the state `near` of a load like this one or without it,
+/// whichever of several it is; `None` where none is. Afterwards `near` is that state.
+pub(crate) fn nearby(
+    pads: &Pads,
+    load: &Load,
+    options: &Options,
+    near: &mut Option<Start>,
+) -> Option<f64> {
+    if load.size == 0.0 || load.normal.iter().any(|&n| n <= 0.0) {
+        return None;
+    }
+    let mut solver = Solver::new(pads, *load, options.refiner);
+    let seed = options.seed.map(|twist| pads.scaled_twist(twist));
+    let state = solver.nearby(near.map(|Start(z)| z).as_ref(), seed)?;
+    let parted = |k: usize| pressure::separates(&pads.areas[k], face_pressure(&state.q(), k));
+    if options.separation == Separation::Discard && (0..2).any(parted) {
+        return None;
+    }
+    *near = Some(Start(state.z));
+    Some(state.mu_over_size * load.size)
+}
+
 /// Turns a solved state into an answer with its certificate.
 pub(super) fn finish(
     pads: &Pads,

@@ -80,6 +80,27 @@ impl TwistOut {
         levers.min_by(|a, b| a.width.total_cmp(&b.width))
     }
 
+    /// The gripping force \[N\] at which [`TwistOut::margin`] is zero: with less, friction has to help.
+    /// Infinite without contact.
+    pub fn force(&self, load: &Wrench) -> f64 {
+        let q = DVec2::new(-load.moment.y, load.moment.x);
+        let pull = load.force.z / 2.0;
+        let along = |&(normal, [i, ii]): &(DVec2, [f64; 2])| {
+            let short = q.dot(normal) - pull * (i - ii);
+            if short <= 0.0 {
+                0.0
+            } else if i + ii > 0.0 {
+                short / (i + ii)
+            } else {
+                f64::INFINITY
+            }
+        };
+        if self.normals.is_empty() {
+            return f64::INFINITY;
+        }
+        self.normals.iter().map(along).fold(pull.abs(), f64::max)
+    }
+
     /// Distance to twist-out under an external wrench in the grip frame: `1 - s` where the load's
     /// out-of-plane moment times `1/s` is the largest that the contact can take without friction's
     /// help; 1 for no such moment, 0 at the limit, negative beyond it. Negative infinity without

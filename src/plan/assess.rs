@@ -17,7 +17,7 @@ use crate::geometry::patch_area;
 use crate::gripper::Gripper;
 use crate::load::wrench_in_grip;
 use crate::mechanics::twist_out::{self, FreeTwistOut, TwistOut};
-use crate::mechanics::{Options, Pads, curved, inverse, refused};
+use crate::mechanics::{curved, refused};
 use crate::model::{Grip, LoadCase, Patch, Status, Surfaces, Wrench};
 use crate::part::MassProperties;
 use crate::rank::{self, Weights};
@@ -156,7 +156,7 @@ pub(super) struct AssessedGrips {
 }
 
 /// Loads of one call of the backend: bounds the memory whatever the number of grips and loads.
-const LOADS_AT_ONCE: usize = 1 << 20;
+pub(super) const LOADS_AT_ONCE: usize = 1 << 20;
 /// The same where the answer of every load is kept for a while, some 250 bytes each.
 const ANSWERS_AT_ONCE: usize = 1 << 17;
 /// The same of grips on planes, whose loads are not copied: so many that a graphics processor seldom
@@ -312,20 +312,20 @@ impl Assessor<'_> {
     }
 
     /// The loads as a grip sees them.
-    fn wrenches(&self, grip: &Grip) -> Vec<Wrench> {
+    pub(super) fn wrenches(&self, grip: &Grip) -> Vec<Wrench> {
         self.loads.iter().map(|load| self.wrench(grip, load)).collect()
     }
 
-    fn wrench(&self, grip: &Grip, load: &LoadCase) -> Wrench {
+    pub(super) fn wrench(&self, grip: &Grip, load: &LoadCase) -> Wrench {
         wrench_in_grip(&load.wrench, self.mass.centre_of_mass, &grip.part_from_grip)
     }
 
     /// The loads as they are on the part, for all grips.
-    fn in_part(&self) -> Vec<Wrench> {
+    pub(super) fn in_part(&self) -> Vec<Wrench> {
         self.loads.iter().map(|load| load.wrench).collect()
     }
 
-    fn problem<'a>(&self, grip: &'a Grip, wrenches: &'a [Wrench]) -> Problem<'a> {
+    pub(super) fn problem<'a>(&self, grip: &'a Grip, wrenches: &'a [Wrench]) -> Problem<'a> {
         Problem {
             contact: &grip.contact,
             distance: grip.distance(),
@@ -421,41 +421,6 @@ impl Assessor<'_> {
         }
         Ok(())
     }
-
-    /// Adds what only the grips of the final list need: the gripping force needed for the friction
-    /// with the safety asked for, and the largest multiple under the worst load, both as [`inverse`]
-    /// has them, all limit states looked for; of contacts that are not plane also what each face
-    /// carries.
-    pub fn finish(&self, grips: &mut [RankedGrip]) {
-        let PadFriction { value: friction, safety } = self.settings.pads;
-        let ScoreOptions { separation, refiner, .. } = self.settings.score;
-        let options = Options { separation, refiner, ..Options::default() };
-        let force = self.settings.force;
-        let ready = Surfaced::new(grips.iter().map(|ranked| &ranked.grip), force);
-        grips.par_iter_mut().with_max_len(1).for_each(|ranked| {
-            let (distance, wrench) = (ranked.grip.distance(), &ranked.worst.wrench);
-            let (curved, plane) = match &ranked.grip.surfaces {
-                Some(_) => (ready.of(&ranked.grip).map(|ready| &ready.pads), None),
-                None => (None, friction.and_then(|_| Pads::new(&ranked.grip.contact))),
-            };
-            if let Some(pads) = curved {
-                let answer = pads.solve_again(distance, force, wrench, ranked.worst.status);
-                (ranked.faces, ranked.notes) = (answer.faces, answer.notes);
-            }
-            let Some(friction) = friction else { return };
-            let needed = |friction| match (curved, &plane) {
-                (Some(pads), _) => curved::force_needed(pads, distance, wrench, friction, force),
-                (None, Some(pads)) => {
-                    inverse::force_needed(pads, distance, wrench, friction, &options)
-                }
-                (None, None) => None,
-            };
-            ranked.force_needed = needed(friction / safety);
-            let plain = if safety == 1.0 { ranked.force_needed } else { needed(friction) };
-            let multiple = plain.map_or(0.0, |needed| force / needed);
-            ranked.load_multiple = multiple.is_finite().then_some(multiple);
-        });
-    }
 }
 
 /// The least lever of a contact, zero without one \[m\].
@@ -464,17 +429,17 @@ fn least(lever: &TwistOut) -> f64 {
 }
 
 /// Surfaces of some grips made ready, each once.
-struct Surfaced(FxHashMap<usize, Ready>);
+pub(super) struct Surfaced(FxHashMap<usize, Ready>);
 
 /// A contact that is not plane.
-struct Ready {
-    pads: curved::Pads,
+pub(super) struct Ready {
+    pub(super) pads: curved::Pads,
     /// Axes about which the part can turn in it.
     free: Vec<DVec2>,
 }
 
 impl Surfaced {
-    fn new<'a>(grips: impl Iterator<Item = &'a Grip>, force: f64) -> Self {
+    pub(super) fn new<'a>(grips: impl Iterator<Item = &'a Grip>, force: f64) -> Self {
         let mut found: FxHashMap<usize, (&Surfaces, f64)> = FxHashMap::default();
         for grip in grips {
             if let Some(surfaces) = &grip.surfaces {
@@ -494,7 +459,7 @@ impl Surfaced {
         Arc::as_ptr(surfaces) as usize
     }
 
-    fn of(&self, grip: &Grip) -> Option<&Ready> {
+    pub(super) fn of(&self, grip: &Grip) -> Option<&Ready> {
         self.0.get(&Self::key(grip.surfaces.as_ref()?))
     }
 }

@@ -258,7 +258,7 @@ impl Plan {
         let grips: Vec<Grip> = tried.iter().filter_map(|(_, grip)| grip.clone()).collect();
         let over: Vec<Option<String>> = grips.par_iter().map(|grip| assessor.over(grip)).collect();
         let mut scored = assessor.assess(grips)?;
-        assessor.finish(&mut scored);
+        assessor.finish(&mut scored)?;
         let mut scored = scored.into_iter().zip(over);
         Ok(tried
             .into_iter()

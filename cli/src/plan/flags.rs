@@ -198,8 +198,7 @@ struct ScoringArgs {
     #[arg(long)]
     k2: Option<f64>,
     /// Friction coefficient of the pads [default: the gripper's], for what holds, the force needed
-    /// and the multiple of the worst load, all of it with its moments, that is held. Another load
-    /// may end at a smaller multiple, where it twists the contact out. `plan` compares several, each
+    /// and the multiple of all loads, with their moments, that is held. `plan` compares several, each
     /// given with its own --pad-friction.
     #[arg(long, value_name = "MU")]
     pad_friction: Vec<f64>,

@@ -183,9 +183,9 @@ fn print(outcomes: &[Compared]) -> anyhow::Result<()> {
     }
     let usable = summary::usable(outcomes[0].outcome.set.pads().safety);
     let text = format!(
-        "force N: gripping force per jaw with which it {usable}; + more than the gripper has, - less \
+        "force N: gripping force per jaw with which it {usable} under every load; + more than the gripper has, - less \
          than its least. pad: share of the pad that touches; left: share of that contact left under \
-         the worst load. mu_s and force N are that load's; with less force another load can be worse."
+         the worst load."
     );
     writeln!(out, "\n{}", wrapped(&text, width))?;
     Ok(())

@@ -70,13 +70,13 @@ fn legend(
         Some(friction) => {
             let usable = usable(pads.safety);
             let multiple = match has("multiple") {
-                true => " multiple: factor by which all of the worst load can grow.",
+                true => " multiple: factor by which all loads can grow.",
                 false => "",
             };
             texts.push(format!(
                 "safety: the pads' friction {friction} over mu_s; a grip holds where it is at least \
-                 {}. force N: gripping force per jaw with which it {usable} under that load{}; with \
-                 less force another load can be worse.{multiple}",
+                 {}. force N: gripping force per jaw with which it {usable} under every load{}.\
+                 {multiple}",
                 pads.safety,
                 range_note(set, shown, gripper)
             ));

@@ -487,7 +487,7 @@ fn exact_answers_overlap_the_kernels_of_the_next_block() {
             order.push(block.range);
             assert_eq!(block.survivors.seeds, expected);
             std::thread::sleep(std::time::Duration::from_millis(200));
-            Vec::new()
+            Vec::<()>::new()
         })
     })
     .unwrap();

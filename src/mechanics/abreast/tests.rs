@@ -98,7 +98,7 @@ fn lifting_loads(contact: &Contact) -> [usize; 3] {
         let loads: Vec<Load> = some.iter().map(|(load, ..)| *load).collect();
         for shift in [1, 5, 11, 17, 40] {
             let near = |i: usize| &solved[(ABREAST * begin + i + shift) % solved.len()].2;
-            let question = Question { value: 0.0, sharp: 2e-4 };
+            let question = Question::of(0.0, 2e-4);
             let quick = comparer.several(&loads, near, &options, (question, false));
             let found = comparer.several(&loads, near, &options, (question, true));
             for (i, (_, mu, _, lifts)) in some.iter().enumerate() {
