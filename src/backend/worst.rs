@@ -586,26 +586,23 @@ impl Work<'_> {
             _ => {}
         }
         let mut start = near.map(Neighbour::start);
-        if self.wanted.is_some() {
+        let answer = if self.wanted.is_some() {
             let Some(mu) = nearby(pads, &scaled, &options, &mut start) else {
                 return Compared::Refused;
             };
-            if unlike
-                && let Some(state) = start.and_then(|start| Neighbour::at(pads, &scaled, start))
-            {
-                self.neighbours.add(here, state);
+            Compared::Solved(mu)
+        } else {
+            let (distance, force, wrench) = (problem.distance, problem.force, case.wrench(load));
+            let score = solve_next(pads, distance, force, &wrench, &options, &mut start);
+            if usable(&score).is_none() {
+                return self.answer(load, case.solve(load));
             }
-            return Compared::Solved(mu);
-        }
-        let wrench = &case.wrench(load);
-        let score = solve_next(pads, problem.distance, problem.force, wrench, &options, &mut start);
-        if usable(&score).is_none() {
-            return self.answer(load, case.solve(load));
-        }
+            self.answer(load, score)
+        };
         if unlike && let Some(state) = start.and_then(|start| Neighbour::at(pads, &scaled, start)) {
             self.neighbours.add(here, state);
         }
-        self.answer(load, score)
+        answer
     }
 
     fn answer(&mut self, load: usize, score: Score) -> Compared {

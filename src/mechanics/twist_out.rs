@@ -248,6 +248,22 @@ mod tests {
     }
 
     #[test]
+    fn the_force_is_the_one_without_any_margin() {
+        let number = |index: u32, factor: f64| (f64::from(index) * factor).fract() * 2.0 - 1.0;
+        for index in 1..40 {
+            let n = |factor: f64| number(index, factor);
+            let shifted = rectangle(0.3 * n(0.754_877), 0.2 * n(0.569_840), 1.5, 0.7);
+            let levers = pair(rectangle(0.0, 0.0, 1.0, 1.0), shifted);
+            let load = load(n(0.819_172), n(0.671_043), 0.5 * n(0.549_700));
+            let force = levers.force(&load);
+            assert!(levers.margin(force, &load).abs() < 1e-9 || force == load.force.z.abs() / 2.0);
+            assert!(levers.margin(1.01 * force, &load) > 0.0);
+            assert!(levers.margin(0.99 * force, &load) < 0.0);
+        }
+        assert_eq!(pair(vec![], vec![]).force(&load(0.1, 0.0, 0.0)), f64::INFINITY);
+    }
+
+    #[test]
     fn levers_of_a_rectangle_and_of_shifted_areas() {
         let bars = pair(rectangle(0.0, 0.0, 3.0, 1.0), rectangle(0.0, 0.0, 3.0, 1.0));
         let lever = bars.least_lever().unwrap();

@@ -149,7 +149,7 @@ impl Assessor<'_> {
         open.force = self.own(&open, &ranked.worst.wrench, friction, Search::WhereNeeded)?;
         if open.force == 0.0 {
             // Nothing along the pads: a load may still pull or tilt.
-            for load in 0..self.loads.len() {
+            for load in (0..self.loads.len()).filter(|load| *load != worst) {
                 self.take(&mut open, load, friction)?;
             }
         } else if let On::Planes(_) = open.on {
