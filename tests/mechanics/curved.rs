@@ -436,6 +436,42 @@ fn faces_near_one_axis_hold_settle_or_roll_out() {
     close(stiffness, -50.0 * 0.0002, 1e-6, &out);
 }
 
+/// Equal crests whose axes differ, by rounding or truly: nothing turns freely that did not, and the
+/// answer moves as the axes do. A screw that slides far along the axes while it turns about them is no
+/// rotation of its own.
+#[test]
+fn axes_askew_free_no_rotation() {
+    let mut random = Random::new(11);
+    for count in 0..20 {
+        let radius = random.range(0.015, 0.05);
+        let distance = 2.0 * radius * random.range(0.2, 0.6);
+        let angle = if count % 2 == 0 { 0.0 } else { random.range(0.0, 3.0) };
+        let turned = random.signed();
+        let at = |skew: f64| {
+            let pieces = |sign: f64| {
+                let axis = DVec2::from_angle(angle + if sign > 0.0 { skew } else { turned * skew });
+                let gap = Gap::Cylinder { radius, axis, at: DVec2::ZERO, height: 0.0 };
+                vec![rectangle([-0.01, -0.01], [0.01, 0.01], gap)]
+            };
+            let (face_i, face_ii) = (pieces(1.0), pieces(-1.0));
+            let surfaces = Surfaces { face_i, face_ii, stiffness: [7.6e9; 2], layer: Some(2e-3) };
+            let wrench = Wrench {
+                force: DVec3::new(-1.2, 0.5, 1.5),
+                moment: DVec3::new(-0.03, 0.012, 0.016),
+            };
+            solve(&surfaces, distance, 150.0, &wrench).unwrap()
+        };
+        let wanted = at(0.0);
+        assert_eq!(wanted.dimensions, 3, "{wanted:?}");
+        for skew in [1e-17, 3e-16, 1e-14, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3, 1e-2, 0.1] {
+            let got = at(skew);
+            assert_eq!(got.dimensions, 3, "{skew} {got:?}");
+            let [got, wanted] = [&got, &wanted].map(|answer| answer.score.mu_s.unwrap());
+            assert!((got / wanted - 1.0).abs() < 1e-9 + 10.0 * skew, "{skew}: {got} {wanted}");
+        }
+    }
+}
+
 #[test]
 fn loads_without_a_limit_state_are_refused_with_their_reason() {
     let of = |force: [f64; 3], moment: [f64; 3]| {

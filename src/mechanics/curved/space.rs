@@ -8,7 +8,7 @@
 //! and as large as the contact on a plane.
 
 use glam::DVec2;
-use nalgebra::{Matrix2, Matrix4, Matrix4x2, SVector, SymmetricEigen};
+use nalgebra::{Matrix2, Matrix4, Matrix4x2, Matrix6, Matrix6x4, SymmetricEigen, Vector6};
 
 use super::face::Pressed;
 
@@ -42,10 +42,15 @@ const ON_AXIS: f64 = 1e-6;
 /// hold by the pressure on a single facet.
 const FACETS: f64 = 0.98;
 
+/// Motion along the axis of a rotation over its angle and the distance of the faces, from which on the
+/// rotation is a screw: with pads as they are such a motion changes nothing by itself, and no surface
+/// that is known here is mapped onto itself by a screw alone.
+const SCREW: f64 = 1e-3;
+
 /// A point of the pressure: `(u, omega) -> normal velocity` as coefficients, its face, its force,
 /// its place and the gap's slope.
 struct Point {
-    c: SVector<f64, 6>,
+    c: Vector6<f64>,
     face: usize,
     p: f64,
     x: DVec2,
@@ -59,7 +64,7 @@ pub(super) fn rotations(faces: [&Pressed<'_>; 2], distance: f64) -> [Rotation; 2
         let (side, height) = if k == 0 { (1.0, 0.5 * distance) } else { (-1.0, -0.5 * distance) };
         face.points(|x, slope, p| {
             let normal = [slope.x, slope.y, side];
-            let c = SVector::from([
+            let c = Vector6::from([
                 normal[0],
                 normal[1],
                 normal[2],
@@ -70,20 +75,44 @@ pub(super) fn rotations(faces: [&Pressed<'_>; 2], distance: f64) -> [Rotation; 2
             points.push(Point { c, face: k, p, x, slope });
         });
     }
-    // Free motions that go with a rotation: three translations and the turn about x3.
-    let (rest, turns) = ([0, 1, 2, 5], [3, 4]);
-    let mut sums = [[0.0; 6]; 6];
+    let mut sums = Matrix6::zeros();
     for Point { c, p, .. } in &points {
-        for i in 0..6 {
-            for j in i..6 {
-                sums[i][j] += p * c[i] * c[j];
-            }
-        }
+        sums += *p * c * c.transpose();
     }
-    let sum = |i: usize, j: usize| sums[i.min(j)][i.max(j)];
-    let inner = Matrix4::from_fn(|i, j| sum(rest[i], rest[j]));
-    let mixed = Matrix4x2::from_fn(|i, j| sum(rest[i], turns[j]));
-    let own = Matrix2::from_fn(|i, j| sum(turns[i], turns[j]));
+    let found = |slides| principal(&sums, slides).map(|motion| (axis_of(&motion), motion));
+    let mut turns = found([DVec2::X, DVec2::Y]);
+    let pitch = |motion: &Vector6<f64>| {
+        let [v, w] = [0, 3].map(|first| motion.fixed_rows::<3>(first).into_owned());
+        v.dot(&w).abs() / w.norm_squared()
+    };
+    if let Some((axis, _)) = turns.iter().find(|(_, motion)| pitch(motion) > SCREW * distance.abs())
+    {
+        turns = found([axis.perp(), DVec2::ZERO]);
+    }
+    turns.map(|(axis, motion)| Rotation {
+        axis,
+        kind: kind(&points, faces, axis, &motion, distance),
+    })
+}
+
+/// Direction of a motion's axis in the pad plane.
+fn axis_of(motion: &Vector6<f64>) -> DVec2 {
+    let axis = DVec2::new(motion[3], motion[4]);
+    // One sense for the same axis.
+    if axis.x < -1e-9 || axis.x.abs() <= 1e-9 && axis.y < 0.0 { -axis } else { axis }
+}
+
+/// The two principal rotations by the `sums` of what the pressure does under motions, the softer one
+/// first: each with the free motions that go with it, along the `slides`, along x3 and about it.
+fn principal(sums: &Matrix6<f64>, slides: [DVec2; 2]) -> [Vector6<f64>; 2] {
+    let mut rest = Matrix6x4::zeros();
+    for (k, slide) in slides.iter().enumerate() {
+        (rest[(0, k)], rest[(1, k)]) = (slide.x, slide.y);
+    }
+    (rest[(2, 2)], rest[(5, 3)]) = (1.0, 1.0);
+    let inner = rest.transpose() * sums * rest;
+    let mixed: Matrix4x2<f64> = rest.transpose() * sums.fixed_columns::<2>(3);
+    let own: Matrix2<f64> = sums.fixed_view::<2, 2>(3, 3).into_owned();
     // Each coordinate in units of its own size; those that do nothing drop out.
     let units = Matrix4::from_diagonal(
         &inner.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 }),
@@ -100,20 +129,9 @@ pub(super) fn rotations(faces: [&Pressed<'_>; 2], distance: f64) -> [Rotation; 2
     let order = if principal.eigenvalues[0] <= principal.eigenvalues[1] { [0, 1] } else { [1, 0] };
     order.map(|i| {
         let turn = principal.eigenvectors.column(i);
-        let mut motion = SVector::<f64, 6>::zeros();
-        for (k, &j) in turns.iter().enumerate() {
-            motion[j] = turn[k];
-        }
-        let moved = -follow * turn;
-        for (k, &j) in rest.iter().enumerate() {
-            motion[j] = moved[k];
-        }
-        let mut axis = DVec2::new(turn[0], turn[1]);
-        // One sense for the same axis.
-        if axis.x < -1e-9 || axis.x.abs() <= 1e-9 && axis.y < 0.0 {
-            axis = -axis;
-        }
-        Rotation { axis, kind: kind(&points, faces, axis, &motion, distance) }
+        let mut motion = -rest * follow * turn;
+        (motion[3], motion[4]) = (turn[0], turn[1]);
+        motion
     })
 }
 
@@ -121,7 +139,7 @@ fn kind(
     points: &[Point],
     faces: [&Pressed<'_>; 2],
     axis: DVec2,
-    motion: &SVector<f64, 6>,
+    motion: &Vector6<f64>,
     distance: f64,
 ) -> Kind {
     let across = axis.perp();

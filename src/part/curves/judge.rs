@@ -10,8 +10,8 @@ use super::grow::{Exactness, Found, Growth};
 
 /// Facets to the turn of a cylinder or cone, at least.
 const FEWEST: f64 = 7.5;
-/// Cosine of the half angle of the flattest cone: 78 degrees. A flatter one is hard to tell from
-/// any dome.
+/// Cosine of the half angle of the flattest cone that is not a whole ring: 78 degrees. A flatter one is
+/// hard to tell from any dome.
 const FLATTEST: f64 = 0.2;
 /// Angle between facets above which they may as well be flats \[rad\]: 25.5 degrees, 14 to the turn.
 pub(super) const COARSE: f64 = 0.445;
@@ -161,22 +161,23 @@ impl Growth<'_> {
             return None;
         }
         let diagonal = self.net.part.diagonal;
-        let (turn, facets, runs_on) = match found.surface.profile {
+        let reach = found.surface.reach();
+        let chord = |step: f64| reach * (1.0 - (step / 2.0).cos());
+        let (turn, facets, runs_on, is_steep, chord) = match found.surface.profile {
             Profile::Line { slope, .. } => {
                 // The normals of a cone turn by less than the facets.
                 let about = 2.0 * ((step / 2.0).sin() / slope.cos()).min(1.0).asin();
                 let turn = turn(found, about);
-                (turn, TAU / about, edge.runs_on > 0.5 * mean)
+                let (is_steep, chord) =
+                    (slope.cos() > FLATTEST || turn == TAU, chord(about) * slope.cos());
+                (turn, TAU / about, edge.runs_on > 0.5 * mean, is_steep, chord)
             }
-            Profile::Circle { .. } => (0.0, TAU / step, edge.runs_on > 0.3 * edge.outer),
+            Profile::Circle { .. } => {
+                (0.0, TAU / step, edge.runs_on > 0.3 * edge.outer, true, chord(step))
+            }
         };
-        let is_steep = match found.surface.profile {
-            Profile::Line { slope, .. } => slope.cos() > FLATTEST,
-            Profile::Circle { .. } => true,
-        };
-        let chord = |radius: f64| radius * (1.0 - (step / 2.0).cos());
         // Facets as long as a belt of a sphere is wide touch it at their ends only.
-        let is_deep = found.sag > DEEP * chord(found.surface.reach()) + self.net.floor;
+        let is_deep = found.sag > DEEP * chord + self.net.floor;
         let is_sound = match found.kind {
             Kind::Cylinder | Kind::Cone | Kind::Sphere | Kind::Torus if is_deep => false,
             Kind::Cylinder | Kind::Cone | Kind::Revolution => {

@@ -21,6 +21,8 @@ const PATCH: usize = 12;
 const POOR: f64 = 2.0;
 /// Sine of the angle between the strips of a cylinder and the direction about which they bend, at most.
 pub(super) const STEEPEST: f64 = 0.1;
+/// Sine of that angle above which strips are no cone's: a slope of 1.2 degrees.
+const FLAT: f64 = 0.9998;
 /// Points that a fit needs beyond its parameters, to be a test.
 pub(super) const SPARE: usize = 2;
 /// ... and as many again for a torus, which comes near to many a surface.
@@ -225,7 +227,7 @@ impl Growth<'_> {
             if rise < STEEPEST {
                 guesses.push((Kind::Cylinder, cylinder_along(direction, &points)));
             }
-            if (1e-4..0.998).contains(&rise) {
+            if (1e-4..FLAT).contains(&rise) {
                 guesses.push((Kind::Cone, cone_along(net, direction, row, &points)));
             }
             for (kind, guess) in guesses {
