@@ -234,6 +234,24 @@ fn cones_and_stepped_shafts() {
     assert_eq!((part.faces.len(), part.coaxial_faces().len()), (3, 1));
 }
 
+/// Rings that fall away from a land, by less than a degree and more: cones, however flat.
+#[test]
+fn gentle_cones_beside_a_land() {
+    for (fall, counts) in [(0.05, &[24, 48][..]), (0.2, &[24, 96]), (0.5, &[24, 96, 360])] {
+        for &n in counts {
+            let profile = [(0.0, 10.0), (8.0 - fall, 10.0), (8.0, 6.0)];
+            let profile = profile.map(|(z, r)| DVec2::new(z, r));
+            let part = Solid::lathe(&profile, n, |_| 0.0).part(3, 0.0);
+            let what = format!("{fall} mm, {n}");
+            let kinds: Vec<&str> = part.curved.iter().map(|face| face.shape.name()).collect();
+            assert_eq!(kinds, ["cylinder", "cone"], "{what}");
+            let Shape::Cone { half_angle, .. } = part.curved[1].shape else { panic!() };
+            assert!((half_angle.tan() / (4.0 / fall) - 1.0).abs() < 1e-3, "{what}: {half_angle}");
+            assert_eq!(part.faces.len(), 2, "{what}: {:?}", part.faces);
+        }
+    }
+}
+
 /// Profile of a sphere from pole to pole, or from a circle to a circle.
 fn sphere(radius: f64, from: f64, to: f64, steps: u32) -> Vec<DVec2> {
     let mut points = arc(DVec2::ZERO, radius, PI - from, PI - to, steps);
@@ -572,7 +590,7 @@ fn a_chamfered_cylinder_is_no_ball() {
             kinds.sort_unstable();
             let what = format!("{n} facets, chamfer {chamfer}, {longer} longer");
             assert_eq!(kinds, ["cone", "cone", "cylinder"], "{what}");
-            assert_eq!(part.faces.len(), 2, "{what}");
+            assert_eq!(part.faces.len(), 2, "{what}: {:?}", part.faces);
         }
     }
 }

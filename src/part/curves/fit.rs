@@ -64,6 +64,8 @@ pub(in crate::part) struct Surface {
 
 /// Most steps of a fit; exact data need three to six.
 const STEPS: usize = 40;
+/// Angle of a cone to its axis, at most \[rad\]: 89.8 degrees.
+const FLATTEST: f64 = 1.567;
 /// Most points that a fit looks at: more make it no better.
 const MOST_POINTS: usize = 600;
 
@@ -181,7 +183,7 @@ impl Surface {
             }
         }
         let sound = match self.profile {
-            Profile::Line { radius, slope } => radius > 0.0 && slope.abs() < 1.55,
+            Profile::Line { radius, slope } => radius > 0.0 && slope.abs() < FLATTEST,
             Profile::Circle { major, minor } => major >= 0.0 && minor > 0.0,
         };
         (sound && self.axis.origin.is_finite() && cost.is_finite()).then_some(self)

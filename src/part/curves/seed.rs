@@ -21,8 +21,8 @@ const PATCH: usize = 12;
 const POOR: f64 = 2.0;
 /// Sine of the angle between the strips of a cylinder and the direction about which they bend, at most.
 pub(super) const STEEPEST: f64 = 0.1;
-/// Sine of that angle above which strips are no cone's: a slope of 1.2 degrees.
-const FLAT: f64 = 0.9998;
+/// Sine of that angle above which strips are no cone's: a slope of a quarter of a degree.
+const FLAT: f64 = 0.99999;
 /// Points that a fit needs beyond its parameters, to be a test.
 pub(super) const SPARE: usize = 2;
 /// ... and as many again for a torus, which comes near to many a surface.

@@ -13,7 +13,7 @@ use super::seed::{SPARE, STEEPEST, cylinder_along};
 /// Difference of the depth of a strip's plane and that of the other strips', as a share of it, up to
 /// which it is one of them.
 const AS_DEEP: f64 = 0.05;
-/// Difference of the sines and cosines of its angle to the axis and theirs.
+/// Difference of the sines and cosines of its angle to the axis and theirs, over the cosine of theirs.
 const STEEP: f64 = 0.05;
 /// Sine of the angle to the axis up to which the edge of a strip runs along it.
 const ALONG: f64 = 0.02;
@@ -219,8 +219,9 @@ impl Growth<'_> {
         let axis = found.surface.axis;
         let outward = found.sign * net.normal(facet);
         let (rise, across) = (outward.dot(axis.direction), outward.reject_from(axis.direction));
-        // As steep as the strips.
-        if across.length() < slope.cos() - STEEP || (rise + slope.sin()).abs() > STEEP {
+        // As steep as the strips: a land beside a gentle cone is not.
+        let off = STEEP * slope.cos();
+        if across.length() < slope.cos() - off || (rise + slope.sin()).abs() > off {
             return false;
         }
         let away = across.normalize();
