@@ -110,8 +110,9 @@ pub trait Observer: Send {
     /// Now and then, and once before the first candidate.
     fn progress(&mut self, _progress: Progress) {}
 
-    /// The search is over: the numbers that only so many listed grips have are made now.
-    fn finishing(&mut self, _grips: usize) {}
+    /// The search is over: the numbers that only listed grips have are made now, and so many of all have
+    /// them.
+    fn finishing(&mut self, _done: usize, _grips: usize) {}
 
     /// The grips of a chunk in the order of their ids, each with its worst load solved, also those
     /// that do not hold ([`crate::model::Status::holds`]). Their ranks are not known yet.
@@ -265,10 +266,13 @@ impl Plan {
         let partial = self.partial()?;
         let search = self.search(&assessor, partial.as_ref());
         let found = search.run(&mut proposer, observer, stop)?;
-        let complete = found.complete;
-        let outcome = self.conclude(&proposer, &assessor, found, observer)?;
-        if let Some(partial) = partial.filter(|_| complete) {
-            partial.remove()?;
+        let mut outcome = self.conclude(&proposer, &assessor, found, observer, stop)?;
+        if let Some(partial) = partial {
+            if outcome.set.provenance.complete {
+                partial.remove()?;
+            } else if outcome.checkpoint.is_none() {
+                outcome.checkpoint = partial.is_there().then(|| partial.path.clone());
+            }
         }
         Ok(outcome)
     }
@@ -302,16 +306,18 @@ impl Plan {
         assessor: &Assessor<'_>,
         mut found: Found,
         observer: &mut dyn Observer,
+        stop: &AtomicBool,
     ) -> Result<Outcome> {
         for remark in proposer.tally().remarks(&self.gripper, &self.propose) {
             observer.note(&remark);
         }
-        let (complete, checkpoint) = (found.complete, found.checkpoint.clone());
+        let checkpoint = found.checkpoint.clone();
         let lost = found.collector.take_lost();
         let misses = self.misses(proposer, &lost);
-        let none = complete && found.collector.is_empty();
+        let none = found.complete && found.collector.is_empty();
         let nearest = none.then(|| self.nearest_lost(proposer, &lost)).flatten();
-        let (set, shown) = self.finish(proposer, assessor, found, lost, observer)?;
+        let (set, shown) = self.finish(proposer, assessor, found, lost, observer, stop)?;
+        let complete = set.provenance.complete;
         if complete && set.grips.is_empty() {
             let rejections = &set.summary.rejections;
             let tally = proposer.tally();
@@ -341,7 +347,8 @@ impl Plan {
     }
 
     /// Orders what was found and adds what only the grips of the list need; the ids of those to
-    /// show. `lost`: grips that do not hold, by reason.
+    /// show. `lost`: grips that do not hold, by reason. After `stop` only those to show have all numbers,
+    /// and the list is not complete.
     fn finish(
         &self,
         proposer: &Proposer<'_>,
@@ -349,6 +356,7 @@ impl Plan {
         found: Found,
         lost: BTreeMap<String, Vec<Negative>>,
         observer: &mut dyn Observer,
+        stop: &AtomicBool,
     ) -> Result<(GripSet, Vec<u64>)> {
         let selection = &self.request.selection;
         let (low, high) = self.part.mesh.bounding_box();
@@ -360,8 +368,15 @@ impl Plan {
             *rejections.entry(reason.clone()).or_default() += count;
         }
         let mut grips = self.kept(ranking.grips, size);
-        observer.finishing(grips.len());
-        assessor.finish(&mut grips)?;
+        let (first, count) = (self.shown(&grips, size), grips.len());
+        let mut told = |done: usize| observer.finishing(done, count);
+        let left = assessor.finish_until(&mut grips, &first, stop, &mut told)?;
+        if left > 0 {
+            observer.warning(&format!(
+                "interrupted: {left} of {count} grips have no force needed and no multiple"
+            ));
+        }
+        let complete = found.complete && left == 0;
         let comparison = selection
             .compare
             .map(|weights| compare::compare(&mut grips, centre, self.settings.force, &weights));
@@ -369,7 +384,7 @@ impl Plan {
         self.add_noise(proposer, assessor, &mut grips, &shown)?;
         self.solve_other_loads(assessor, &mut grips, &shown)?;
         let mut set = GripSet::new(
-            self.provenance(found.backend, found.complete),
+            self.provenance(found.backend, complete),
             self.part_summary([low, high]),
             output::gripper_json(&self.gripper)?,
             self.loads.clone(),

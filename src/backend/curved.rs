@@ -178,7 +178,8 @@ impl CurvedProblem<'_> {
 
     fn exceeding(&self, friction: f64, known: &[usize]) -> Exceeding {
         let Self { pads, distance, force, wrenches } = *self;
-        let mut screen = pads.and_then(|pads| pads.screen(distance, force, wrenches));
+        let screen = pads.and_then(|pads| pads.screen(distance, force, wrenches));
+        let mut screen = screen.map(Screen::by_any_state);
         let mut found = Exceeding::default();
         for load in self.by_estimate(screen.as_ref()) {
             if known.contains(&load) {

@@ -6,7 +6,11 @@
 //! are taken, until none is left. A load held with some force and with the plan's counts as held with
 //! all between.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
 use rayon::prelude::*;
+use rustc_hash::FxHashSet;
 
 use super::assess::{Assessor, LOADS_AT_ONCE, Surfaced};
 use crate::backend::{Batch, CurvedProblem, Exceeding, Problem, ScoreOptions, exceeding_curved};
@@ -18,6 +22,8 @@ use crate::results::{PadFriction, RankedGrip};
 
 /// Share of the force by which more is tried than what a load needs.
 const MORE: f64 = 1e-6;
+/// Time between two looks at whether to stop.
+const BLOCK: Duration = Duration::from_secs(1);
 /// A load that twists out at this share of the force, were it not for friction, is likely to need more.
 const LIKELY: f64 = 0.7;
 
@@ -50,6 +56,38 @@ enum Looked {
 }
 
 impl Assessor<'_> {
+    /// As [`Self::finish`], those of the ids `first` before the others, and these until `stop` becomes true;
+    /// how many are left. `told`: how many are done.
+    ///
+    /// # Errors
+    /// As [`Self::finish`].
+    pub(super) fn finish_until(
+        &self,
+        grips: &mut [RankedGrip],
+        first: &[u64],
+        stop: &AtomicBool,
+        told: &mut dyn FnMut(usize),
+    ) -> Result<usize> {
+        let first: FxHashSet<u64> = first.iter().copied().collect();
+        let mut open: Vec<&mut RankedGrip> = grips.iter_mut().collect();
+        open.sort_by_key(|ranked| !first.contains(&ranked.grip.id));
+        let (mut done, mut left, mut size) = (0, 0, first.len().max(1));
+        while done < open.len() {
+            let stopped = || done > 0 && stop.load(Ordering::Relaxed);
+            if stopped() {
+                return Ok(left + open.len() - done);
+            }
+            told(done);
+            let begun = Instant::now();
+            let end = open.len().min(done + size);
+            left += self.finish_block(&mut open[done..end], &stopped)?;
+            let share = BLOCK.as_secs_f64() / begun.elapsed().as_secs_f64().max(1e-9);
+            size = ((end - done) as f64 * share.clamp(0.25, 4.0)).ceil() as usize;
+            done = end;
+        }
+        Ok(left)
+    }
+
     /// Adds what only the grips of the final list need: the gripping force at which the friction with
     /// the safety asked for just holds every load, and the largest multiple of the loads; of contacts
     /// that are not plane also what each face carries under the worst load.
@@ -60,6 +98,17 @@ impl Assessor<'_> {
     /// # Errors
     /// As [`crate::backend::Backend::score`].
     pub fn finish(&self, grips: &mut [RankedGrip]) -> Result<()> {
+        let left = self.finish_block(&mut grips.iter_mut().collect::<Vec<_>>(), &|| false)?;
+        debug_assert!(left == 0, "nothing stops it");
+        Ok(())
+    }
+
+    /// How many are left once it is `stopped`.
+    fn finish_block(
+        &self,
+        grips: &mut [&mut RankedGrip],
+        stopped: &(dyn Fn() -> bool + Sync),
+    ) -> Result<usize> {
         let force = self.settings.force;
         let ready = Surfaced::new(grips.iter().map(|ranked| &ranked.grip), force);
         grips.par_iter_mut().with_max_len(1).for_each(|ranked| {
@@ -70,44 +119,54 @@ impl Assessor<'_> {
             }
         });
         let PadFriction { value: Some(friction), safety } = self.settings.pads else {
-            return Ok(());
+            return Ok(0);
         };
-        let needed = self.forces_needed(grips, &ready, friction / safety)?;
+        let needed = self.forces_needed(grips, &ready, friction / safety, stopped)?;
         let plain = match safety {
             1.0 => needed.clone(),
-            _ => self.forces_needed(grips, &ready, friction)?,
+            _ => self.forces_needed(grips, &ready, friction, stopped)?,
         };
+        let mut left = 0;
         for ((ranked, needed), plain) in grips.iter_mut().zip(needed).zip(plain) {
+            let (Some(needed), Some(plain)) = (needed, plain) else {
+                left += 1;
+                continue;
+            };
             ranked.force_needed = needed;
             let multiple = plain.map_or(0.0, |needed| force / needed);
             ranked.load_multiple = multiple.is_finite().then_some(multiple);
         }
-        Ok(())
+        Ok(left)
     }
 
-    /// The force \[N\] of each grip; `None` where none holds all loads.
+    /// The force \[N\] of each grip, `None` where none holds all loads; of those looked at before it is
+    /// `stopped`.
     fn forces_needed(
         &self,
-        grips: &[RankedGrip],
+        grips: &[&mut RankedGrip],
         ready: &Surfaced,
         friction: f64,
-    ) -> Result<Vec<Option<f64>>> {
+        stopped: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Vec<Option<Option<f64>>>> {
         let mut found = vec![None; grips.len()];
-        let mut open: Vec<Open<'_>> = (grips.par_iter().enumerate().with_max_len(1))
-            .filter_map(|(index, ranked)| self.begun(index, ranked, ready, friction))
+        let begun: Vec<Option<Option<Open<'_>>>> = (grips.par_iter().enumerate().with_max_len(1))
+            .map(|(index, ranked)| (!stopped()).then(|| self.begun(index, ranked, ready, friction)))
             .collect();
-        // Without any load.
-        open.retain(|open| {
-            if open.force == 0.0 {
-                found[open.index] = Some(0.0);
+        let mut open = Vec::new();
+        for (index, begun) in begun.into_iter().enumerate() {
+            match begun {
+                None => {}
+                Some(None) => found[index] = Some(None),
+                // Without any load.
+                Some(Some(begun)) if begun.force == 0.0 => found[index] = Some(Some(0.0)),
+                Some(Some(begun)) => open.push(begun),
             }
-            open.force > 0.0
-        });
+        }
         let most = (LOADS_AT_ONCE / self.loads.len().max(1)).max(1);
         while !open.is_empty() {
             let mut left = Vec::new();
             let mut rest = open.into_iter().peekable();
-            while rest.peek().is_some() {
+            while rest.peek().is_some() && !stopped() {
                 let block: Vec<Open<'_>> = rest.by_ref().take(most).collect();
                 let exceeding = self.exceeding(&block, friction)?;
                 let looked: Vec<(Open<'_>, Looked)> = block
@@ -121,7 +180,7 @@ impl Assessor<'_> {
                     .collect();
                 for (open, looked) in looked {
                     match looked {
-                        Looked::Done(force) => found[open.index] = force,
+                        Looked::Done(force) => found[open.index] = Some(force),
                         Looked::Again => left.push(open),
                     }
                 }

@@ -27,7 +27,7 @@ const LEAST_PAUSE: u32 = 20;
 
 /// The file beside the result that holds an unfinished run.
 pub(super) struct Partial {
-    path: PathBuf,
+    pub(super) path: PathBuf,
     /// Time between two states.
     every: Duration,
     /// What the run was asked, see [`checkpoint::inputs`].

@@ -70,7 +70,7 @@ impl Plan {
             proposer.gather(progress.iter().map(Cow::as_ref))?;
             let backend = backends.join(", ");
             let found = Found { collector, complete: true, backend, checkpoint: None };
-            self.conclude(&proposer, &assessor, found, observer)
+            self.conclude(&proposer, &assessor, found, observer, &AtomicBool::new(false))
         })
     }
 

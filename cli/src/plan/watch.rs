@@ -78,9 +78,17 @@ impl Observer for Watch {
         }
     }
 
-    fn finishing(&mut self, grips: usize) {
+    fn finishing(&mut self, done: usize, grips: usize) {
         if let Some(bar) = &self.bar {
-            bar.set_message(format!("completing {grips} grips"));
+            bar.set_message(match done {
+                0 => format!("completing {grips} grips"),
+                _ => format!("completing {grips} grips: {} %", 100 * done / grips),
+            });
+        }
+        if let Some(text) =
+            self.log.as_mut().and_then(|log| log.completing([done, grips], Instant::now()))
+        {
+            terminal::say(&format!("{}{text}", self.about));
         }
     }
 
@@ -120,6 +128,19 @@ impl Log {
     fn new(before: u64) -> Self {
         let begun = Instant::now();
         Self { begun, before, next: begun + Self::FIRST }
+    }
+
+    /// How many of the grips found have all their numbers, where it is time to say it.
+    fn completing(&mut self, [done, grips]: [usize; 2], now: Instant) -> Option<String> {
+        if now < self.next {
+            return None;
+        }
+        self.next = now + Self::PAUSE;
+        Some(format!(
+            "all candidates looked at; {} of {} grips have their forces",
+            HumanCount(done as u64),
+            HumanCount(grips as u64)
+        ))
     }
 
     /// How far the run is, where it is time to say it.

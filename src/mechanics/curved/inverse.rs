@@ -53,17 +53,24 @@ pub fn force_needed(
     }
     let search = Search { size, most: MOST * size.max(start) };
     let mut near: Option<Limit<'_>> = None;
-    let mut next = |force: f64| {
-        let limit = pads.limit(distance, force, wrench, near.as_ref());
-        let mu = limit.as_ref().and_then(Limit::mu);
+    let mut next = |force: f64, anew: bool| {
+        let mut limit = pads.limit(distance, force, wrench, near.as_ref());
+        let mu_of = |limit: &Option<Limit<'_>>| limit.as_ref().and_then(Limit::mu);
+        if anew && near.is_some() && mu_of(&limit).is_none() {
+            limit = pads.limit(distance, force, wrench, None);
+        }
+        let mu = mu_of(&limit);
         if mu.is_some() {
             near = limit;
         }
         over(mu)
     };
-    let end = search.run(start, CLOSER, &mut next);
-    if end.is_right(&solved) {
-        return end.found;
+    // Where the state is lost there is none, or another one.
+    for anew in [false, true] {
+        let end = search.run(start, CLOSER, &mut |force| next(force, anew));
+        if end.is_right(&solved) {
+            return end.found;
+        }
     }
     search.run(start, FOUND, &mut |force| solved(force)).found
 }

@@ -38,6 +38,8 @@ pub struct Screen<'a> {
     rolling: Vec<(usize, Stiffness)>,
     /// Of many loads.
     floors: Option<Floors>,
+    /// Whether any limit state will do, not only that on the branch from `d = 0`.
+    any: bool,
     /// States found so far.
     known: Vec<Known>,
 }
@@ -217,11 +219,16 @@ impl Pads {
         let floors =
             if wrenches.len() >= MANY { Floors::new(&problem, faces, force, pull) } else { None };
         let (near, known) = (Near::new(faces), Vec::new());
-        Some(Screen { problem, force, near, rolling, floors, known, pressed })
+        Some(Screen { problem, force, near, rolling, floors, any: false, known, pressed })
     }
 }
 
 impl Screen<'_> {
+    /// Where it is only asked whether a load is held: by any limit state.
+    pub fn by_any_state(self) -> Self {
+        Self { any: true, ..self }
+    }
+
     /// About the `mu_s` of a load, for the order in which loads are compared.
     pub fn estimate(&self, wrench: &Wrench) -> f64 {
         let (force, moment) = (wrench.force.truncate(), wrench.moment.truncate());
@@ -245,8 +252,8 @@ impl Screen<'_> {
             self.problem.rolling[*held] = stiffness.at(wrench.force.z);
         }
         if let Some(floors) = &self.floors {
-            if !strong(&self.problem, value / WEAK) && floors.below(&self.problem, value).is_some()
-            {
+            let is_first = self.any || !strong(&self.problem, value / WEAK);
+            if is_first && floors.below(&self.problem, value).is_some() {
                 return Compared::Below;
             }
             if let Some(mu) = floors.rolls(&self.problem) {
@@ -261,9 +268,9 @@ impl Screen<'_> {
     /// As [`Self::reach`], if that does not depend on what the load decides by itself.
     fn reach_settled(&self, value: f64) -> Option<(Compared, Place, f64)> {
         let (compared, place, most) = self.reach(value)?;
-        let open = strong(&self.problem, most / WEAK)
-            || tilts_far(&self.problem, &place.angles)
-            || self.may_settle(&place);
+        let others =
+            || strong(&self.problem, most / WEAK) || tilts_far(&self.problem, &place.angles);
+        let open = !self.any && others() || self.may_settle(&place);
         (!open).then_some((compared, place, most))
     }
 
