@@ -21,6 +21,8 @@ use crate::results::{GripSet, PadFriction, Provenance, RankedGrip, Summary};
 /// Poses within this \[m\] and this \[rad\] are one pose: what files with six digits keep.
 const SAME_PLACE: f64 = 2e-6;
 const SAME_TURN: f64 = 1e-5;
+/// Angle off a closing direction from which on a round face is looked at in the pose's own \[rad\].
+const OFF: f64 = 1e-3;
 
 /// What became of a pose.
 #[derive(Debug, Clone, PartialEq)]
@@ -203,16 +205,19 @@ impl Plan {
     /// With the plan's candidates and, on tapers, those of poses beside their rows.
     fn proposer_for(&self, poses: &[Pose], turn: f64) -> Result<Proposer<'_>> {
         let plain = Proposer::new(&self.part, &self.gripper, &self.propose)?;
-        if !plain.has_rows() {
+        let fitted: Vec<(f64, std::result::Result<Fit, Misfit>)> =
+            poses.par_iter().map(|pose| self.fitted(&plain, pose, turn)).collect::<Result<_>>()?;
+        let is_off = |(_, fit): &(f64, std::result::Result<Fit, Misfit>)| match fit {
+            Ok(fit) => fit.turned > OFF,
+            Err(_) => true,
+        };
+        if !(plain.has_rows() || plain.has_round() && fitted.iter().any(is_off)) {
             return Ok(plain);
         }
-        let frame = |pose: &Pose| {
-            let (gap, _) = self.fitted(&plain, pose, turn)?;
-            self.grip_frame(pose, gap)
-        };
-        let frames = poses.par_iter().map(frame).collect::<Result<_>>()?;
+        let frames = poses.iter().zip(&fitted).map(|(pose, (gap, _))| self.grip_frame(pose, *gap));
+        let frames = frames.collect::<Result<_>>()?;
         // Those rows must not be the ones that make curved faces too many.
-        let options = self.propose.clone().with_curved(Some(true)).with_rows_at(frames);
+        let options = self.propose.clone().with_curved(Some(true)).with_poses(frames);
         Proposer::new(&self.part, &self.gripper, &options)
     }
 

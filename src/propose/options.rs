@@ -77,10 +77,10 @@ pub struct ProposeOptions {
     /// Gripping force, by which pads are pressed into what is not plane \[N\]; `None`: the gripper's
     /// largest.
     pub force: Option<f64>,
-    /// Poses of grip frames in the part frame for which there is a row of grips, too, where rows lie
-    /// across a taper: those of others lie beside the rows of the grid.
+    /// Poses of grip frames in the part frame for which there are grips, too, where those of the grid lie
+    /// beside them: a row across a taper, a closing direction across a round face.
     #[serde(skip)]
-    pub rows_at: Vec<Frame>,
+    pub poses: Vec<Frame>,
 }
 
 setters!(ProposeOptions {
@@ -106,7 +106,7 @@ setters!(ProposeOptions {
     with_scene: scene: Option<Arc<Scene>>,
     with_chunk: chunk: usize,
     with_force: force: Option<f64>,
-    with_rows_at: rows_at: Vec<Frame>,
+    with_poses: poses: Vec<Frame>,
 });
 
 /// A scene's meshes are too long to be written down.
@@ -169,7 +169,7 @@ impl From<&Candidates> for ProposeOptions {
             scene: None,
             chunk: 65_536,
             force: None,
-            rows_at: Vec::new(),
+            poses: Vec::new(),
         }
     }
 }

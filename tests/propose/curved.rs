@@ -8,9 +8,10 @@ use gripfast::geometry::patch_area;
 use gripfast::gripper;
 use gripfast::load::{LoadSet, wrench_in_grip};
 use gripfast::mechanics::curved::Pads;
-use gripfast::model::{Gap, Grip, LoadCase, Slip, Status, Wrench};
+use gripfast::model::{Frame, Gap, Grip, LoadCase, Slip, Status, Wrench};
 use gripfast::part::Part;
 use gripfast::plan::{Assessor, Plan, Settings};
+use gripfast::poses::Pose;
 use gripfast::propose::{ProposeOptions, Proposer};
 use gripfast::request::{Choice, Polish, Request};
 use gripfast::results::{GripSet, RankedGrip};
@@ -54,6 +55,10 @@ fn load(name: &str, force: DVec3, moment: DVec3) -> LoadCase {
 }
 
 fn planned(part: Part, loads: Vec<LoadCase>) -> GripSet {
+    plan(part, loads).run(&mut (), &AtomicBool::new(false)).unwrap().set
+}
+
+fn plan(part: Part, loads: Vec<LoadCase>) -> Plan {
     let mut request = Request::new("", "robotiq-2f85");
     request.mass = Some(Mass(0.2));
     request.force = Some(Force(60.0));
@@ -61,8 +66,29 @@ fn planned(part: Part, loads: Vec<LoadCase>) -> GripSet {
     request.candidates.curved = Some(true);
     request.candidates.angle_step = Angle(45_f64.to_radians());
     request.scoring.backend = Choice::Cpu;
-    let plan = Plan::builder(request).part(part).loads(loads).build().unwrap();
-    plan.run(&mut (), &AtomicBool::new(false)).unwrap().set
+    Plan::builder(request).part(part).loads(loads).build().unwrap()
+}
+
+/// A barrel can be gripped at any angle, not only in the directions that a plan tries.
+#[test]
+fn a_pose_on_a_barrel_is_met_at_any_angle() {
+    let plan = plan(shaft(0.3), vec![load("along", DVec3::Z * 9.0, DVec3::ZERO)]);
+    let set = plan.run(&mut (), &AtomicBool::new(false)).unwrap().set;
+    let best = set.grips.iter().find(|ranked| barrel_axis(ranked).is_some()).unwrap();
+    let angles = [0.0, 1.3, 4.0, 7.1, -5.3, 22.0];
+    let turned = angles.map(|degrees: f64| {
+        let rotation = DMat3::from_rotation_z(degrees.to_radians());
+        let by = Frame { rotation, origin: DVec3::ZERO };
+        Pose::of_grip("turned", by.compose(&best.grip.part_from_grip))
+    });
+    let assessed = plan.assess(&turned, 0.05).unwrap();
+    for (degrees, pose) in angles.iter().zip(&assessed.poses) {
+        let fit = pose.fit.unwrap();
+        assert!(fit.turned < 1e-6 && pose.is_grip(), "{degrees}: {fit:?}");
+        let mu_s = pose.ranked.as_ref().unwrap().worst.mu_s.unwrap();
+        let wanted = best.worst.mu_s.unwrap();
+        assert!((mu_s / wanted - 1.0).abs() < 1e-4, "{degrees}: {mu_s} {wanted}");
+    }
 }
 
 /// Axis of the barrel in the grip frame.

@@ -510,7 +510,7 @@ fn poses_beside_the_rows_of_a_taper_have_widths_of_their_own() {
     let options = ProposeOptions::default()
         .with_curved(Some(true))
         .with_force(Some(FORCE))
-        .with_rows_at(heights.map(pose).to_vec());
+        .with_poses(heights.map(pose).to_vec());
     let proposer = Proposer::new(&part, &gripper, &options).unwrap();
     for z in heights {
         let fit = proposer.fit(&pose(z), 0.05).unwrap();

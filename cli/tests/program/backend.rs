@@ -319,7 +319,7 @@ fn polish_top_gives_the_same_best_grips() {
             "--loads",
             "ball:60",
             "--spacing",
-            "4mm",
+            "6mm",
             "--json",
             "-q",
         ];

@@ -130,6 +130,8 @@ fn every_real_part_ends_with_a_list_or_a_clear_reason() {
             "90deg",
             "--spacing",
             "10mm",
+            "--keep",
+            "50",
             "--unit",
             unit,
         ];

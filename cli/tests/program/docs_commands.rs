@@ -106,8 +106,12 @@ fn run(words: &[String], folder: &Path) -> (Vec<String>, i32) {
         .stdout(file);
     let status = command.status().unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
-    // Which backend there is says more of the machine than of the command: the pages leave it out.
-    let lines = text.trim_matches('\n').lines().filter(|line| !line.starts_with("backend "));
+    // Which backend there is, and how long it takes, say more of the machine than of the command: the pages
+    // leave it out.
+    let of_machine = |line: &str| {
+        line.starts_with("backend ") || line.contains(" candidates, ") && line.ends_with(" left")
+    };
+    let lines = text.trim_matches('\n').lines().filter(|line| !of_machine(line));
     (lines.map(|line| line.trim_end().to_owned()).collect(), status.code().unwrap())
 }
 

@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3};
 
 use super::relief::Relief;
+use super::rows::RIGHTED;
 use super::shapes::{project, stretches};
 use super::skyline::Skyline;
 use super::survey::{LEVEL, Survey, is_free};
@@ -259,6 +260,7 @@ impl Finder<'_> {
         }
         let is_sphere = |face: &CurvedFace| matches!(face.shape, Shape::Sphere { .. });
         if self.round_faces().any(is_sphere) {
+            self.options.poses.iter().for_each(|pose| add(pose.rotation.z_axis, &mut found));
             self.facing_spheres().into_iter().for_each(|direction| add(direction, &mut found));
             let divisions = (ICOSAHEDRON / self.options.angle_step).round() as usize;
             let divisions = divisions.clamp(1, MOST_DIVISIONS);
@@ -343,6 +345,12 @@ impl Finder<'_> {
             add(first * turn.x + second * turn.y, found);
         }
         planes.iter().for_each(|face| add(face.normal, found));
+        for pose in &self.options.poses {
+            let across = pose.rotation.z_axis.reject_from(axis);
+            if across.length() > RIGHTED {
+                add(across.normalize(), found);
+            }
+        }
     }
 
     /// Axes of faces that are round about one, the largest first.

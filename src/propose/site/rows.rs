@@ -29,7 +29,7 @@ const SAME_REACH: f64 = 1e-9;
 /// Rows nearer to each other than this are one \[m\].
 const SAME_ROW: f64 = 1e-7;
 /// Cosine of the angle by which closing jaws right a pose, and more: 10 degrees.
-const RIGHTED: f64 = 0.985;
+pub(super) const RIGHTED: f64 = 0.985;
 /// A direction that lies this far out of the pads' plane has no angle in it (cosine).
 const ALONG: f64 = 1e-3;
 
@@ -132,7 +132,7 @@ impl<'a> Finder<'a> {
     /// Places along `y`, between two, of the poses for which rows are asked for.
     fn rows_at(&self, taper: &Taper, [low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
         let closing = self.directions[taper.direction];
-        let poses = self.options.rows_at.iter();
+        let poses = self.options.poses.iter();
         let poses = poses.filter(move |pose| pose.rotation.z_axis.dot(closing).abs() > RIGHTED);
         let place = move |pose: &Frame| taper.uphill.dot((axes(closing) * pose.origin).truncate());
         poses.map(place).filter(move |y| (low..=high).contains(y))
