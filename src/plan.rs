@@ -89,6 +89,8 @@ pub struct Plan {
     format: Option<Format>,
     command: Vec<String>,
     warnings: Vec<String>,
+    /// Whether nobody looks at the grips that are not shown.
+    shown_only: bool,
     threads: ThreadPool,
 }
 
@@ -368,9 +370,12 @@ impl Plan {
             *rejections.entry(reason.clone()).or_default() += count;
         }
         let mut grips = self.kept(ranking.grips, size);
-        let (first, count) = (self.shown(&grips, size), grips.len());
+        let first = self.shown(&grips, size);
+        // Where none holds the least force of all is told.
+        let others = !self.shown_only || ranking.holding == 0;
+        let count = if others { grips.len() } else { first.len() };
         let mut told = |done: usize| observer.finishing(done, count);
-        let left = assessor.finish_until(&mut grips, &first, stop, &mut told)?;
+        let left = assessor.finish_until(&mut grips, (&first, others), stop, &mut told)?;
         if left > 0 {
             observer.warning(&format!(
                 "interrupted: {left} of {count} grips have no force needed and no multiple"

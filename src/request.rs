@@ -380,10 +380,14 @@ impl Request {
     /// number of grips to keep.
     pub(crate) fn wants_first_only(&self) -> bool {
         let Selection { diverse, merge_symmetric, keep, compare, .. } = &self.selection;
-        let Output { output, report, json, .. } = &self.output;
-        let written = output.is_some() || report.is_some() || *json;
         let chosen = *diverse || *merge_symmetric || keep.is_some() || compare.is_some();
-        !written && !chosen && self.scoring.k1 >= 0.0
+        !self.writes() && !chosen && self.scoring.k1 >= 0.0
+    }
+
+    /// Whether more is written than the grips to show.
+    pub(crate) fn writes(&self) -> bool {
+        let Output { output, report, json, .. } = &self.output;
+        output.is_some() || report.is_some() || *json
     }
 
     /// Reads a stored request: JSON where the file's name ends in `.json`, else TOML. Paths in it

@@ -25,6 +25,7 @@ mod job;
 mod lanes;
 #[doc(hidden)]
 pub mod layout;
+mod neighbours;
 mod prepare;
 mod problem;
 mod score;

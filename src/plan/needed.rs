@@ -56,21 +56,24 @@ enum Looked {
 }
 
 impl Assessor<'_> {
-    /// As [`Self::finish`], those of the ids `first` before the others, and these until `stop` becomes true;
-    /// how many are left. `told`: how many are done.
+    /// As [`Self::finish`], those of the ids `first` before the `others`, if they are wanted, and these until
+    /// `stop` becomes true; how many of them are left. `told`: how many are done.
     ///
     /// # Errors
     /// As [`Self::finish`].
     pub(super) fn finish_until(
         &self,
         grips: &mut [RankedGrip],
-        first: &[u64],
+        (first, others): (&[u64], bool),
         stop: &AtomicBool,
         told: &mut dyn FnMut(usize),
     ) -> Result<usize> {
         let first: FxHashSet<u64> = first.iter().copied().collect();
         let mut open: Vec<&mut RankedGrip> = grips.iter_mut().collect();
         open.sort_by_key(|ranked| !first.contains(&ranked.grip.id));
+        if !others {
+            open.truncate(first.len());
+        }
         let (mut done, mut left, mut size) = (0, 0, first.len().max(1));
         while done < open.len() {
             let stopped = || done > 0 && stop.load(Ordering::Relaxed);

@@ -100,6 +100,7 @@ impl PlanBuilder {
         let Self { mut request, part, gripper, loads, command, first_only } = self;
         request.check()?;
         let asked_polish = request.scoring.polish;
+        let shown_only = first_only && !request.writes();
         if asked_polish == Polish::Auto {
             let first = first_only && request.wants_first_only();
             request.scoring.polish = if first { Polish::Top } else { Polish::Worst };
@@ -161,6 +162,7 @@ impl PlanBuilder {
             format,
             command,
             warnings,
+            shown_only,
             threads,
         })
     }

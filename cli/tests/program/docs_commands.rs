@@ -109,7 +109,9 @@ fn run(words: &[String], folder: &Path) -> (Vec<String>, i32) {
     // Which backend there is, and how long it takes, say more of the machine than of the command: the pages
     // leave it out.
     let of_machine = |line: &str| {
-        line.starts_with("backend ") || line.contains(" candidates, ") && line.ends_with(" left")
+        line.starts_with("backend ")
+            || line.contains(" candidates, ") && line.ends_with(" left")
+            || line.ends_with(" grips have their forces")
     };
     let lines = text.trim_matches('\n').lines().filter(|line| !of_machine(line));
     (lines.map(|line| line.trim_end().to_owned()).collect(), status.code().unwrap())

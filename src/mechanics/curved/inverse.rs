@@ -11,8 +11,6 @@ const CLOSER: f64 = 1e-11;
 /// The same where the load is held at no less for want of a limit state: tries there are in vain, and where
 /// nothing could be followed each is a search over all tilts.
 const HELD: f64 = 1e-7;
-/// Both where no state can be followed.
-const SEARCHED: f64 = 1e-5;
 /// Solves at most.
 const STEPS: i32 = 120;
 /// Force over the load's size beyond which none is enough.
@@ -54,29 +52,29 @@ pub fn force_needed(
         return (solved(start) <= 0.0).then_some(0.0);
     }
     let search = Search { size, most: MOST * size.max(start) };
-    let mut near: Option<Limit<'_>> = None;
-    let mut next = |force: f64, anew: bool| {
-        let mut limit = pads.limit(distance, force, wrench, near.as_ref());
-        let mu_of = |limit: &Option<Limit<'_>>| limit.as_ref().and_then(Limit::mu);
-        if anew && near.is_some() && mu_of(&limit).is_none() {
-            limit = pads.limit(distance, force, wrench, None);
-        }
-        let mu = mu_of(&limit);
-        if mu.is_some() {
-            near = limit;
-        }
-        over(mu)
-    };
+    let mu_of = |limit: &Option<Limit<'_>>| limit.as_ref().and_then(Limit::mu);
     // Where the state is lost there is none, or another one.
     let mut enough = start;
     for anew in [false, true] {
-        let end = search.run(start, [CLOSER, HELD], &mut |force| next(force, anew));
+        let mut near: Option<Limit<'_>> = None;
+        let mut next = |force: f64| {
+            let mut limit = pads.limit(distance, force, wrench, near.as_ref());
+            if anew && near.is_some() && mu_of(&limit).is_none() {
+                limit = pads.limit(distance, force, wrench, None);
+            }
+            let mu = mu_of(&limit);
+            if mu.is_some() {
+                near = limit;
+            }
+            over(mu)
+        };
+        let end = search.run(start, CLOSER, &mut next);
         if end.is_right(&solved) {
             return end.found;
         }
         enough = end.found.unwrap_or(enough);
     }
-    search.run(enough, [SEARCHED; 2], &mut |force| solved(force)).found
+    search.run(enough, FOUND, &mut |force| solved(force)).found
 }
 
 /// The search for a force.
@@ -109,8 +107,8 @@ impl End {
 
 impl Search {
     /// `excess`: the logarithm of `mu_s` over the friction at a force; `within`: as much of it counts
-    /// as none, and the width at which the least force that has a limit state counts as found.
-    fn run(&self, start: f64, [within, held]: [f64; 2], excess: &mut dyn FnMut(f64) -> f64) -> End {
+    /// as none.
+    fn run(&self, start: f64, within: f64, excess: &mut dyn FnMut(f64) -> f64) -> End {
         // `low` is too little, `high` enough; `last` is the one before, if it has a limit state.
         let mut low: Option<(f64, f64)> = None;
         let mut high: Option<(f64, f64)> = None;
@@ -141,7 +139,7 @@ impl Search {
             let push = if late { 1.0 + FOUND * GROWTH.powi(done - PATIENCE) } else { 1.0 };
             force = match (low, high) {
                 (Some((a, over)), Some((b, under))) => {
-                    let width = if over.is_finite() { FOUND.max(within) } else { held };
+                    let width = if over.is_finite() { FOUND } else { HELD };
                     if b - a <= width * b {
                         return end(Some(b), low);
                     }
