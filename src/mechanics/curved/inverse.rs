@@ -52,29 +52,20 @@ pub fn force_needed(
         return (solved(start) <= 0.0).then_some(0.0);
     }
     let search = Search { size, most: MOST * size.max(start) };
-    let mu_of = |limit: &Option<Limit<'_>>| limit.as_ref().and_then(Limit::mu);
-    // Where the state is lost there is none, or another one.
-    let mut enough = start;
-    for anew in [false, true] {
-        let mut near: Option<Limit<'_>> = None;
-        let mut next = |force: f64| {
-            let mut limit = pads.limit(distance, force, wrench, near.as_ref());
-            if anew && near.is_some() && mu_of(&limit).is_none() {
-                limit = pads.limit(distance, force, wrench, None);
-            }
-            let mu = mu_of(&limit);
-            if mu.is_some() {
-                near = limit;
-            }
-            over(mu)
-        };
-        let end = search.run(start, CLOSER, &mut next);
-        if end.is_right(&solved) {
-            return end.found;
+    let mut near: Option<Limit<'_>> = None;
+    let mut next = |force: f64| {
+        let limit = pads.limit(distance, force, wrench, near.as_ref());
+        let mu = limit.as_ref().and_then(Limit::mu);
+        if mu.is_some() {
+            near = limit;
         }
-        enough = end.found.unwrap_or(enough);
+        over(mu)
+    };
+    let end = search.run(start, CLOSER, &mut next);
+    if end.is_right(&solved) {
+        return end.found;
     }
-    search.run(enough, FOUND, &mut |force| solved(force)).found
+    search.run(start, FOUND, &mut |force| solved(force)).found
 }
 
 /// The search for a force.
