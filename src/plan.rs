@@ -370,12 +370,12 @@ impl Plan {
             *rejections.entry(reason.clone()).or_default() += count;
         }
         let mut grips = self.kept(ranking.grips, size);
-        let first = self.shown(&grips, size);
+        let shown = self.shown(&grips, size);
         // Where none holds the least force of all is told.
         let others = !self.shown_only || ranking.holding == 0;
-        let count = if others { grips.len() } else { first.len() };
+        let count = if others { grips.len() } else { shown.len() };
         let mut told = |done: usize| observer.finishing(done, count);
-        let left = assessor.finish_until(&mut grips, (&first, others), stop, &mut told)?;
+        let left = assessor.finish_until(&mut grips, (&shown, others), stop, &mut told)?;
         if left > 0 {
             observer.warning(&format!(
                 "interrupted: {left} of {count} grips have no force needed and no multiple"
@@ -385,7 +385,6 @@ impl Plan {
         let comparison = selection
             .compare
             .map(|weights| compare::compare(&mut grips, centre, self.settings.force, &weights));
-        let shown = self.shown(&grips, size);
         self.add_noise(proposer, assessor, &mut grips, &shown)?;
         self.solve_other_loads(assessor, &mut grips, &shown)?;
         let mut set = GripSet::new(

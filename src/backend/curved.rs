@@ -185,11 +185,7 @@ impl CurvedProblem<'_> {
             if known.contains(&load) {
                 continue;
             }
-            let compared = match &mut screen {
-                Some(screen) => screen.compare(&self.wrenches[load], friction),
-                None => Compared::Open,
-            };
-            let held = match compared {
+            let held = match self.compare(&mut screen, load, friction) {
                 Compared::Below => true,
                 Compared::At(mu) => mu <= friction,
                 Compared::Open => false,
@@ -214,6 +210,13 @@ impl CurvedProblem<'_> {
         order
     }
 
+    fn compare(&self, screen: &mut Option<Screen<'_>>, load: usize, value: f64) -> Compared {
+        match screen {
+            Some(screen) => screen.compare(&self.wrenches[load], value),
+            None => Compared::Open,
+        }
+    }
+
     /// At least the `mu_s` of a load that is held, or no more than `value`.
     fn held(
         &self,
@@ -222,11 +225,7 @@ impl CurvedProblem<'_> {
         value: f64,
         seen: &mut Seen,
     ) -> Option<f64> {
-        let compared = match screen {
-            Some(screen) => screen.compare(&self.wrenches[load], value),
-            None => Compared::Open,
-        };
-        match compared {
+        match self.compare(screen, load, value) {
             Compared::Below => {
                 seen.compared += 1;
                 Some(0.0)

@@ -202,16 +202,19 @@ impl Plan {
         })
     }
 
-    /// With the plan's candidates and, on tapers, those of poses beside their rows.
+    /// With the plan's candidates and those of poses beside them, on tapers and round faces.
     fn proposer_for(&self, poses: &[Pose], turn: f64) -> Result<Proposer<'_>> {
         let plain = Proposer::new(&self.part, &self.gripper, &self.propose)?;
+        if !(plain.has_rows() || plain.has_round()) {
+            return Ok(plain);
+        }
         let fitted: Vec<(f64, std::result::Result<Fit, Misfit>)> =
             poses.par_iter().map(|pose| self.fitted(&plain, pose, turn)).collect::<Result<_>>()?;
         let is_off = |(_, fit): &(f64, std::result::Result<Fit, Misfit>)| match fit {
             Ok(fit) => fit.turned > OFF,
             Err(_) => true,
         };
-        if !(plain.has_rows() || plain.has_round() && fitted.iter().any(is_off)) {
+        if !(plain.has_rows() || fitted.iter().any(is_off)) {
             return Ok(plain);
         }
         let frames = poses.iter().zip(&fitted).map(|(pose, (gap, _))| self.grip_frame(pose, *gap));

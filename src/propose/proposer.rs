@@ -24,7 +24,7 @@ use crate::clash::{Sweep, Topology, Tree, sweeps};
 use crate::error::{Error, Result};
 use crate::gripper::{Gripper, Jaw, Jaws};
 use crate::model::{Contact, Grip, Polygon};
-use crate::part::{CurvedFace, FacePair, PairKind, Part, Shape};
+use crate::part::{FacePair, PairKind, Part, Shape};
 
 /// Positions per work item: large enough to share what an angle determines, small enough to spread
 /// over the threads. Fixed, because contacts are shared within an item: results must not depend on
@@ -141,8 +141,7 @@ impl<'a> Proposer<'a> {
 
     /// Whether faces can be gripped in more closing directions than are tried.
     pub(crate) fn has_round(&self) -> bool {
-        let is_round = |face: &CurvedFace| !matches!(face.shape, Shape::Freeform);
-        self.part.curved.iter().any(|face| face.reachable && is_round(face))
+        self.part.curved.iter().any(|face| face.reachable && face.shape != Shape::Freeform)
     }
 
     /// Whether any candidate is free of interference; looks at them until one is.

@@ -183,8 +183,8 @@ fn print(outcomes: &[Compared]) -> anyhow::Result<()> {
     }
     let usable = summary::usable(outcomes[0].outcome.set.pads().safety);
     let text = format!(
-        "force N: gripping force per jaw with which it {usable} under every load; + more than the gripper has, - less \
-         than its least. pad: share of the pad that touches; left: share of that contact left under \
+        "force N: gripping force per jaw with which it {usable} under every load; + more than the \
+         gripper has, - less than its least. pad: share of the pad that touches; left: share of that contact left under \
          the worst load."
     );
     writeln!(out, "\n{}", wrapped(&text, width))?;

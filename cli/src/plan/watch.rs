@@ -130,12 +130,20 @@ impl Log {
         Self { begun, before, next: begun + Self::FIRST }
     }
 
+    /// Whether it is time for a line; the next one is due later.
+    fn is_due(&mut self, now: Instant) -> bool {
+        let due = now >= self.next;
+        if due {
+            self.next = now + Self::PAUSE;
+        }
+        due
+    }
+
     /// How many of the grips found have all their numbers, where it is time to say it.
     fn completing(&mut self, [done, grips]: [usize; 2], now: Instant) -> Option<String> {
-        if now < self.next {
+        if !self.is_due(now) {
             return None;
         }
-        self.next = now + Self::PAUSE;
         Some(format!(
             "all candidates looked at; {} of {} grips have their forces",
             HumanCount(done as u64),
@@ -145,10 +153,9 @@ impl Log {
 
     /// How far the run is, where it is time to say it.
     fn line(&mut self, [done, total, grips]: [u64; 3], now: Instant) -> Option<String> {
-        if now < self.next || done >= total {
+        if done >= total || !self.is_due(now) {
             return None;
         }
-        self.next = now + Self::PAUSE;
         let left = match done - self.before {
             0 => String::new(),
             since => {

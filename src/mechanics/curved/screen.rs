@@ -252,8 +252,8 @@ impl Screen<'_> {
             self.problem.rolling[*held] = stiffness.at(wrench.force.z);
         }
         if let Some(floors) = &self.floors {
-            let is_first = self.any || !strong(&self.problem, value / WEAK);
-            if is_first && floors.below(&self.problem, value).is_some() {
+            let counts = self.any || !strong(&self.problem, value / WEAK);
+            if counts && floors.below(&self.problem, value).is_some() {
                 return Compared::Below;
             }
             if let Some(mu) = floors.rolls(&self.problem) {

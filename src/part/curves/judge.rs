@@ -12,7 +12,7 @@ use super::grow::{Exactness, Found, Growth};
 const FEWEST: f64 = 7.5;
 /// Cosine of the half angle of the flattest cone that is not a whole ring: 78 degrees. A flatter one is
 /// hard to tell from any dome.
-const FLATTEST: f64 = 0.2;
+const FLATTEST_ARC: f64 = 0.2;
 /// Angle between facets above which they may as well be flats \[rad\]: 25.5 degrees, 14 to the turn.
 pub(super) const COARSE: f64 = 0.445;
 /// Turn below which a face shows too little of its curvature \[rad\]: 26 degrees.
@@ -169,7 +169,7 @@ impl Growth<'_> {
                 let about = 2.0 * ((step / 2.0).sin() / slope.cos()).min(1.0).asin();
                 let turn = turn(found, about);
                 let (is_steep, chord) =
-                    (slope.cos() > FLATTEST || turn == TAU, chord(about) * slope.cos());
+                    (slope.cos() > FLATTEST_ARC || turn == TAU, chord(about) * slope.cos());
                 (turn, TAU / about, edge.runs_on > 0.5 * mean, is_steep, chord)
             }
             Profile::Circle { .. } => {
