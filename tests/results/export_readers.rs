@@ -5,9 +5,11 @@
 //! with `GRIPFAST_READERS=require` it fails.
 
 use crate::support::grips;
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::{LazyLock, Mutex};
 
 use glam::{DMat3, DVec3};
 use gripfast::export::{self, Convention, Dialect, Format, Joint, Options, Origin, Stated};
@@ -15,8 +17,12 @@ use gripfast::part::Mesh;
 use gripfast::results::GripSet;
 use serde_json::Value;
 
+/// The Python to use, or why there is none, by package: importing some takes seconds.
+static PYTHONS: LazyLock<Mutex<BTreeMap<String, Result<PathBuf, String>>>> =
+    LazyLock::new(Mutex::default);
+
 /// The Python to use, or why there is none.
-fn python(package: &str) -> Result<PathBuf, String> {
+fn find_python(package: &str) -> Result<PathBuf, String> {
     let local = crate::support::root().join(if cfg!(windows) {
         ".venv/Scripts/python.exe"
     } else {
@@ -34,10 +40,14 @@ fn python(package: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Runs a reader on a file; `None` when it cannot run and need not.
-pub(crate) fn read(reader: &str, package: &str, path: &Path) -> Option<Value> {
-    let python = match python(package) {
-        Ok(python) => python,
+/// The Python for a reader; `None` when it cannot run and need not.
+fn python(reader: &str, package: &str) -> Option<PathBuf> {
+    // Another test's failure says nothing about what was found.
+    let mut known = PYTHONS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let found = known.entry(package.to_owned()).or_insert_with(|| find_python(package)).clone();
+    drop(known);
+    match found {
+        Ok(python) => Some(python),
         Err(reason) => {
             assert!(
                 std::env::var_os("GRIPFAST_READERS").is_none_or(|value| value != "require"),
@@ -48,9 +58,14 @@ pub(crate) fn read(reader: &str, package: &str, path: &Path) -> Option<Value> {
                 std::io::stderr(),
                 "SKIPPED {reader}: {reason}; see tests/readers/requirements.txt"
             );
-            return None;
+            None
         }
-    };
+    }
+}
+
+/// Runs a reader on a file; `None` when it cannot run and need not.
+pub(crate) fn read(reader: &str, package: &str, path: &Path) -> Option<Value> {
+    let python = python(reader, package)?;
     let script = crate::support::root().join("tests/readers").join(reader);
     let output = Command::new(python)
         .arg(script)
@@ -511,10 +526,7 @@ fn files_for_many_parts_name_part_gripper_and_frame() {
     let name = set.gripper["name"].as_str().unwrap().replace('"', "\"\"");
     assert!(csv.lines().nth(1).unwrap().contains("box.stl") && csv.contains(&name), "{csv}");
     let npz = write("grips.npz", Format::GraspNet);
-    let python = match python("numpy") {
-        Ok(python) => python,
-        Err(_) => return,
-    };
+    let Some(python) = python("names of the parts", "numpy") else { return };
     let code = "import numpy, sys; d = numpy.load(sys.argv[1]); print(d['part_file'], d['poses'].shape, d['tool_frame'], d['gripper_name'])";
     let output = Command::new(python).args(["-c", code]).arg(npz).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
