@@ -24,6 +24,9 @@ const MOST_PAIRS: usize = 200;
 /// smaller, from which on they are tried. Flanks of teeth and strips of freely curved surfaces have
 /// 1 to 3 %, drafted walls more than 20 %.
 const LEAST_OVERLAP: f64 = 0.1;
+/// Area of a plane over the smallest side of the part's box below which it says nothing of how large the
+/// part's walls are: noise has broken them.
+const LEAST_PLANE: f64 = 0.05;
 /// Planes that are looked at only to count what is too small.
 const MOST_COUNTED: usize = 3000;
 
@@ -204,7 +207,10 @@ impl Finder<'_> {
             return 0.0;
         }
         let planes = self.part.faces.iter().filter(|face| face.reachable);
-        let largest = planes.map(|face| face.area).fold(0.0, f64::max);
+        let (low, high) = self.part.mesh.bounding_box();
+        let box_size = high - low;
+        let side = box_size.element_product() / box_size.max_element();
+        let largest = planes.map(|face| face.area).fold(LEAST_PLANE * side, f64::max);
         let pads = self.gripper.pad_sizes().map(glam::DVec2::element_product);
         LEAST_OVERLAP * largest.min(pads[0]).min(pads[1])
     }
