@@ -7,6 +7,7 @@ use super::patch::Scratch;
 use super::work::{self, Known};
 use super::{Explanation, Proposer, site};
 use crate::error::Result;
+use crate::geometry::patch_area;
 use crate::gripper::Jaws;
 use crate::model::{Frame, Grip};
 use crate::part::PairKind;
@@ -47,13 +48,15 @@ pub enum Misfit {
 
 impl Proposer<'_> {
     /// The faces that a gripper at `part_from_grip` closes on, when its closing axis is off their
-    /// normal by `turn` \[rad\] at most and they stand between the opened pads.
+    /// normal by `turn` \[rad\] at most and they stand between the opened pads. Of several in one middle
+    /// those that the jaws meet first.
     ///
     /// # Errors
     /// The reason, when there are none.
     pub fn fit(&self, part_from_grip: &Frame, turn: f64) -> std::result::Result<Fit, Misfit> {
         let mut nearest: Option<f64> = None;
-        let mut fits: Vec<Fit> = Vec::new();
+        // By how far they are off the pose \[m\].
+        let mut fits: Vec<(f64, Fit)> = Vec::new();
         let reach = self.gripper.pad_reach();
         for (index, site) in self.sites.iter().enumerate() {
             let local = site.part_from_site.inverse().compose(part_from_grip);
@@ -70,30 +73,34 @@ impl Proposer<'_> {
                 && position.distance(within) <= reach
                 && local.origin.z.abs() <= room
             {
-                fits.push(Fit {
-                    site: index,
-                    position,
-                    angle: local.rotation.x_axis.truncate().to_angle(),
-                    jaws: site::jaws(&local),
-                    gap,
-                    turned,
-                    shifted: local.origin.z.abs(),
-                });
+                let angle = local.rotation.x_axis.truncate().to_angle();
+                let shifted = local.origin.z.abs();
+                let [aside, off_row] = site.off_row(position, angle);
+                let jaws = site::jaws(&local);
+                let fit = Fit { site: index, position, angle, jaws, gap, turned, shifted };
+                fits.push((shifted + reach * turned + aside + 1e-3 * reach * off_row, fit));
             }
         }
-        fits.sort_by(|a, b| {
-            let off = |fit: &Fit| {
-                let [aside, turned] = self.sites[fit.site].off_row(fit.position, fit.angle);
-                fit.shifted + reach * fit.turned + aside + 1e-3 * reach * turned
-            };
-            off(a).total_cmp(&off(b)).then(a.site.cmp(&b.site))
-        });
-        let touches = |fit: &&Fit| {
+        fits.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.site.cmp(&b.1.site)));
+        let touched = |(_, fit): &(f64, Fit), least: f64| {
             let contact = self.grip_at(fit, 0).contact;
-            !contact.face_i.is_empty() && !contact.face_ii.is_empty()
+            [&contact.face_i, &contact.face_ii].iter().all(|face| patch_area(face) > least)
         };
-        match (fits.iter().find(touches).or(fits.first()), nearest) {
-            (Some(fit), _) => Ok(*fit),
+        let is_inside = |fit: &Fit| self.sites[fit.site].kind == PairKind::Internal;
+        // Jaws that close on a stepped shaft meet the thickest step under the pads, whichever is listed
+        // first.
+        let first_met = |nearest: &(f64, Fit)| {
+            let inside = is_inside(&nearest.1);
+            let sense = if inside { 1.0 } else { -1.0 };
+            let as_near = fits.iter().take_while(|other| other.0 <= nearest.0 + ROUNDING);
+            let alike = as_near.filter(|other| is_inside(&other.1) == inside);
+            // More than what rounding moves a pad over an edge.
+            let met = alike.filter(|other| touched(other, ROUNDING * reach)).map(|other| other.1);
+            met.min_by(|a, b| (sense * a.gap).total_cmp(&(sense * b.gap))).unwrap_or(nearest.1)
+        };
+        let fit = fits.iter().find(|fit| touched(fit, 0.0)).map(first_met);
+        match (fit.or(fits.first().map(|first| first.1)), nearest) {
+            (Some(fit), _) => Ok(fit),
             (None, Some(angle)) if angle <= turn + 1e-9 => Err(Misfit::Beside),
             (None, nearest) => Err(Misfit::Tilted(nearest)),
         }

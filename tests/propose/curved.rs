@@ -91,6 +91,37 @@ fn a_pose_on_a_barrel_is_met_at_any_angle() {
     }
 }
 
+/// Jaws that close over a shoulder meet the thicker step, whichever face is listed first.
+#[test]
+fn poses_on_a_stepped_shaft_are_on_the_step_that_is_met_first() {
+    // The thick step in the middle, so that it is neither the first nor the last.
+    let steps = [(0.008, 0.0), (0.008, 0.025), (0.012, 0.025), (0.012, 0.045), (0.006, 0.045)];
+    let steps = [&steps[..], &[(0.006, 0.065)]].concat();
+    let ends = [DVec3::ZERO, DVec3::Z * 0.065];
+    let (vertices, triangles) = lathe(48, 6, ends, |turn, row| {
+        let (radius, height) = steps[row as usize];
+        (DVec2::from_angle(turn) * radius).extend(height)
+    });
+    let part = Part::from_triangles("stepped", &vertices, &triangles).unwrap();
+    let plan = plan(part, vec![load("down", DVec3::NEG_Z, DVec3::ZERO)]);
+    let grips = plan.run(&mut (), &AtomicBool::new(false)).unwrap().set.grips;
+    let poses: Vec<Pose> =
+        grips.iter().map(|it| Pose::of_grip("it", it.grip.part_from_grip)).collect();
+    let assessed = plan.assess(&poses, 0.05).unwrap().poses;
+    let mut shoulders = 0;
+    for (ranked, pose) in grips.iter().zip(&assessed) {
+        let (grip, found) = (&ranked.grip, pose.ranked.as_ref().unwrap());
+        assert!((grip.width - found.grip.width).abs() < 1e-9, "{} {:?}", grip.width, pose.fit);
+        assert!(pose.is_grip(), "{}: {:?}", grip.id, pose.rejection());
+        let [wanted, got] = [ranked, found].map(|ranked| ranked.worst.mu_s.unwrap());
+        assert!((got - wanted).abs() <= 1e-6 * wanted, "{}: {got} {wanted}", grip.id);
+        // A pad that reaches over the thin steps beside the thick one.
+        let beside = (grip.part_from_grip.origin.z - 0.035).abs();
+        shoulders += usize::from((grip.width - 0.024).abs() < 1e-9 && beside > 0.005);
+    }
+    assert!(shoulders > 10, "{shoulders} of {}", grips.len());
+}
+
 /// Axis of the barrel in the grip frame.
 fn barrel_axis(ranked: &RankedGrip) -> Option<DVec2> {
     match ranked.grip.surfaces.as_ref()?.face_i.first()?.gap {
