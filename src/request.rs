@@ -129,7 +129,7 @@ pub struct Candidates {
     /// do.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scene: Option<PathBuf>,
-    /// Only these planar faces may be touched, and those of `faces_in`.
+    /// Only these faces, plane and curved ones, may be touched, and those of `faces_in`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub faces: Option<Vec<u32>>,
     /// Only planar faces that lie wholly in one of these boxes may be touched, and those of

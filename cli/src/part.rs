@@ -173,21 +173,8 @@ fn to_text(part: &Part, pairs: &[FacePair], density: Option<f64>, rows: usize) -
             text += "faceted or round?: so few facets may be meant as planes; --faceted takes all for such\n";
         }
     }
-    match part.symmetry() {
-        Some(Symmetry::Axis { axis }) => {
-            text += &format!(
-                "\nround about the axis {} through {} mm: a turn about it maps grips to grips\n",
-                triple(axis.direction, 4),
-                triple(axis.origin * 1e3, 2)
-            );
-        }
-        Some(Symmetry::Point { centre }) => {
-            text += &format!(
-                "\nround about {} mm: every turn about it maps grips to grips\n",
-                triple(centre * 1e3, 2)
-            );
-        }
-        _ => {}
+    if let Some(about) = part.symmetry().as_ref().and_then(about) {
+        text += &format!("\nround about {about}: a turn about it maps grips to grips\n");
     }
     text += &format!("\n{} antiparallel pairs\n", pairs.len());
     text += &pair_table(pairs, rows);
@@ -241,6 +228,18 @@ fn triple(value: DVec3, decimals: usize) -> String {
         fixed(value.y, decimals),
         fixed(value.z, decimals)
     )
+}
+
+/// What a part is round about, in words.
+pub(crate) fn about(symmetry: &Symmetry) -> Option<String> {
+    match symmetry {
+        Symmetry::Axis { axis } => {
+            let [direction, origin] = [triple(axis.direction, 4), triple(axis.origin * 1e3, 2)];
+            Some(format!("the axis {direction} through {origin} mm"))
+        }
+        Symmetry::Point { centre } => Some(format!("{} mm", triple(*centre * 1e3, 2))),
+        _ => None,
+    }
 }
 
 fn face_table(faces: &[PlanarFace], rows: usize) -> String {

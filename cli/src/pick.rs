@@ -76,6 +76,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     });
     let pose = pose.transpose()?;
     let tool_frame = format!("{}, origin {origin}", convention.axes());
+    let free_turn = set.part.symmetry.map(|symmetry| symmetry.moved(&scene.world_from_part));
     let mut out = crate::terminal::answer(args.json);
     if args.json {
         let passed: Vec<_> = pick
@@ -98,6 +99,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
                 "approach_from": pose.origin - approach * scene.approach,
                 "approach_direction": approach,
                 "tool_frame": tool_frame,
+                "free_turn": free_turn,
             })
         });
         serde_json::to_writer(
@@ -128,6 +130,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
                     false => "",
                 };
                 writeln!(out, "no grip of {} is free{slips}", set.grips.len())?;
+                if set.grips.iter().any(|grip| !grip.merged.is_empty()) {
+                    writeln!(
+                        out,
+                        "their turned and mirrored copies were left out of the result: a plan without \
+                         --merge-symmetric has them"
+                    )?;
+                }
             }
             Some((grip, pose)) => {
                 // Rounded first: no negative zeros.
@@ -153,6 +162,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
                 writeln!(out, "  tool in the world             x {x:.3}  y {y:.3}  z {z:.3} mm")?;
                 writeln!(out, "  orientation (qx qy qz qw)     {qx:.6} {qy:.6} {qz:.6} {qw:.6}")?;
                 writeln!(out, "  tool frame                    {tool_frame}")?;
+                if let Some(about) = free_turn.as_ref().and_then(crate::part::about) {
+                    writeln!(out, "  a turn maps grips to grips    about {about} of the world")?;
+                }
             }
         }
         writeln!(

@@ -54,21 +54,14 @@ pub(crate) fn score_curved_watched(
     merit: &(dyn Fn(usize, f64) -> f64 + Sync),
     watch: &Watch<'_>,
 ) -> Vec<Option<Scored>> {
-    let watched = |score: &dyn Fn() -> Scored| {
-        if watch.is_stopped() {
-            return None;
-        }
-        let scored = score();
-        watch.count(1);
-        Some(scored)
-    };
     let Some(best) = best else {
-        return problems.par_iter().map(|problem| watched(&|| problem.polished(polish))).collect();
+        let polished = |problem: &CurvedProblem<'_>| watch.scored(|| problem.polished(polish));
+        return problems.par_iter().map(polished).collect();
     };
     let promise = |(index, problem): (usize, &CurvedProblem<'_>)| merit(index, problem.about());
     let promise = problems.par_iter().enumerate().map(promise).collect();
     let score =
-        |index: usize, beaten: &Beaten<'_>| watched(&|| problems[index].score(Some(beaten)));
+        |index: usize, beaten: &Beaten<'_>| watch.scored(|| problems[index].score(Some(beaten)));
     race(promise, best, merit, &score)
 }
 

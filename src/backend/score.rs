@@ -2,6 +2,7 @@
 //! solved in f64.
 
 use std::ops::Range;
+use std::sync::atomic::AtomicBool;
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -11,6 +12,7 @@ use super::prepare::Contacts;
 use super::problem::{Batch, F32_TOLERANCE, Problem, Seed, SeedStatus};
 use super::screen::Wanted;
 use super::seeds::SeedSet;
+use super::watch::Watch;
 use super::worst::{Ended, Work};
 use crate::contact::{PlaneWrench, Twist};
 use crate::error::Result;
@@ -25,6 +27,9 @@ pub(crate) const TIE: f64 = 1e-9;
 
 /// Loads seeded at a time, which bounds the memory whatever the size of the batch.
 pub(super) const BLOCK: usize = 1 << 19;
+
+/// Loads of a grip that a race solves before it looks for one that is not held.
+const HARD: usize = 16;
 
 /// How [`Backend::score`] works.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -80,11 +85,24 @@ impl Backend {
         seeds: &SeedSet,
         options: &ScoreOptions,
     ) -> Result<Vec<Scored>> {
+        let (stop, mut tell) = (AtomicBool::new(false), |_| ());
+        let scored = self.score_watched(batch, seeds, options, &Watch::new(&stop, &mut tell))?;
+        Ok(scored.into_iter().flatten().collect())
+    }
+
+    /// As [`Backend::score`], as far as `watch` does not stop it: `None` for the other grips.
+    pub(crate) fn score_watched(
+        &self,
+        batch: &Batch<'_>,
+        seeds: &SeedSet,
+        options: &ScoreOptions,
+        watch: &Watch<'_>,
+    ) -> Result<Vec<Option<Scored>>> {
         let wanted = if options.polish == Polish::All { Wanted::All } else { options.wanted() };
         self.by_blocks((BLOCK, wanted), batch, seeds, |Block { range, contacts, survivors }| {
             cases(&contacts, &batch.problems[range], &survivors, options)
                 .into_par_iter()
-                .map(|case| case.score(None))
+                .map(|case| watch.scored(|| case.score(None)))
                 .collect()
         })
     }
@@ -253,23 +271,36 @@ impl Case<'_> {
         if self.options.polish == Polish::All {
             return self.score_all();
         }
-        let mut work = Work::new(self);
         let out = |mu: f64| beaten.is_some_and(|beaten| beaten(mu));
         if beaten.is_some() && out(self.lower()) {
-            return work.outranked();
+            return Work::new(self).outranked();
         }
         let has_bounds = |load: &usize| self.has_bounds(*load);
         let (bounded, open): (Vec<usize>, Vec<usize>) = (0..self.seeds.len()).partition(has_bounds);
-        let open = self.in_turn(open, beaten.is_some());
-        work.at_least(bounded.iter().map(|&load| self.seeds[load].lower).fold(0.0, f64::max));
-        let ended = work.without_bounds(&open, &out).and_then(|()| work.with_bounds(bounded, &out));
-        match ended {
-            Ok(()) => work.worst(),
-            Err(Ended::Outranked) => work.outranked(),
-            // Which load refuses it shall not hang on the order of the race.
-            Err(Ended::Refused) if beaten.is_some() => self.score(None),
-            Err(Ended::Refused) => work.refused(),
-        }
+        let known = bounded.iter().map(|&load| self.seeds[load].lower).fold(0.0, f64::max);
+        let look = |open: &[usize], leader: Option<usize>, most: usize| {
+            let mut work = Work::new(self);
+            work.at_least(known);
+            work.at_most(most);
+            let ended = work.without_bounds(open, leader, &out);
+            match ended.and_then(|()| work.with_bounds(bounded.clone(), &out)) {
+                Ok(()) => Ok(work.worst()),
+                Err(Ended::Outranked) => Ok(work.outranked()),
+                Err(Ended::Refused | Ended::Hard) => Err(work),
+            }
+        };
+        // The one that seems to ask for most comes before them all: few of the others reach it.
+        let estimate = |load: usize| self.seeds[load].estimate;
+        let leader = open.iter().copied().max_by(|&a, &b| estimate(a).total_cmp(&estimate(b)));
+        // Where a race has to solve many, loads near to twisting out are likely to end it. Which of them
+        // refuses the grip shall hang neither on that nor on the leader, and one that seems to, alone, may
+        // be held beside another's state.
+        let most = if beaten.is_some() { HARD } else { usize::MAX };
+        let turn = || self.in_turn(&open, false);
+        look(&self.in_turn(&open, beaten.is_some()), leader, most)
+            .or_else(|_| Work::new(self).first_refused(&turn()).ok_or(()))
+            .or_else(|()| look(&turn(), None, usize::MAX))
+            .unwrap_or_else(Work::refused)
     }
 
     fn has_bounds(&self, load: usize) -> bool {
@@ -287,7 +318,7 @@ impl Case<'_> {
             asked.partition(|&load| self.has_bounds(load));
         // Loads left out by a bound are below the greatest of these.
         let lower = self.seeds.iter().map(|seed| seed.lower).fold(0.0, f64::max);
-        let found = Work::new(self).exceeding(friction, &self.in_turn(open, false), &bounded);
+        let found = Work::new(self).exceeding(friction, &self.in_turn(&open, false), &bounded);
         let loads = found.into_iter().map(|load| self.loads[load] as usize).collect();
         Exceeding { loads, others: lower > friction }
     }
@@ -307,11 +338,11 @@ impl Case<'_> {
     /// Loads without bounds in the order in which they are compared. One that has no limit state
     /// is the worst, whatever the others are (a load with bounds has one): the nearest to twisting
     /// out comes first. In a race the most demanding does.
-    fn in_turn(&self, open: Vec<usize>, race: bool) -> Vec<usize> {
+    fn in_turn(&self, open: &[usize], race: bool) -> Vec<usize> {
         let urgency: Vec<f64> = if race {
             open.iter().map(|&load| -self.seeds[load].estimate).collect()
         } else {
-            self.margins(&open)
+            self.margins(open)
         };
         let mut order: Vec<usize> = (0..open.len()).collect();
         order.sort_by(|&a, &b| urgency[a].total_cmp(&urgency[b]).then(a.cmp(&b)));

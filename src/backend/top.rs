@@ -1,12 +1,15 @@
 //! A race for the best grips: those whose bounds show that they cannot be among them are not solved
 //! to the end.
 
+use std::sync::atomic::AtomicBool;
+
 use rayon::prelude::*;
 
 use super::job::Backend;
 use super::problem::Batch;
 use super::score::{BLOCK, Block, Case, ScoreOptions, Scored, cases, usable};
 use super::seeds::SeedSet;
+use super::watch::Watch;
 use crate::error::Result;
 
 /// A merit this share below that of the last of the best still counts as one of them: far above
@@ -64,6 +67,21 @@ impl Backend {
         best: &mut Best,
         merit: &(dyn Fn(usize, f64) -> f64 + Sync),
     ) -> Result<Vec<Scored>> {
+        let (stop, mut tell) = (AtomicBool::new(false), |_| ());
+        let watch = Watch::new(&stop, &mut tell);
+        let scored = self.score_best_watched(batch, seeds, options, (best, merit), &watch)?;
+        Ok(scored.into_iter().flatten().collect())
+    }
+
+    /// As [`Backend::score_best`], as far as `watch` does not stop it: `None` for the other grips.
+    pub(crate) fn score_best_watched(
+        &self,
+        batch: &Batch<'_>,
+        seeds: &SeedSet,
+        options: &ScoreOptions,
+        (best, merit): (&mut Best, &(dyn Fn(usize, f64) -> f64 + Sync)),
+        watch: &Watch<'_>,
+    ) -> Result<Vec<Option<Scored>>> {
         self.by_blocks(
             (BLOCK, options.wanted()),
             batch,
@@ -73,9 +91,10 @@ impl Backend {
                 let merit = |index: usize, mu: f64| merit(range.start + index, mu);
                 let lower = |(index, case): (usize, &Case<'_>)| merit(index, case.lower());
                 let promise = cases.par_iter().enumerate().map(lower).collect();
-                let score =
-                    |index: usize, beaten: &Beaten<'_>| Some(cases[index].score(Some(beaten)));
-                race(promise, best, &merit, &score).into_iter().flatten().collect()
+                let score = |index: usize, beaten: &Beaten<'_>| {
+                    watch.scored(|| cases[index].score(Some(beaten)))
+                };
+                race(promise, best, &merit, &score)
             },
         )
     }

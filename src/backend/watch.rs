@@ -4,6 +4,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
+use super::score::Scored;
+
 /// Time between two looks at how far a call has come.
 const PAUSE: Duration = Duration::from_millis(200);
 
@@ -31,9 +33,18 @@ impl<'a> Watch<'a> {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Counts grips that are scored.
-    pub(crate) fn count(&self, grips: usize) {
-        self.scored.fetch_add(grips, Ordering::Relaxed);
+    /// Scores a grip and counts it, unless it is stopped.
+    pub(crate) fn scored(&self, score: impl FnOnce() -> Scored) -> Option<Scored> {
+        if self.is_stopped() {
+            return None;
+        }
+        let scored = score();
+        self.count();
+        Some(scored)
+    }
+
+    fn count(&self) {
+        self.scored.fetch_add(1, Ordering::Relaxed);
         // Whoever tells at the moment tells for all.
         let Ok(mut teller) = self.teller.try_lock() else { return };
         if teller.last.elapsed() >= PAUSE {

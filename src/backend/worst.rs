@@ -24,6 +24,8 @@ pub(super) struct Work<'a> {
     open: Open,
     /// Loads that are not seen to be held by the friction `open.floor`, where these are wanted.
     wanted: Option<Vec<usize>>,
+    /// Loads solved at which it ends.
+    most: usize,
 }
 
 /// What is known of the largest `mu_s` before the loads that can have it are solved.
@@ -99,6 +101,8 @@ pub(super) enum Ended {
     Outranked,
     /// The load solved last has no limit state.
     Refused,
+    /// More loads had to be solved than are wont to be.
+    Hard,
 }
 
 impl<'a> Work<'a> {
@@ -112,43 +116,51 @@ impl<'a> Work<'a> {
             comparer: case.pads.map(|pads| Comparer::new(pads, case.problem.force)),
             open: Open::default(),
             wanted: None,
+            most: usize::MAX,
         }
     }
 }
 
 impl Work<'_> {
+    /// Ends once this many loads had to be solved.
+    pub(super) fn at_most(&mut self, loads: usize) {
+        self.most = loads;
+    }
+
     /// Takes it that some load's `mu_s` is at least this.
     pub(super) fn at_least(&mut self, mu: f64) {
         self.open.floor = self.open.floor.max(mu);
     }
 
-    /// Compares loads without bounds one by one, and solves those that can be the worst.
+    /// Compares loads without bounds one by one, the `leader` before all others, and solves those that
+    /// can be the worst.
     pub(super) fn without_bounds(
         &mut self,
         loads: &[usize],
+        leader: Option<usize>,
         out: &dyn Fn(f64) -> bool,
     ) -> std::result::Result<(), Ended> {
-        // The one that seems to ask for most comes before them all: few of the others reach it.
-        let estimate = |load: usize| self.case.seeds[load].estimate;
-        let leader = loads.iter().copied().max_by(|&a, &b| estimate(a).total_cmp(&estimate(b)));
-        let leader = leader.filter(|&load| {
-            let solved = self.compare(load, Question::of(0.0, 0.0));
-            if let Compared::Solved(mu) = solved {
-                self.open.largest = mu;
-                return true;
+        if let Some(leader) = leader {
+            match self.compare(leader, Question::of(0.0, 0.0)) {
+                Compared::Solved(mu) => self.open.largest = mu,
+                _ => return Err(Ended::Refused),
             }
-            // Its turn comes.
-            self.solved.clear();
-            false
-        });
-        let mut queue = Queue::default();
-        let ended = self.through(loads, leader, out, &mut queue);
-        if let Err(Ended::Refused) = ended {
-            self.refused_before(loads, &queue);
         }
-        ended?;
+        self.through(loads, leader, out, &mut Queue::default())?;
         self.solve_open()?;
         if out(self.open.largest) { Err(Ended::Outranked) } else { Ok(()) }
+    }
+
+    /// Of the loads without a limit state the one whose turn comes first, if there are any: of those
+    /// before it it is enough to see that they are held.
+    pub(super) fn first_refused(mut self, loads: &[usize]) -> Option<Scored> {
+        self.at_least(f64::INFINITY);
+        let mut queue = Queue::default();
+        let Err(Ended::Refused) = self.through(loads, None, &|_| false, &mut queue) else {
+            return None;
+        };
+        self.refused_before(loads, &queue);
+        Some(self.refused())
     }
 
     /// Looks at loads in their turn, several at a time where the states of loads like them are known.
@@ -162,6 +174,9 @@ impl Work<'_> {
         for &load in loads {
             if out(self.open.value()) {
                 return Err(Ended::Outranked);
+            }
+            if self.solved.len() >= self.most {
+                return Err(Ended::Hard);
             }
             if leader == Some(load) {
                 continue;

@@ -4,6 +4,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::{Axis, Part, Shape};
+use crate::model::Frame;
 
 /// Faces across the axis may lean by this \[rad\].
 const LEVEL: f64 = 1e-3;
@@ -25,6 +26,18 @@ pub enum Symmetry {
         /// The point \[m\].
         centre: DVec3,
     },
+}
+
+impl Symmetry {
+    /// The same where `frame` puts the part.
+    pub fn moved(&self, frame: &Frame) -> Self {
+        match *self {
+            Self::Axis { axis: Axis { origin, direction } } => Self::Axis {
+                axis: Axis { origin: frame.point(origin), direction: frame.rotation * direction },
+            },
+            Self::Point { centre } => Self::Point { centre: frame.point(centre) },
+        }
+    }
 }
 
 impl Part {

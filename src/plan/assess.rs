@@ -230,36 +230,44 @@ impl Assessor<'_> {
             if curved {
                 self.assess_curved(block, best, watch, &mut done);
             } else {
-                let count = block.len();
-                done.ranked.extend(self.assess_plane(block, best)?);
-                watch.count(count);
+                self.assess_plane(block, best, watch, &mut done)?;
             }
         }
         Ok(done)
     }
 
-    fn assess_plane(&self, grips: Vec<Grip>, best: Option<&mut Best>) -> Result<Vec<RankedGrip>> {
+    fn assess_plane(
+        &self,
+        grips: Vec<Grip>,
+        best: Option<&mut Best>,
+        watch: &Watch<'_>,
+        done: &mut AssessedGrips,
+    ) -> Result<()> {
+        let score = &self.settings.score;
         let wrenches = self.in_part();
         let batch =
             Batch { problems: grips.iter().map(|grip| self.problem(grip, &wrenches)).collect() };
         let scored = match best {
-            None => self.backend.score(&batch, self.seeds, &self.settings.score)?,
+            None => self.backend.score_watched(&batch, self.seeds, score, watch)?,
             Some(best) => {
                 let alphas: Vec<f64> = grips
                     .par_iter()
                     .map(|grip| self.alpha(grip, least(&TwistOut::new(&grip.contact))))
                     .collect();
                 let merit = |index: usize, mu: f64| self.settings.merit(mu, alphas[index]);
-                self.backend.score_best(&batch, self.seeds, &self.settings.score, best, &merit)?
+                let race = (best, &merit as &(dyn Fn(usize, f64) -> f64 + Sync));
+                self.backend.score_best_watched(&batch, self.seeds, score, race, watch)?
             }
         };
-        let jobs = grips.into_par_iter().zip(scored).filter(|(_, scored)| !scored.outranked);
-        let measure = |(grip, scored): (Grip, Scored)| {
+        done.left += scored.iter().filter(|scored| scored.is_none()).count();
+        let measured = grips.into_par_iter().zip(scored).filter_map(|(grip, scored)| {
+            let scored = scored.filter(|scored| !scored.outranked)?;
             let lever = TwistOut::new(&grip.contact);
             let margin = |wrench: &Wrench| lever.margin(self.settings.force, wrench);
-            self.measure(grip, &scored, least(&lever), &margin)
-        };
-        Ok(jobs.map(measure).collect())
+            Some(self.measure(grip, &scored, least(&lever), &margin))
+        });
+        done.ranked.par_extend(measured);
+        Ok(())
     }
 
     fn assess_curved(

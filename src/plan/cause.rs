@@ -66,6 +66,8 @@ pub(super) fn causes(
         };
         let why = if let Err(why) = within(across, gripper) {
             why
+        } else if options.faces.as_ref().is_some_and(|chosen| !chosen.contains(&face.id)) {
+            "it is none of the faces chosen".to_owned()
         } else if options.curved == Some(false) {
             "not tried, as the option curved is off".to_owned()
         } else if tally.curved_left_out {
@@ -75,20 +77,26 @@ pub(super) fn causes(
         } else if turn < HALF_TURN {
             format!("it covers {:.0} deg: no two of its sides are opposite", turn.to_degrees())
         } else {
-            let most =
-                rejections.iter().max_by_key(|(name, count)| (**count, std::cmp::Reverse(*name)));
-            match most {
-                Some((reason, count)) => format!(
-                    "no pad of {} reaches it; most places, {count}, fall to {}",
-                    gripper.name,
-                    reason.replace('_', " ")
-                ),
-                None => format!("no pad of {} reaches it", gripper.name),
-            }
+            no_place(gripper, rejections)
         };
         causes.push(format!("{name} (face {}): {why}", face.id));
     }
     causes
+}
+
+/// What kept a face whose width the jaws can take from being gripped.
+fn no_place(gripper: &Gripper, rejections: &BTreeMap<String, u64>) -> String {
+    let none = format!("no pad of {} reaches it", gripper.name);
+    // Pairs of faces are rejected for what other faces are.
+    let places = rejections.iter().filter(|(name, _)| !name.starts_with("face_pair"));
+    let most = places.max_by_key(|(name, count)| (**count, std::cmp::Reverse(*name)));
+    let Some((reason, count)) = most else { return none };
+    let in_the_way = ["part_interference", "approach", "ground", "keep_out", "scene"];
+    let told = reason.replace('_', " ");
+    match in_the_way.iter().any(|start| reason.starts_with(start)) {
+        true => format!("{none}; most places, {count}, fall to {told}"),
+        false => format!("no place on it makes a grip; most of all, {count}, fall to {told}"),
+    }
 }
 
 /// Where loads lift a pad off with more than the jaws press: the largest load and what they can bear.
@@ -186,6 +194,25 @@ mod tests {
             within(0.5, &gripper).unwrap_err().ends_with("no gripper of the catalogue reaches it")
         );
         assert_eq!(mm(0.02), "20 mm");
+    }
+
+    #[test]
+    fn a_face_is_out_of_reach_only_where_something_is_in_the_way() {
+        let gripper = gripper::find("robotiq-2f85").unwrap();
+        let told = |reasons: &[(&str, u64)]| {
+            let reasons = reasons.iter().map(|&(name, count)| (name.to_owned(), count));
+            no_place(&gripper, &reasons.collect())
+        };
+        let pair = ("face_pair_outside_stroke", 70);
+        assert_eq!(told(&[pair]), "no pad of Robotiq 2F-85 reaches it");
+        assert_eq!(
+            told(&[pair, ("approach_blocked:finger", 9), ("over_pressure", 8)]),
+            "no pad of Robotiq 2F-85 reaches it; most places, 9, fall to approach blocked:finger"
+        );
+        assert_eq!(
+            told(&[pair, ("approach_blocked:finger", 9), ("over_pressure", 10)]),
+            "no place on it makes a grip; most of all, 10, fall to over pressure"
+        );
     }
 
     #[test]

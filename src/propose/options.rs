@@ -47,7 +47,7 @@ pub struct ProposeOptions {
     pub keep_out: Vec<[DVec3; 2]>,
     /// The gripper must stay above this plane.
     pub ground: Option<Ground>,
-    /// Only these planar faces may be touched, and those of `faces_in`.
+    /// Only these faces, plane and curved ones, may be touched, and those of `faces_in`.
     pub faces: Option<Vec<u32>>,
     /// Only planar faces that lie wholly in one of these boxes may be touched (part frame, smallest
     /// and largest corner \[m\]), and those of `faces`; no box: no such limit.

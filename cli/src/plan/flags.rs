@@ -149,7 +149,7 @@ struct CandidateArgs {
     /// robot; the one that `gripfast pick` reads.
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// Only these planar faces, e.g. 0,1,4 (see `gripfast part`).
+    /// Only these faces, plane and curved ones, e.g. 0,1,4 (see `gripfast part`).
     #[arg(long, value_delimiter = ',', value_name = "FACES")]
     faces: Option<Vec<u32>>,
     /// Only planar faces that lie wholly in this box, and those of --faces: x,y,z:x,y,z with units;

@@ -124,7 +124,19 @@ pub(super) fn no_pairs(rejections: &BTreeMap<String, u64>, gripper: &Gripper) ->
                 the pairs"
             .to_owned();
     }
-    format!("no two opposite faces lie within the stroke of {least:.1} to {most:.1} mm")
+    let stroke = format!("within the stroke of {least:.1} to {most:.1} mm");
+    if any("face_pair_outside_stroke") {
+        format!("no two opposite faces lie {stroke}")
+    } else if any("bore_too_narrow_for_pads") {
+        "the pads are too wide for the bores: half a pad may be 0.4 of a bore's radius wide"
+            .to_owned()
+    } else if any("face_pair_too_small") {
+        "all faces that are opposite each other are too small for pads: those of a mesh may be \
+         pieces of what is one face on the part (see `gripfast part`)"
+            .to_owned()
+    } else {
+        format!("no two faces {stroke} come into question")
+    }
 }
 
 /// A part that is smaller than the pads, as one is in a file of another unit than was taken.

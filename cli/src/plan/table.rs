@@ -27,6 +27,10 @@ pub(super) fn print(
 ) -> anyhow::Result<()> {
     summary(out, set, gripper)?;
     if set.grips.is_empty() {
+        if !set.provenance.complete {
+            writeln!(out, "\nno grip was found before the search was interrupted")?;
+            return Ok(());
+        }
         writeln!(out, "\nno grip holds this part: see the reasons above")?;
         if set.summary.pairs == 0 {
             writeln!(out, "{}", no_pairs(&set.summary.rejections, gripper))?;

@@ -159,6 +159,7 @@ fn the_first_free_grip_is_printed_with_the_reasons_before_it() {
     );
     assert_eq!(found["chosen"]["approach_direction"], serde_json::json!([0.0, 0.0, -1.0]));
     assert_eq!(found["chosen"]["tool_frame"], "z approach, x closing, origin at the flange");
+    assert_eq!(found["chosen"]["free_turn"], serde_json::Value::Null);
     assert!((found["chosen"]["opened_m"].as_f64().unwrap() - 0.03).abs() < 1e-12);
 
     let (code, stdout, _) = pick(folder.path(), &[]);
