@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use glam::DVec3;
-use gripfast::backend::{Backend, Batch, Polish, Problem, ScoreOptions, Scored, SeedSet};
+use gripfast::backend::{Backend, Batch, Best, Polish, Problem, ScoreOptions, Scored, SeedSet};
 use gripfast::gripper;
 use gripfast::load::{LoadSet, LoadSource, wrench_in_grip};
 use gripfast::model::{Grip, Wrench};
@@ -48,13 +48,7 @@ impl Case {
         self.grips.iter().map(seen).collect()
     }
 
-    fn score(
-        &self,
-        backend: &Backend,
-        wrenches: &[Vec<Wrench>],
-        force: f64,
-        polish: Polish,
-    ) -> Vec<Scored> {
+    fn batch<'a>(&'a self, wrenches: &'a [Vec<Wrench>], force: f64) -> Batch<'a> {
         let problems = self.grips.iter().zip(wrenches).map(|(grip, wrenches)| Problem {
             contact: &grip.contact,
             distance: grip.distance(),
@@ -62,9 +56,26 @@ impl Case {
             wrenches,
             pose: None,
         });
+        Batch { problems: problems.collect() }
+    }
+
+    fn score(
+        &self,
+        backend: &Backend,
+        wrenches: &[Vec<Wrench>],
+        force: f64,
+        polish: Polish,
+    ) -> Vec<Scored> {
         let options = ScoreOptions { polish, ..Default::default() };
-        let batch = Batch { problems: problems.collect() };
-        backend.score(&batch, &SeedSet::default(), &options).unwrap()
+        backend.score(&self.batch(wrenches, force), &SeedSet::default(), &options).unwrap()
+    }
+
+    /// In a race that none is out of.
+    fn race(&self, wrenches: &[Vec<Wrench>], force: f64) -> Vec<Scored> {
+        let (batch, set, options) =
+            (self.batch(wrenches, force), SeedSet::default(), ScoreOptions::default());
+        let mut best = Best::new(usize::MAX);
+        Backend::Cpu.score_best(&batch, &set, &options, &mut best, &|_, mu| 1.0 / mu).unwrap()
     }
 
     /// Loads solved in full per grip that is held, and grips held: on the processor, and (where there
@@ -77,6 +88,8 @@ impl Case {
             let found = self.score(gpu, &wrenches, force, Polish::Worst);
             assert_same(&format!("{name}, {force} N, graphics processor"), &found, &expected);
         }
+        let raced = self.race(&wrenches, force);
+        assert_same(&format!("{name}, {force} N, race"), &raced, &expected);
         let found = self.score(&Backend::Cpu, &wrenches, force, Polish::Worst);
         assert_same(&format!("{name}, {force} N, processor"), &found, &expected)
     }
