@@ -151,6 +151,8 @@ fn a_run_stopped_within_a_chunk_keeps_its_grips_and_scores_it_again() {
     request.candidates.angle_step = Angle(90_f64.to_radians());
     request.output.output = Some(folder.path().join("grips.json"));
     request.output.resume = true;
+    // Each grip of the file is asked for the force that it needs.
+    request.selection.keep = Some(20);
     let part = superellipsoid();
     assert_eq!((part.faces.len(), part.curved.len()), (0, 1));
     let plan = Plan::builder(request).part(part).build().unwrap();

@@ -84,11 +84,11 @@ export class Detail {
     this.full(i);
   }
 
-  /** That grip `i` is one of several that a turn about the part's axis maps to each other. */
+  /** That grip `i` is one of several that a turn of the part, about its axis or middle, maps to each other. */
   turns(i) {
     const first = this.report.column.turn_of?.[i];
     const turns = this.report.turns.get(first) ?? 1;
-    return turns < 2 ? '' : `, one of ${count(turns)} turns about the axis${first === this.report.column.id[i] ? '' : ` of id ${first}`}`;
+    return turns < 2 ? '' : `, one of ${count(turns)} that a turn of the part maps to each other${first === this.report.column.id[i] ? '' : `, the first of them id ${first}`}`;
   }
 
   numbers(i) {

@@ -851,7 +851,7 @@ async function turns(page) {
     return { alike: state.order.every((i) => seen(i) === seen(first(i))), best: new Set(report.column.turn_of).size, all: state.order.length };
   });
   check('turns about the axis look alike from the axis', families.alike && families.best < families.all, JSON.stringify(families));
-  check('and are told of the grip', /one of \d+ turns about the axis/.test(await page.innerText('.grip-sub')), await page.innerText('.grip-sub'));
+  check('and are told of the grip', /one of \d+ that a turn of the part maps to each other/.test(await page.innerText('.grip-sub')), await page.innerText('.grip-sub'));
   await page.evaluate(() => (document.querySelector('#more-filters').open = true));
   await page.selectOption('#turns', 'best');
   const left = await page.evaluate(() => window.gripfast.state.order.map((i) => [window.gripfast.report.column.id[i], window.gripfast.report.column.turn_of[i]]));
