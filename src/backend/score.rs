@@ -286,7 +286,7 @@ impl Case<'_> {
             match ended.and_then(|()| work.with_bounds(bounded.clone(), &out)) {
                 Ok(()) => Ok(work.worst()),
                 Err(Ended::Outranked) => Ok(work.outranked()),
-                Err(Ended::Refused | Ended::Hard) => Err(work),
+                Err(Ended::Refused | Ended::Hard) => Err(Box::new(work.refused())),
             }
         };
         // The one that seems to ask for most comes before them all: few of the others reach it.
@@ -300,7 +300,7 @@ impl Case<'_> {
         look(&self.in_turn(&open, beaten.is_some()), leader, most)
             .or_else(|_| Work::new(self).first_refused(&turn()).ok_or(()))
             .or_else(|()| look(&turn(), None, usize::MAX))
-            .unwrap_or_else(Work::refused)
+            .unwrap_or_else(|refused| *refused)
     }
 
     fn has_bounds(&self, load: usize) -> bool {
