@@ -3,11 +3,13 @@
 use std::io::Write;
 
 use glam::{DQuat, DVec3};
+use rustc_hash::FxHashMap;
 
 use super::{Format, Options, View, tidy};
 use crate::error::Result;
 use crate::geometry::patch_area;
 use crate::model::{Slip, Wrench};
+use crate::rank;
 use crate::results::{ForceRange, GripSet, PadFriction, RankedGrip};
 
 /// A column with its name, which ends in the unit.
@@ -234,6 +236,12 @@ pub(super) fn from_view(view: &View<'_>) -> Table {
             number("earlier_place", &|grip| grip.earlier.as_ref().map(|earlier| earlier.place)),
             number("earlier_mu_s", &|grip| grip.earlier.as_ref().map(|earlier| earlier.mu_s)),
         ]);
+    }
+    // Of round parts.
+    if view.set.part.symmetry.is_some() {
+        let ids = view.set.grips.iter().map(|grip| grip.grip.id);
+        let firsts: FxHashMap<u64, u64> = ids.zip(rank::turned(view.set)).collect();
+        columns.push(number("turn_of", &|grip| firsts.get(&grip.grip.id).map(|&id| id as f64)));
     }
     Table { columns, rows: grips.len() }
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
 use glam::{DMat3, DVec2, DVec3};
+use gripfast::export::{self, Values, table};
 use gripfast::gripper;
 use gripfast::model::{Frame, Grip, Wrench};
 use gripfast::part::{Part, ReadOptions, Symmetry, Unit};
@@ -188,6 +189,11 @@ fn turns_of_a_shaft_are_one_family() {
     }
     // Six closing directions and two sides to come from.
     assert!(angles.values().any(|turns| turns.len() == 12), "{angles:?}");
+    // A table names the family of each grip.
+    let table = table(set, &export::Options::default()).unwrap();
+    let column = table.columns.iter().find(|column| column.name == "turn_of").unwrap();
+    let expected = firsts.iter().map(|&id| Some(id as f64)).collect();
+    assert_eq!(column.values, Values::Number(expected));
     // No two families are one: no turn maps their best grips to each other.
     let best: Vec<u64> = angles.keys().copied().collect();
     for (place, a) in best.iter().enumerate() {
