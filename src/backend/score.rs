@@ -2,7 +2,6 @@
 //! solved in f64.
 
 use std::ops::Range;
-use std::sync::atomic::AtomicBool;
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -85,8 +84,7 @@ impl Backend {
         seeds: &SeedSet,
         options: &ScoreOptions,
     ) -> Result<Vec<Scored>> {
-        let (stop, mut tell) = (AtomicBool::new(false), |_| ());
-        let scored = self.score_watched(batch, seeds, options, &Watch::new(&stop, &mut tell))?;
+        let scored = Watch::none(|watch| self.score_watched(batch, seeds, options, watch))?;
         Ok(scored.into_iter().flatten().collect())
     }
 

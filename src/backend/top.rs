@@ -1,8 +1,6 @@
 //! A race for the best grips: those whose bounds show that they cannot be among them are not solved
 //! to the end.
 
-use std::sync::atomic::AtomicBool;
-
 use rayon::prelude::*;
 
 use super::job::Backend;
@@ -67,10 +65,10 @@ impl Backend {
         best: &mut Best,
         merit: &(dyn Fn(usize, f64) -> f64 + Sync),
     ) -> Result<Vec<Scored>> {
-        let (stop, mut tell) = (AtomicBool::new(false), |_| ());
-        let watch = Watch::new(&stop, &mut tell);
-        let scored = self.score_best_watched(batch, seeds, options, (best, merit), &watch)?;
-        Ok(scored.into_iter().flatten().collect())
+        let score = |watch: &Watch<'_>| {
+            self.score_best_watched(batch, seeds, options, (best, merit), watch)
+        };
+        Ok(Watch::none(score)?.into_iter().flatten().collect())
     }
 
     /// As [`Backend::score_best`], as far as `watch` does not stop it: `None` for the other grips.

@@ -29,6 +29,11 @@ impl<'a> Watch<'a> {
         Self { stop, scored: AtomicUsize::new(0), teller }
     }
 
+    /// Makes a call that nobody sees or stops.
+    pub(crate) fn none<T>(call: impl FnOnce(&Watch<'_>) -> T) -> T {
+        call(&Watch::new(&AtomicBool::new(false), &mut |_| ()))
+    }
+
     pub(crate) fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }

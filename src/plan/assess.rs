@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -194,8 +193,7 @@ impl Assessor<'_> {
     /// # Errors
     /// As [`Backend::score`].
     pub fn assess(&self, grips: Vec<Grip>) -> Result<Vec<RankedGrip>> {
-        let (stop, mut tell) = (AtomicBool::new(false), |_| ());
-        Ok(self.assess_watched(grips, None, &Watch::new(&stop, &mut tell))?.ranked)
+        Ok(Watch::none(|watch| self.assess_watched(grips, None, watch))?.ranked)
     }
 
     /// As [`Assessor::assess`] until `watch` stops it. With `best`, the merits so far, without the grips
