@@ -95,8 +95,14 @@ impl Proposer<'_> {
             let as_near = fits.iter().take_while(|other| other.0 <= nearest.0 + ROUNDING);
             let alike = as_near.filter(|other| is_inside(&other.1) == inside);
             // More than what rounding moves a pad over an edge.
-            let met = alike.filter(|other| touched(other, ROUNDING * reach)).map(|other| other.1);
-            met.min_by(|a, b| (sense * a.gap).total_cmp(&(sense * b.gap))).unwrap_or(nearest.1)
+            let met: Vec<Fit> = alike
+                .filter(|other| touched(other, ROUNDING * reach))
+                .map(|other| other.1)
+                .collect();
+            let first = met.iter().map(|fit| sense * fit.gap).fold(f64::INFINITY, f64::min);
+            // Of those as near the one whose candidates come first.
+            let met = met.into_iter().filter(|fit| sense * fit.gap <= first + ROUNDING);
+            met.min_by_key(|fit| fit.site).unwrap_or(nearest.1)
         };
         let fit = fits.iter().find(|fit| touched(fit, 0.0)).map(first_met);
         match (fit.or(fits.first().map(|first| first.1)), nearest) {
