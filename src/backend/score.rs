@@ -281,7 +281,7 @@ impl Case<'_> {
             work.at_least(known);
             work.at_most(most);
             let ended = work.without_bounds(open, leader, &out);
-            match ended.and_then(|()| work.with_bounds(bounded.clone(), &out)) {
+            match ended.and_then(|()| work.with_bounds(&bounded, &out)) {
                 Ok(()) => Ok(work.worst()),
                 Err(Ended::Outranked) => Ok(work.outranked()),
                 Err(Ended::Refused | Ended::Hard) => Err(Box::new(work.refused())),

@@ -386,12 +386,13 @@ impl Work<'_> {
     /// for the worst of them only.
     pub(super) fn with_bounds(
         &mut self,
-        mut bounded: Vec<usize>,
+        bounded: &[usize],
         out: &dyn Fn(f64) -> bool,
     ) -> std::result::Result<(), Ended> {
         let case = self.case;
         let floor = self.open.floor.max(self.open.largest);
-        bounded.retain(|&load| case.seeds[load].upper >= floor);
+        let reaches = |load: &usize| case.seeds[*load].upper >= floor;
+        let mut bounded: Vec<usize> = bounded.iter().copied().filter(reaches).collect();
         let close = self.close_bounds(&bounded);
         let upper = |load: usize| {
             close.get(&load).copied().unwrap_or(f64::INFINITY).min(case.seeds[load].upper)

@@ -162,6 +162,22 @@ const ANSWERS_AT_ONCE: usize = 1 << 17;
 /// waits while the last block of a call is solved.
 const PLANE_LOADS_AT_ONCE: usize = 1 << 23;
 
+impl AssessedGrips {
+    /// Takes along grips with their answers: those left unscored are counted, those out of the race dropped.
+    fn take<T: Send>(
+        &mut self,
+        grips: impl IndexedParallelIterator<Item = T>,
+        scored: Vec<Option<Scored>>,
+        measure: impl Fn(T, &Scored) -> RankedGrip + Sync + Send,
+    ) {
+        self.left += scored.iter().filter(|scored| scored.is_none()).count();
+        self.ranked.par_extend(grips.zip(scored).filter_map(|(grip, scored)| {
+            let scored = scored.filter(|scored| !scored.outranked)?;
+            Some(measure(grip, &scored))
+        }));
+    }
+}
+
 impl Assessor<'_> {
     /// The grips without those under a load that the gripper may not carry, and how many fell to
     /// which limit.
@@ -257,14 +273,11 @@ impl Assessor<'_> {
                 self.backend.score_best_watched(&batch, self.seeds, score, race, watch)?
             }
         };
-        done.left += scored.iter().filter(|scored| scored.is_none()).count();
-        let measured = grips.into_par_iter().zip(scored).filter_map(|(grip, scored)| {
-            let scored = scored.filter(|scored| !scored.outranked)?;
+        done.take(grips.into_par_iter(), scored, |grip, scored| {
             let lever = TwistOut::new(&grip.contact);
             let margin = |wrench: &Wrench| lever.margin(self.settings.force, wrench);
-            Some(self.measure(grip, &scored, least(&lever), &margin))
+            self.measure(grip, scored, least(&lever), &margin)
         });
-        done.ranked.par_extend(measured);
         Ok(())
     }
 
@@ -293,14 +306,10 @@ impl Assessor<'_> {
         };
         let polish = self.settings.score.polish;
         let scored = score_curved_watched(&problems, polish, best, &merit, watch);
-        done.left += scored.iter().filter(|scored| scored.is_none()).count();
-        let jobs = grips.into_par_iter().zip(levers).zip(scored);
-        let measured = jobs.filter_map(|((grip, lever), scored)| {
-            let scored = scored.filter(|scored| !scored.outranked)?;
+        done.take(grips.into_par_iter().zip(levers), scored, |(grip, lever), scored| {
             let margin = |wrench: &Wrench| lever.margin(self.settings.force, wrench);
-            Some(self.measure(grip, &scored, least(&lever), &margin))
+            self.measure(grip, scored, least(&lever), &margin)
         });
-        done.ranked.par_extend(measured);
     }
 
     fn curved_problem<'a>(

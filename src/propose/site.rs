@@ -168,6 +168,7 @@ pub(super) fn sites(
         centre_of_mass,
         planes: &planes,
         chosen,
+        smallest: tapers::smallest(part, gripper, options),
         directions: Vec::new(),
         budget: Budget::NONE,
     };
@@ -250,6 +251,8 @@ struct Finder<'a> {
     centre_of_mass: DVec3,
     planes: &'a Planes,
     chosen: Option<&'a [bool]>,
+    /// See [`tapers::smallest`] [m^2].
+    smallest: f64,
     /// Closing directions so far.
     directions: Vec<DVec3>,
     /// What may still be tried on curved faces.

@@ -107,7 +107,7 @@ impl<'a> Finder<'a> {
             return None;
         }
         let (area, taper) = self.wedge(&pairs)?;
-        if area < self.smallest() {
+        if area < self.smallest {
             return None;
         }
         let survey = surveys.of(self, taper.direction)?;

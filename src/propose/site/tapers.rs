@@ -10,8 +10,10 @@ use super::shapes::project;
 use super::{Finder, axes};
 use crate::geometry::overlay;
 use crate::geometry::polygon::{self, Bounds2};
+use crate::gripper::Gripper;
 use crate::model::Gap;
-use crate::part::{ANTIPARALLEL, CurvedFace, PairKind, PlanarFace, Shape};
+use crate::part::{ANTIPARALLEL, CurvedFace, PairKind, Part, PlanarFace, Shape};
+use crate::propose::options::ProposeOptions;
 
 /// Angle of either surface to the pads up to which two are opposite each other \[rad\].
 pub(super) const STEEPEST: f64 = 15.0 * std::f64::consts::PI / 180.0;
@@ -129,6 +131,21 @@ impl Disc {
     }
 }
 
+/// Overlap of leaning planes below which they are none for pads [m^2]; any that is asked for by its number
+/// will do.
+pub(super) fn smallest(part: &Part, gripper: &Gripper, options: &ProposeOptions) -> f64 {
+    if options.faces.is_some() {
+        return 0.0;
+    }
+    let planes = part.faces.iter().filter(|face| face.reachable);
+    let (low, high) = part.mesh.bounding_box();
+    let size = high - low;
+    let side = size.element_product() / size.max_element();
+    let largest = planes.map(|face| face.area).fold(LEAST_PLANE * side, f64::max);
+    let pads = gripper.pad_sizes().map(DVec2::element_product);
+    LEAST_OVERLAP * largest.min(pads[0]).min(pads[1])
+}
+
 impl Finder<'_> {
     /// Pairs of planes that are opposite each other and not parallel; and how many were too small.
     pub(super) fn drafted(&mut self) -> (Vec<Taper>, u64) {
@@ -143,7 +160,7 @@ impl Finder<'_> {
             .filter(|face| face.reachable && self.may_touch(face.id) && !is_facet(face))
             .collect();
         let (most, least) = (ANTIPARALLEL.cos(), (2.0 * STEEPEST).cos());
-        let floor = self.smallest();
+        let floor = self.smallest;
         let mut areas: BTreeMap<usize, f64> = BTreeMap::new();
         for face in &faces {
             *areas.entry(self.planes.of[face.id as usize]).or_default() += face.area;
@@ -198,21 +215,6 @@ impl Finder<'_> {
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.sides.cmp(&b.1.sides)));
         (found.into_iter().take(MOST_PAIRS).map(|(_, taper)| taper).collect(), too_small)
-    }
-
-    /// Overlap of leaning planes below which they are none for pads [m^2]; any that is asked for by
-    /// its number will do.
-    pub(super) fn smallest(&self) -> f64 {
-        if self.options.faces.is_some() {
-            return 0.0;
-        }
-        let planes = self.part.faces.iter().filter(|face| face.reachable);
-        let (low, high) = self.part.mesh.bounding_box();
-        let box_size = high - low;
-        let side = box_size.element_product() / box_size.max_element();
-        let largest = planes.map(|face| face.area).fold(LEAST_PLANE * side, f64::max);
-        let pads = self.gripper.pad_sizes().map(glam::DVec2::element_product);
-        LEAST_OVERLAP * largest.min(pads[0]).min(pads[1])
     }
 
     /// Pairs in two planes as one, and the area in which they are opposite each other [m^2].
